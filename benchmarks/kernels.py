@@ -1,0 +1,126 @@
+"""Cell-steps per second of one acoustic pipe, beside a triad: `python benchmarks/kernels.py [cells ...]`.
+
+A cell-step is one cell over one whole step of the method. The STREAM triad has arrays of twice as many
+elements as there are cells: as many bytes in play as two fields with three buffers each. `of triad` is the
+share of its bandwidth for the bytes that a cell-step cannot do without. One thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
+TRIAD_BYTES = 24  # per element: two read, one written (the line fetched before writing is not counted)
+BUDGET = 0.2  # [s] for one measurement
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Something that steps cells: `prepare(cells)` gives `advance(steps)`, compiled and warm.
+
+    bytes : that a cell-step must read and write at the least, out of cache
+    """
+
+    name: str
+    bytes: int
+    prepare: Callable[[int], Callable[[int], None]]
+
+
+def schemes() -> list[Subject]:
+    """fvsolve's schemes with SSP-RK2 and two fields."""
+    return []
+
+
+def pyclaw() -> list[Subject]:
+    """PyClaw's classic Fortran solver, if there: Lax-Wendroff with the MC limiter, periodic, Courant 0.9."""
+    try:
+        from clawpack import pyclaw, riemann
+    except ImportError:
+        return []
+
+    def prepare(cells: int) -> Callable[[int], None]:
+        solver = pyclaw.ClawSolver1D(riemann.acoustics_1D)
+        solver.limiters = pyclaw.limiters.tvd.MC
+        solver.bc_lower[0] = solver.bc_upper[0] = pyclaw.BC.periodic
+        domain = pyclaw.Domain(pyclaw.Dimension(0.0, 1.0, cells, name="x"))
+        state = pyclaw.State(domain, 2)
+        state.problem_data.update(rho=1.0, bulk=1.0, zz=1.0, cc=1.0)
+        state.q[0, :] = np.exp(-100.0 * (domain.grid.x.centers - 0.5) ** 2)
+        state.q[1, :] = 0.0
+        solution = pyclaw.Solution(state, domain)
+        solver.dt_variable, solver.max_steps = False, 10**9
+        solver.dt = solver.dt_initial = 0.9 / cells
+        solver.setup(solution)
+
+        def advance(steps: int) -> None:
+            solver.evolve_to_time(solution, solution.t + steps * solver.dt)
+
+        return advance
+
+    return [Subject("PyClaw, Lax-Wendroff MC", 32, prepare)]
+
+
+@numba.njit(error_model="numpy")
+def triad(a, b, c, s, times):
+    """a = b + s c, `times` over, the arrays changing places so that no pass can be left out."""
+    for _ in range(times):
+        for i in range(a.size):
+            a[i] = b[i] + s * c[i]
+        a, b, c = c, a, b
+    return a[0]
+
+
+def rate(advance: Callable[[int], object], elements: int, repeats: int = 5) -> float:
+    """Elements per second, best of `repeats`, each long enough to be timed."""
+    advance(1)
+    times, wall = 1, 0.0
+    while wall < BUDGET / 10.0:
+        times *= 2
+        start = time.perf_counter()
+        advance(times)
+        wall = time.perf_counter() - start
+    times = max(1, int(times * BUDGET / repeats / wall))
+    walls = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        advance(times)
+        walls.append(time.perf_counter() - start)
+    return times * elements / min(walls)
+
+
+def bandwidth(elements: int) -> float:
+    """What the triad moves [bytes/s] on arrays of this many elements."""
+    a, b, c = np.zeros(elements), np.ones(elements), np.ones(elements)
+    return TRIAD_BYTES * rate(lambda times: triad(a, b, c, 0.0, times), elements)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cells", nargs="*", type=int, default=SIZES)
+    sizes = parser.parse_args().cells
+    reached = {cells: bandwidth(2 * cells) for cells in sizes}
+    print("| million per second |" + "".join(f" {cells:.0e} cells |" for cells in sizes))
+    print("|---|" + "---|" * len(sizes))
+    cells_of_triad = (
+        f" {reached[cells] / TRIAD_BYTES / 1e6:.0f} ({reached[cells] / 1e9:.0f} GB/s) |" for cells in sizes
+    )
+    print("| triad, elements (twice the cells) |" + "".join(cells_of_triad))
+    peers = pyclaw()
+    for subject in schemes() + peers:
+        row = f"| {subject.name} |"
+        for cells in sizes:
+            speed = rate(subject.prepare(cells), cells)
+            row += f" {speed / 1e6:.1f} ({speed * subject.bytes / reached[cells]:.0%} of triad) |"
+        print(row, flush=True)
+    if not peers:
+        print("\nNo PyClaw row: clawpack does not import here (from PyPI it wants a Fortran compiler).")
+
+
+if __name__ == "__main__":
+    main()

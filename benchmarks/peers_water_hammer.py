@@ -1,0 +1,217 @@
+"""fvsolve beside rthym-moc 0.4.1: `python benchmarks/peers_water_hammer.py [rate] [three] [nine]`.
+
+rate:         one uniform pipe with friction, Courant 1: node-steps per second.
+three, nine:  networks whose lengths share no step: CPU time against error to the exact heads (exact.py).
+
+CPU time is the best of several: of the stepping alone for fvsolve (its own summary), of the solve call for
+rthym-moc; `whole` is all that fvsolve.run(dict) does once compiled. One thread. `error` is the difference of
+the heads at gate and junction to the exact ones over the run, in Joukowsky jumps: the greatest for the smooth
+closure, the mean for ramp and instant closure.
+"""
+
+import argparse
+import platform
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from time import perf_counter
+
+import networks
+import numpy as np
+import peer_moc
+from exact import exact_heads, impulse_response
+
+import fvsolve
+
+EVERY = 0.01  # [s] between the rows that are compared
+GOALS = {
+    "smooth": ((1e-3, 500), (1e-4, 10_000)),
+    "ramp": ((1e-3, 2), (1e-4, 500)),
+    "instant": ((1e-2, "none"), (3e-3, "none")),
+}
+PEER_STEPS = {"three": 8e-3 / 2.0 ** np.arange(8), "nine": 8e-3 / 2.0 ** np.arange(7)}  # [s]
+CELL_TIMES = {"smooth": 0.04 / 2 ** (0.5 * np.arange(8)), "ramp": 0.02 / 2.0 ** np.arange(6)}  # [s]
+CELL_TIMES["instant"] = CELL_TIMES["ramp"]
+SCHEMES = {"instant": dict(scheme="muscl", limiter="monotonized-central", method="ssp-rk2", courant=0.9)}
+
+
+@dataclass
+class Run:
+    """One run: what sets its size [s], cells, CPU time [s], greatest and mean error, whole call [s]."""
+
+    size: float
+    cells: int
+    cpu: float
+    greatest: float
+    mean: float
+    whole: float = np.nan
+
+
+def solved(case, repeats):
+    """Result and summary of the quickest of `repeats` runs of a case, and the least whole-call time [s]."""
+    best, whole = None, np.inf
+    for _ in range(repeats):
+        start = perf_counter()
+        result = fvsolve.run(case)
+        whole = min(whole, perf_counter() - start)
+        if not result.ok:
+            raise SystemExit(f"{case['title']}: {result.reason}")
+        if best is None or result.summary["seconds"] < best.summary["seconds"]:
+            best = result
+    return best, whole
+
+
+def by_cells(network, closure, response, cell_time, repeats=5, **numerics):
+    """fvsolve's run with cells of `cell_time`."""
+    case = networks.case(network, closure, cell_time, EVERY, **numerics)
+    result, whole = solved(case, repeats)
+    last = np.append(np.diff(result.t) > 0, True)  # at a jump, the row after it
+    exact = exact_heads(network, closure, result.t[last], response)
+    found = np.array([np.abs(result[f"{p}.head"][last] - exact[p]) for p in network.probes]) / network.jump
+    summary = result.summary
+    return Run(cell_time, summary["cells"], summary["seconds"], found.max(), found.mean(), whole)
+
+
+def by_characteristics(network, closure, response, dt):
+    """rthym-moc's run with steps of dt."""
+    cpu, times, heads = peer_moc.heads(network, closure, dt, repeats=5 if dt > 4e-4 else 1)
+    stride = max(1, round(EVERY / dt))
+    exact = exact_heads(network, closure, times[stride - 1 :: stride], response)
+    found = (
+        np.array([np.abs(heads[p][stride - 1 :: stride] - exact[p]) for p in network.probes]) / network.jump
+    )
+    cells = sum(max(1, round(p.travel / dt)) for p in network.pipes)
+    return Run(dt, cells, cpu, found.max(), found.mean())
+
+
+def fitting_step(network, dt):
+    """The step within a factor sqrt(2) of dt that bends the wave speeds least [s]."""
+    steps = np.geomspace(dt / 2**0.5, dt * 2**0.5, 20_001)
+    travel = np.array([p.travel for p in network.pipes])[:, None]
+    bend = np.abs(np.maximum(1, np.round(travel / steps)) * steps / travel - 1).max(axis=0)
+    return steps[bend.argmin()]
+
+
+def price(runs, error, target):
+    """CPU time at which `runs` reach an error, and how it was found.
+
+    "": log-log between the two runs about it, counting only runs that beat all cheaper ones; "<": the
+    cheapest run is better already; "~": beyond the best run, along the least-squares line of the logarithms.
+    """
+    runs = sorted(runs, key=lambda r: r.cpu)
+    front = [r for k, r in enumerate(runs) if all(error(r) < error(q) for q in runs[:k])]
+    if error(front[0]) <= target:
+        return front[0].cpu, "<"
+    for a, b in zip(front, front[1:], strict=False):
+        if error(b) <= target:
+            part = np.log(error(a) / target) / np.log(error(a) / error(b))
+            return a.cpu * (b.cpu / a.cpu) ** part, ""
+    slope, level = np.polyfit(np.log([r.cpu for r in runs]), np.log([error(r) for r in runs]), 1)
+    start = max(front[-1].cpu, np.exp((np.log(target) - level) / slope))
+    return start, "~"
+
+
+def table(title, runs, unit):
+    """Print one program's runs."""
+    print(f"  {title}")
+    print(f"    {unit:>11} {'cells':>7} {'CPU ms':>10} {'greatest':>9} {'mean':>9} {'whole ms':>9}")
+    for r in runs:
+        whole = f"{r.whole * 1e3:9.1f}" if np.isfinite(r.whole) else " " * 9
+        row = (
+            f"{r.size * 1e3:8.4f} ms {r.cells:7d} {r.cpu * 1e3:10.2f} {r.greatest:9.1e} {r.mean:9.1e} {whole}"
+        )
+        print(f"    {row}")
+
+
+def verdict(name, cells, halved, fitted):
+    """Print the prices at the goals' errors, and the factor between them."""
+
+    def error(r):
+        return r.greatest if name == "smooth" else r.mean
+
+    for target, goal in GOALS[name]:
+        own, how = price(cells, error, target)
+        row = f"fvsolve {how or ' '}{own * 1e3:8.2f} ms"
+        for title, runs in (("steps halved", halved), ("steps picked to fit", fitted)):
+            cost, mark = price(runs, error, target)
+            row += f" | {title} {mark or ' '}{cost * 1e3:10.1f} ms, {cost / own:9.1f} times"
+        print(f"  error {target:.0e} (goal {goal:>6}): {row}")
+
+
+def network_table(network):
+    """All closures of one network, both programs."""
+    response = impulse_response(network)
+    paths = ", ".join(f"{len(w)} pulses at {p}" for p, (_, w) in response.items())
+    print(f"\n{network.name} pipes, {network.end} s; exact: {paths}; jump {network.jump:.3f} m")
+    agreement(network)
+    for name, closure in networks.CLOSURES.items():
+        print(f"\n {network.name} pipes, {name} closure")
+        numerics = SCHEMES.get(name, {})
+        halved = [by_characteristics(network, closure, response, dt) for dt in PEER_STEPS[network.name]]
+        picked = dict.fromkeys(fitting_step(network, dt) for dt in PEER_STEPS[network.name])
+        fitted = [by_characteristics(network, closure, response, dt) for dt in picked]
+        cells = [by_cells(network, closure, response, tau, **numerics) for tau in CELL_TIMES[name]]
+        table("rthym-moc, steps halved", halved, "step")
+        table("rthym-moc, steps picked within a factor 1.4 to bend wave speeds least", fitted, "step")
+        table(f"fvsolve, {' '.join(str(v) for v in (numerics or OWN).values())}", cells, "cell time")
+        verdict(name, cells, halved, fitted)
+
+
+OWN = {"scheme": "upwind5", "method": "rk4", "courant": 0.9}
+
+
+def agreement(network, dt=1e-3):
+    """Print how far rthym-moc is from the exact heads where every pipe holds a whole number of steps."""
+    pipes = (replace(p, length=round(p.travel / dt) * dt * p.wave_speed) for p in network.pipes)
+    whole = replace(network, pipes=tuple(pipes))
+    worst = max(
+        by_characteristics(whole, networks.CLOSURES[name], impulse_response(whole), dt).greatest
+        for name in ("smooth", "ramp")
+    )
+    print(
+        f"  where every length is a whole number of steps, rthym-moc and exact.py differ by {worst:.1e} jumps"
+    )
+
+
+def rate_table(node_steps=1e8):
+    """One pipe with friction at Courant 1: node-steps per second of both, the same physics."""
+    print(f"\nOne pipe with friction, Courant 1, {node_steps:.0e} node-steps, unsteady friction off")
+    print(f"  {'nodes':>6} {'steps':>8} {'rthym-moc':>12} {'fvsolve':>12} {'factor':>7} {'difference':>11}")
+    for nodes in (100, 1_000, 10_000):
+        steps = int(node_steps / nodes)
+        peer = peer_moc.uniform_pipe(networks.UNIFORM, nodes, steps, repeats=3)
+        case = networks.uniform_case(networks.UNIFORM, nodes, steps)
+        result, _ = solved(case, 3)
+        own = result.summary
+        last = np.append(np.diff(result.t) > 0, True)
+        other = np.interp(result.t[last], peer.time, peer.head)
+        apart = np.abs(result["gate.head"][last] - other)[1:].mean() / networks.UNIFORM.jump
+        theirs, ours = nodes * steps / peer.cpu, own["cells"] * own["steps"] / own["seconds"]
+        row = f"{nodes:6d} {steps:8d} {theirs / 1e6:8.0f} M/s {ours / 1e6:8.0f} M/s {ours / theirs:7.2f}"
+        print(f"  {row} {apart:11.1e}")
+    print("  goal: 3 times from 1 000 nodes up. difference: mean of the heads at the gate, in jumps.")
+
+
+def machine():
+    """Processor and versions, in a line."""
+    with open("/proc/cpuinfo") as lines:
+        names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
+    packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "numba", "rthym-moc"))
+    return f"{names[0] if names else platform.processor()}; Python {platform.python_version()}, {packages}"
+
+
+def main():
+    """Print the tables asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", nargs="*", help="rate, three, nine; all if none is named")
+    what = parser.parse_args().what or ["rate", "three", "nine"]
+    print(machine())
+    if "rate" in what:
+        rate_table()
+    if "three" in what:
+        network_table(networks.THREE)
+    if "nine" in what:
+        network_table(networks.NINE)
+
+
+if __name__ == "__main__":
+    main()

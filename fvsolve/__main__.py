@@ -1,0 +1,5 @@
+"""`python -m fvsolve`."""
+
+from fvsolve.cli import main
+
+main()

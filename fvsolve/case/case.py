@@ -1,0 +1,140 @@
+"""A case as read: names, parts and numbers in SI. Knows what was said; knows no file and no mesh."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fvsolve.case import text
+from fvsolve.case.claims import Compare, Expect
+from fvsolve.case.probe import Probe
+from fvsolve.case.sections import DEFAULT_CELLS, FluidSpec, Numerics, Output
+from fvsolve.fluid import Fluid
+from fvsolve.parts import Link, Node, Pipe
+from fvsolve.parts.table import plain
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A hydraulic scene, frozen; SI, pressures absolute [Pa]. Two cases are equal if they say the same.
+
+    properties : the fluid's numbers at its reference state
+    nodes, links : name -> part, in the order of the file
+    copies : name -> path of the files it used, under the names `resolved()` refers to
+    """
+
+    name: str
+    path: Path | None
+    title: str
+    description: str
+    source: str
+    schema: int
+    ambient_pressure: float
+    gravity: float
+    fluid: FluidSpec
+    properties: Fluid
+    nodes: dict[str, Node]
+    links: dict[str, Link]
+    signals: dict[str, Any]
+    numerics: Numerics
+    output: Output
+    expect: dict[str, Expect]
+    compare: dict[str, Compare]
+    copies: dict[str, Path]
+    raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
+    folder: Path | None = field(repr=False)
+
+    @property
+    def files(self) -> list[Path]:
+        """The schedule and compare files it used."""
+        return list(self.copies.values())
+
+    @property
+    def probes(self) -> list[Probe]:
+        """All that must be recorded: probes of the output, then those that only expect or compare name."""
+        named = [*self.output.probes]
+        named += [one.probe for one in [*self.expect.values(), *self.compare.values()]]
+        return list({probe.text: probe for probe in named}.values())
+
+    @property
+    def elevations_stated(self) -> bool:
+        """Whether the nodes state elevations."""
+        return any(node.elevation is not None for node in self.nodes.values())
+
+    def elevation(self, name: str) -> float:
+        """Height of a node above datum [m]: as stated; 0 where none is.
+
+        A reservoir given by head may leave it out where others state theirs: it then lies level with the
+        first node that one of its links leads to, since its head alone drives the flow.
+        """
+        stated = self.nodes[name].elevation
+        if stated is not None or not self.elevations_stated:
+            return stated or 0.0
+        for link in self.links.values():
+            ends = list(link.ports.values())
+            for other in ends if name in ends else []:
+                if self.nodes[other].elevation is not None:
+                    return self.nodes[other].elevation
+        return 0.0
+
+    def wave_speed(self, name: str) -> float:
+        """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho), 1/K = 1/beta + diameter / (E wall)."""
+        return wave_speed(self.links[name], self.properties)
+
+    def resolved(self) -> str:
+        """TOML text with every default filled in, in SI; it reads back as an equal case beside its files."""
+        return text.write(self.table())
+
+    def table(self) -> dict[str, Any]:
+        """The same as nested dicts."""
+        said = {
+            "schema": self.schema,
+            "title": self.title,
+            "description": self.description,
+            "source": self.source,
+            "ambient_pressure": self.ambient_pressure,
+            "gravity": self.gravity,
+            "fluid": self.fluid.table(),
+            "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
+            "links": {name: {"type": link.kind, **link.table()} for name, link in self.links.items()},
+            "signals": {name: plain(signal) for name, signal in self.signals.items()},
+            "numerics": self.numerics.table(),
+            "output": self.output.table(),
+            "expect": {name: one.table() for name, one in self.expect.items()},
+            "compare": {name: one.table() for name, one in self.compare.items()},
+        }
+        return {key: value for key, value in said.items() if value not in ("", {})}
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Case):
+            return NotImplemented
+        return self.table() == other.table()
+
+    __hash__ = None
+
+
+def wave_speed(pipe: Pipe, fluid: Any) -> float:
+    """Speed of waves in a pipe full of a fluid [m/s]."""
+    if pipe.wave_speed is not None:
+        return pipe.wave_speed
+    wall = pipe.wall
+    softness = 0.0 if wall in (None, "stiff") else pipe.diameter / (wall.youngs_modulus * wall.thickness)
+    return math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + softness) / fluid.density)
+
+
+def default_cells(pipes: dict[str, Pipe], fluid: Any, cell_time: float | None) -> dict[str, int]:
+    """Cells of the pipes that state none: as many as travel time / `cell_time` [s], one at least.
+
+    `cell_time` defaults to the longest travel time of the case over `DEFAULT_CELLS`. A number too large for
+    a count is cut at 10^18, for the caller to refuse.
+    """
+    travel = {name: pipe.length / wave_speed(pipe, fluid) for name, pipe in pipes.items()}
+    if cell_time is None:
+        cell_time = max(travel.values(), default=0.0) / DEFAULT_CELLS
+    counts = {}
+    for name, pipe in pipes.items():
+        ratio = travel[name] / cell_time if cell_time > 0 else math.inf
+        counts[name] = max(1, round(min(ratio, 1e18))) if pipe.cells is None else pipe.cells
+    return counts

@@ -1,0 +1,316 @@
+"""From a TOML file or dict to a case. Knows the order of reading; what fits where is known by the parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from fvsolve import units
+from fvsolve.case import check, text
+from fvsolve.case.case import Case, default_cells
+from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
+from fvsolve.case.probe import Probe, default_probes, read_probe
+from fvsolve.case.raw import Raw, override, read_raw
+from fvsolve.case.sections import DEFAULT_ROWS, FluidSpec, Numerics, Output
+from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
+from fvsolve.fluid import properties
+from fvsolve.parts import KINDS, Friction, Pipe
+from fvsolve.parts.pipe import MOST_CELLS
+from fvsolve.parts.schedule import Scheduled
+from fvsolve.parts.table import misfits, read_keys
+from fvsolve.parts.value import (
+    ROOT,
+    Misfit,
+    Quantity,
+    Setting,
+    Text,
+    Whole,
+    between,
+    nonnegative,
+)
+from fvsolve.units import Kinematic, show
+
+SCHEMA = 1
+GROUPS = {
+    "fluid": "the fluid",
+    "nodes": "places",
+    "links": "what lies between them",
+    "numerics": "how it is solved",
+}
+KEYS = (
+    "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
+    "signals", "numerics", "output", "expect", "compare",
+)  # fmt: skip
+TOP = {
+    "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
+    "title": (Text(), ""),
+    "description": (Text(), ""),
+    "source": (Text(), ""),
+    "gravity": (Quantity("acceleration", nonnegative), 9.80665),
+}
+
+
+def load(source: str | Path | Mapping[str, Any] | Case, set: Mapping[str, Any] | None = None) -> Case:
+    """The case of a TOML file, a dict shaped like one, or a case, with the dotted keys of `set` overridden.
+
+    Numbers come out in SI, pressures absolute [Pa]. Raises CaseError with every fault: line, key path, what
+    was found, what was wanted and the nearest valid name.
+    """
+    if isinstance(source, Case):
+        if not set:
+            return source
+        raw = Raw(read_raw(source.raw).table, source.name, source.path, source.folder)
+    else:
+        raw = read_raw(source)
+    return _Reader(raw, set or {}).case()
+
+
+def _alternatives() -> list[tuple[str, ...]]:
+    """Keys of which a table has one at most, over all tables."""
+    models = [Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()]
+    return list(dict.fromkeys(keys for model in models for keys in model.alternatives))
+
+
+class _Reader:
+    """One reading of one case: gathers faults on the way, in the order of dependence."""
+
+    def __init__(self, raw: Raw, settings: Mapping[str, Any]):
+        self.raw = raw
+        self.faults: list[Fault] = override(raw, settings, _alternatives())
+        self.setting = Setting(folder=raw.folder)
+
+    def case(self) -> Case:
+        top = self.top()
+        fluid, properties = self.fluid()
+        self.setting.signals = self.group("signals")
+        parts = {group: self.parts(group) for group in ("nodes", "links")}
+        self.unused_signals()
+        numerics = self.table("numerics", Numerics)
+        kinds = {group: self.kinds(group) for group in parts}
+        output = self.output(numerics, kinds)
+        expect, compare = self.expect(kinds), self.compare(kinds)
+        self.add(check.network(self.raw.table))
+        self.add(
+            check.parts(
+                parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw
+            )
+        )
+        if numerics is not None:
+            has_cells = any(kind is Pipe for kind in kinds["links"].values())
+            self.add(check.numerics(numerics, has_cells))
+            self.add(check.claims(expect, numerics))
+            numerics = numerics.filled(has_cells)
+        links = self.cells(parts["links"], properties, numerics)
+        if self.faults:
+            raise CaseError(dict.fromkeys(self.faults), self.raw.file)
+        return Case(
+            name=self.raw.name,
+            path=self.raw.path,
+            ambient_pressure=self.setting.ambient,
+            fluid=fluid,
+            properties=properties,
+            nodes=parts["nodes"],
+            links=links,
+            signals=dict(self.setting.used),
+            numerics=numerics,
+            output=output,
+            expect=expect,
+            compare=compare,
+            copies=dict(self.setting.files),
+            raw=self.raw.table,
+            folder=self.raw.folder,
+            **top,
+        )
+
+    def fault(self, keys: tuple, message: str) -> None:
+        if ROOT in keys:
+            keys = keys[len(keys) - keys[::-1].index(ROOT) :]
+        place = text.path(keys)
+        if self.raw.is_override(keys):
+            self.faults.append(Fault(place, message, override=True))
+        else:
+            self.faults.append(Fault(place, message, self.raw.line(keys)))
+
+    def add(self, found: Iterable[tuple[tuple, str]]) -> None:
+        for keys, message in found:
+            self.fault(keys, message)
+
+    def misfit(self, keys: tuple, error: ValueError) -> None:
+        if isinstance(error, Misfit):
+            self.add(((*keys, *below), message) for below, message in error.faults)
+        elif hasattr(error, "errors"):
+            self.add(((*keys, *below), message) for below, message in misfits(error, []))
+        else:
+            self.fault(keys, str(error))
+
+    def group(self, name: str) -> dict[str, Any]:
+        found = self.raw.table.get(name, {})
+        if not isinstance(found, dict):
+            self.fault((name,), f"{show(found)} is no table")
+            return {}
+        return found
+
+    def table(self, name: str, model: Any) -> Any:
+        if name not in self.raw.table:
+            if name in GROUPS:
+                self.fault((), f"[{name}] is missing: {GROUPS[name]}")
+                return None
+        try:
+            return model.model_validate(self.raw.table.get(name, {}), context=self.setting)
+        except ValueError as error:
+            self.misfit((name,), error)
+            return None
+
+    def top(self) -> dict[str, Any]:
+        for key in self.raw.table:
+            if key not in KEYS:
+                self.fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}")
+        given = self.raw.table.get("ambient_pressure", 101325.0)
+        try:
+            ambient, gauge = units.parse(given, "pressure")
+            if gauge:
+                raise ValueError(
+                    f'{show(given)} is a gauge pressure; wanted an absolute one, for example "1 atm"'
+                )
+            if ambient <= 0:
+                raise ValueError(f'{show(given)} is absolute, a vacuum; wanted for example "1 atm"')
+            self.setting.ambient = ambient
+        except ValueError as error:
+            self.fault(("ambient_pressure",), str(error))
+        found = {key: default for key, (_, default) in TOP.items()}
+        for key, value in TOP.items():
+            try:
+                if key in self.raw.table:
+                    found |= read_keys({key: self.raw.table[key]}, {key: value}, self.setting)
+            except ValueError as error:
+                self.misfit((), error)
+        return found
+
+    def fluid(self) -> tuple[FluidSpec | None, Any]:
+        spec = self.table("fluid", FluidSpec)
+        if spec is None:
+            return None, None
+        asked = {key: getattr(spec, key) for key in FluidSpec.model_fields}
+        try:
+            if isinstance(spec.viscosity, Kinematic):
+                density = spec.density
+                if density is None:
+                    density = properties(**{**asked, "viscosity": None}).density
+                asked["viscosity"] = float(spec.viscosity) * density
+                spec = spec.model_copy(update={"viscosity": asked["viscosity"]})
+            return spec, properties(**asked)
+        except FluidError as error:
+            self.fault(("fluid", error.key), error.message)
+            return spec, None
+
+    def kinds(self, group: str) -> dict[str, Any]:
+        found = {}
+        for name, part in self.group(group).items():
+            kind = part.get("type") if isinstance(part, dict) else None
+            found[name] = KINDS[group].get(kind) if isinstance(kind, str) else None
+        return found
+
+    def parts(self, group: str) -> dict[str, Any]:
+        if group not in self.raw.table:
+            self.fault((), f"[{group}] is missing: {GROUPS[group]}")
+        made = {}
+        for name, part in self.group(group).items():
+            if not re.fullmatch(r"[\w-]+", name):
+                self.fault((group, name), f"{show(name)} is no name; a name has letters, digits, _ and -")
+            if not isinstance(part, dict):
+                self.fault((group, name), f"{show(part)} is no table; wanted one with a type")
+                continue
+            kind = self.kind(group, name, part)
+            if kind is None:
+                continue
+            try:
+                rest = {key: value for key, value in part.items() if key != "type"}
+                made[name] = kind.model_validate(rest, context=self.setting)
+            except ValueError as error:
+                self.misfit((group, name), error)
+        return made
+
+    def kind(self, group: str, name: str, part: dict[str, Any]) -> Any:
+        known = KINDS[group]
+        if "type" not in part:
+            self.fault((group, name), f"type is missing; wanted one of {listing(known)}")
+            return None
+        kind = part["type"]
+        if not isinstance(kind, str) or kind not in known:
+            other = "links" if group == "nodes" else "nodes"
+            hint = did_you_mean(str(kind), known)
+            if isinstance(kind, str) and kind in KINDS[other]:
+                hint = f"; it belongs under [{other}]"
+            self.fault((group, name, "type"), f"no type {show(kind)}; types are {listing(known)}{hint}")
+            return None
+        return known[kind]
+
+    def unused_signals(self) -> None:
+        for name, given in self.setting.signals.items():
+            if name in self.setting.used or (isinstance(given, dict) and "signal" in given):
+                continue
+            problems = []
+            for dimension in ("number", "flow", "pressure", "head"):
+                try:
+                    Scheduled(dimension).read(given, self.setting)
+                except ValueError as error:
+                    problems.append(error)
+            if len(problems) == 4:
+                self.misfit(("signals", name), problems[0])
+
+    def cells(self, links: dict[str, Any], properties: Any, numerics: Numerics | None) -> dict[str, Any]:
+        pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
+        if properties is None or numerics is None:
+            return links
+        counts = default_cells(pipes, properties, numerics.cell_time)
+        worst = max(counts, key=counts.get, default=None)
+        if worst is not None and counts[worst] > MOST_CELLS:
+            self.fault(
+                ("numerics", "cell_time"),
+                f"would cut {worst} into {counts[worst]:.3g} cells; {MOST_CELLS:.0e} at most",
+            )
+            return links
+        filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()}
+        return {name: filled.get(name, link) for name, link in links.items()}
+
+    def probe(self, given: Any, keys: tuple, kinds: dict) -> Probe | None:
+        try:
+            return read_probe(given, kinds)
+        except ValueError as error:
+            self.fault(keys, str(error))
+            return None
+
+    def output(self, numerics: Numerics | None, kinds: dict) -> Output | None:
+        output = self.table("output", Output)
+        if output is None:
+            return None
+        if output.probes is None:
+            probes = default_probes(kinds)
+        else:
+            named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(output.probes)]
+            probes = list({probe.text: probe for probe in named if probe is not None}.values())
+        changes: dict[str, Any] = {"probes": probes}
+        if output.every is None and numerics is not None:
+            changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS
+        return output.model_copy(update=changes)
+
+    def expect(self, kinds: dict) -> dict[str, Expect]:
+        made = {}
+        for claim, given in self.group("expect").items():
+            try:
+                made[claim] = read_expect(claim, given, kinds, self.setting)
+            except ValueError as error:
+                self.misfit(("expect", claim), error)
+        return made
+
+    def compare(self, kinds: dict) -> dict[str, Compare]:
+        made = {}
+        for name, given in self.group("compare").items():
+            probe = self.probe(name, ("compare", name), kinds)
+            try:
+                made[name] = read_compare(probe, given, self.setting)
+            except ValueError as error:
+                self.misfit(("compare", name), error)
+        return made

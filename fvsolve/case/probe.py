@@ -1,0 +1,100 @@
+"""A quantity of a part that is recorded. Knows how probes are written; knows no values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts import Link, Node
+from fvsolve.units import show
+
+_PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+)\.([^.@]+)(?:@(.*))?")
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What is recorded: text of the case, part and quantity, and along a pipe the fraction from `from`."""
+
+    text: str
+    part: str  # "nodes" | "links"
+    name: str
+    quantity: str
+    fraction: float | None
+    dimension: str
+
+
+Kinds = Mapping[str, Mapping[str, type[Node] | type[Link] | None]]
+
+
+def read_probe(given: object, kinds: Kinds) -> Probe | None:
+    """The probe a text names; None where its part is at fault itself.
+
+    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown). Raises
+    ValueError.
+    """
+    match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
+    if match is None:
+        raise ValueError(f'{show(given)} is no probe; wanted NAME.QUANTITY, for example "gate.pressure"')
+    part, name, quantity, place = match.groups()
+    parts = [part] if part else [part for part in ("nodes", "links") if name in kinds[part]]
+    parts = [part for part in parts if name in kinds[part]]
+    if not parts:
+        names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
+        what = {"nodes": "node", "links": "link"}.get(part or "", "part")
+        raise ValueError(
+            f"no {what} named {show(name)}; {what}s are {listing(names)}{did_you_mean(name, names)}"
+        )
+    if any(kinds[part][name] is None for part in parts):
+        return None
+    found, problems = [], []
+    for part in parts:
+        try:
+            fraction, dimension = _quantity(kinds[part][name], name, quantity, place)
+            found.append(Probe(given.strip(), part, name, quantity, fraction, dimension))
+        except ValueError as error:
+            problems.append(str(error))
+    if not found:
+        raise ValueError("; ".join(problems))
+    if len(found) > 1:
+        raise ValueError(f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}")
+    return found[0]
+
+
+def default_probes(kinds: Kinds) -> list[Probe]:
+    """All nodes (pressure, head, level) and all links (flow)."""
+    texts = []
+    for part, quantities in (("nodes", ("pressure", "head", "level")), ("links", ("flow",))):
+        other = kinds["links" if part == "nodes" else "nodes"]
+        for name, kind in kinds[part].items():
+            known = kind.quantities if kind is not None else ()
+            shared = f"{part}." if name in other else ""
+            texts += [f"{shared}{name}.{quantity}" for quantity in quantities if quantity in known]
+    return [probe for probe in (read_probe(text, kinds) for text in texts) if probe is not None]
+
+
+def _quantity(
+    kind: type[Node] | type[Link], name: str, quantity: str, place: str | None
+) -> tuple[float | None, str]:
+    along = getattr(kind, "along", {})
+    known = {**along, **kind.quantities}
+    article = "an" if kind.kind[0] in "aeiou" else "a"
+    if quantity not in known:
+        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
+        raise ValueError(f"{name} is {article} {kind.kind}, without {show(quantity)}; {has}")
+    if place is None:
+        if quantity not in kind.quantities:
+            raise ValueError(f'{name} is a {kind.kind}: say where, for example "{name}.{quantity}@0.5"')
+        return (0.0 if quantity in along else None), known[quantity]
+    if quantity not in along:
+        raise ValueError(
+            f"{name} is {article} {kind.kind}: {quantity} has no place along it; leave @{place} out"
+        )
+    try:
+        fraction = float(place)
+    except ValueError:
+        fraction = -1.0
+    if not 0.0 <= fraction <= 1.0:
+        raise ValueError(f'"@{place}" is no fraction of the length; wanted 0 to 1')
+    return fraction, known[quantity]

@@ -1,0 +1,189 @@
+"""A case before it is understood: nested dicts, their lines, overrides. Knows no key's meaning."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fvsolve.case.lines import key_lines
+from fvsolve.errors import CaseError, Fault, did_you_mean
+from fvsolve.units import show
+
+DEEPEST = 40
+
+
+@dataclass
+class Raw:
+    """What a source says and where: `table` as nested dicts, `lines` per key path, `overridden` paths."""
+
+    table: dict[str, Any]
+    name: str = "case"
+    path: Path | None = None
+    folder: Path | None = None
+    lines: dict[tuple, int] = field(default_factory=dict)
+    overridden: list[tuple] = field(default_factory=list)
+
+    @property
+    def file(self) -> str:
+        """How messages call it."""
+        return self.path.name if self.path else self.name
+
+    def line(self, keys: tuple) -> int | None:
+        """The line of a key path, or of the nearest table that holds it."""
+        for count in range(len(keys), 0, -1):
+            if keys[:count] in self.lines:
+                return self.lines[keys[:count]]
+        return None
+
+    def is_override(self, keys: tuple) -> bool:
+        """Whether a key path was set, lies below one that was, or came to be by one."""
+        if any(keys[: len(one)] == one for one in self.overridden):
+            return True
+        made = bool(self.lines) and keys not in self.lines
+        return made and any(one[: len(keys)] == keys for one in self.overridden if keys)
+
+    def get(self, keys: tuple) -> Any:
+        """What stands at a key path, or None."""
+        found: Any = self.table
+        for key in keys:
+            try:
+                found = found[key]
+            except (KeyError, IndexError, TypeError):
+                return None
+        return found
+
+
+def read_raw(source: Any) -> Raw:
+    """The raw case of a TOML file or a dict; CaseError where it is neither."""
+    if isinstance(source, Mapping):
+        return Raw(_copy(source))
+    if not isinstance(source, (str, Path)):
+        raise CaseError([Fault("", f"a {type(source).__name__} is no case; wanted a path or a dict")])
+    path = Path(source)
+    text = _read_text(path)
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise CaseError([Fault("", "tables or lists nested too deep")], path.name) from None
+    except ValueError as error:
+        raise CaseError([_syntax_fault(error, text)], path.name) from None
+    return Raw(_copy(table), path.stem, path, path.parent.absolute(), key_lines(text))
+
+
+def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
+    """Put settings (dotted key -> value, text parsed as TOML where it can be) into a raw case; their faults.
+
+    A setting takes the place of what the file says under one of its `alternatives`, keys of which a table
+    has one at most.
+    """
+    faults = []
+    groups = {group: raw.get((group,)) for group in ("nodes", "links")}
+    before = {group: list(parts) for group, parts in groups.items() if isinstance(parts, dict)}
+    for key, value in settings.items():
+        keys = _dotted(str(key))
+        try:
+            _put(raw.table, keys, _copy(_parsed(value)))
+            raw.overridden.append(keys)
+            for others in alternatives:
+                for other in others if keys[-1] in others else ():
+                    if (*keys[:-1], other) not in raw.overridden:
+                        raw.get(keys[:-1]).pop(other, None)
+        except ValueError as error:
+            faults.append(Fault(str(key), str(error), override=True))
+    for keys in raw.overridden:
+        group, name = (*keys, "", "")[:2]
+        if name and name not in before.get(group, [name]):
+            part = raw.get((group, name))
+            if not isinstance(part, dict) or "type" not in part:
+                hint = did_you_mean(name, before[group])
+                faults.append(
+                    Fault(".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True)
+                )
+                raw.table[group].pop(name, None)
+    return faults
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError:
+        near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise CaseError(
+            [Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)
+        ) from None
+    except IsADirectoryError:
+        raise CaseError([Fault("", "is a directory; wanted a TOML file")], str(path)) from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        message = f"byte {show(error.object[error.start : error.start + 1])} is not UTF-8 text"
+        raise CaseError([Fault("", message, line)], path.name) from None
+    except (OSError, ValueError) as error:
+        message = getattr(error, "strerror", None) or str(error)
+        raise CaseError([Fault("", f"cannot be read: {message}")], str(path)) from None
+
+
+def _syntax_fault(error: ValueError, text: str) -> Fault:
+    message = str(error)
+    match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
+    line = int(match[1]) if match else text.count("\n") + 1
+    said = text.splitlines()[line - 1].strip() if 0 < line <= len(text.splitlines()) else ""
+    message = message.replace(match[0], "") if match else message
+    message = message[:1].lower() + message[1:]
+    if message == "cannot overwrite a value":
+        message = "this key is given twice"
+    elif message.startswith("cannot declare"):
+        message = "this table is given twice"
+    return Fault("", f"TOML: {message}: {show(said)}" if said else f"TOML: {message}", line)
+
+
+def _copy(value: Any, depth: int = 0) -> Any:
+    """Plain dicts, lists and scalars; NumPy arrays and numbers become lists and Python's own."""
+    if depth > DEEPEST:
+        raise CaseError([Fault("", "tables or lists nested too deep")])
+    if isinstance(value, Mapping):
+        return {str(key): _copy(one, depth + 1) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_copy(one, depth + 1) for one in value]
+    if isinstance(value, Path):
+        return str(value)
+    if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
+        return _copy(value.tolist(), depth + 1)
+    return value
+
+
+def _dotted(key: str) -> tuple[str, ...]:
+    try:
+        found: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
+    except ValueError:
+        found = None
+    if found is None:
+        return tuple(key.split("."))
+    keys = []
+    while isinstance(found, dict):
+        name = next(iter(found))
+        keys.append(name)
+        found = found[name]
+    return tuple(keys)
+
+
+def _parsed(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    try:
+        found = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        return value
+    return found["value"] if len(found) == 1 else value
+
+
+def _put(table: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
+    for key in keys[:-1]:
+        inner = table.setdefault(key, {})
+        if not isinstance(inner, dict):
+            raise ValueError(f"{show(key)} is no table but {show(inner)}; it has no keys below it")
+        table = inner
+    table[keys[-1]] = value

@@ -1,0 +1,150 @@
+"""The tables fluid, numerics and output of a case. Knows their keys and defaults; knows no part."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from fvsolve import units
+from fvsolve.errors import did_you_mean
+from fvsolve.fluid import LAWS
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import (
+    Choice,
+    Misfit,
+    Number,
+    Quantity,
+    Setting,
+    Text,
+    Value,
+    Whole,
+    between,
+    nonnegative,
+    positive,
+)
+from fvsolve.steppers.methods import METHODS
+from fvsolve.units import show
+
+SCHEMES = ("upwind", "muscl", "upwind5", "weno5", "central", "linear-upwind", "fromm", "upwind3")
+LIMITERS = ("minmod", "van-leer", "monotonized-central")
+
+# Every default of [numerics] and [output]. Steps: Courant where there are cells, error control elsewhere.
+DEFAULT_SCHEME, DEFAULT_LIMITER = "muscl", "van-leer"
+DEFAULT_METHOD, DEFAULT_COURANT = "ssp-rk3", 0.9
+DEFAULT_METHOD_RTOL, DEFAULT_RTOL = "dormand-prince", 1e-6
+DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cells of the same travel time
+DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
+
+
+class FluidSpec(Table):
+    """`[fluid]`: which fluid, at which state, under which density law; numbers here override CoolProp's."""
+
+    name: Annotated[str, Text('a CoolProp fluid, "INCOMP::..." or "user"')]
+    temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = (
+        293.15
+    )
+    pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]")] = 101325.0
+    law: Annotated[str, Choice("density law", LAWS, "one for the case")] = "linear"
+    density: Annotated[float | None, Quantity("density", positive, "[kg/m3]")] = None
+    bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]")] = None
+    viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]")] = None
+    vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
+
+
+class Numerics(Table):
+    """`[numerics]`: the span of time, how space and time are cut, where to start from."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("courant", "step", "rtol"),)
+
+    end: Annotated[float, Quantity("time", about="when the run ends [s]")]
+    start: Annotated[float, Quantity("time", about="when it begins [s]")] = 0.0
+    initial: Annotated[
+        str, Choice("start", ("steady", "equilibrium", "rest"), "steady flow, nothing may move, or no flow")
+    ] = "steady"
+    scheme: Annotated[str, Choice("scheme", SCHEMES, "reconstruction in the cells")] = DEFAULT_SCHEME
+    limiter: Annotated[str, Choice("limiter", LIMITERS, "of the scheme muscl")] = DEFAULT_LIMITER
+    method: Annotated[str | None, Choice("method", METHODS, "Runge-Kutta method")] = None
+    courant: Annotated[float | None, Number(positive, "step, in travel times of the quickest cell")] = None
+    step: Annotated[float | None, Quantity("time", positive, "fixed step [s]")] = None
+    rtol: Annotated[float | None, Number(between(0, 1, open=True), "error per step, relative")] = None
+    cell_time: Annotated[float | None, Quantity("time", positive, "of pipes that state no cells [s]")] = None
+    below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = (
+        "continue"
+    )
+
+    def filled(self, has_cells: bool) -> Numerics:
+        """The same with the step control and method that are the default, cells present or not."""
+        changes: dict[str, Any] = {}
+        if self.courant is self.step is self.rtol is None:
+            changes = {"courant": DEFAULT_COURANT} if has_cells else {"rtol": DEFAULT_RTOL}
+        adaptive = self.rtol is not None or "rtol" in changes
+        if self.method is None:
+            changes["method"] = DEFAULT_METHOD_RTOL if adaptive else DEFAULT_METHOD
+        return self.model_copy(update=changes)
+
+
+class OutputUnits(Value):
+    """`[output] units`: a unit per quantity of a probe."""
+
+    about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }'
+    quantities = ("pressure", "gauge_pressure", "head", "level", "flow", "velocity", "time")
+
+    def read(self, given: Any, setting: Setting) -> dict[str, str]:
+        if not isinstance(given, dict):
+            raise ValueError(f'{show(given)} is no table; wanted one such as {{ pressure = "barg" }}')
+        faults = []
+        for quantity, unit in given.items():
+            if quantity not in self.quantities:
+                near = did_you_mean(str(quantity), self.quantities)
+                faults.append(
+                    ((quantity,), f"unknown quantity{near}; quantities are {', '.join(self.quantities)}")
+                )
+                continue
+            try:
+                if not isinstance(unit, str):
+                    raise ValueError(f"{show(unit)} is no unit; wanted text")
+                units.find(unit, quantity)
+            except ValueError as error:
+                faults.append(((quantity,), str(error)))
+        if faults:
+            raise Misfit(faults)
+        filled = dict(given)
+        if "pressure" in given:
+            filled.setdefault("gauge_pressure", given["pressure"])
+        return filled
+
+    def json(self) -> dict[str, Any]:
+        return {
+            "type": "object",
+            "properties": {quantity: {"type": "string"} for quantity in self.quantities},
+            "additionalProperties": False,
+        }
+
+
+class Names(Value):
+    """A list of texts, read as probes later, when the parts are known."""
+
+    about = "what is recorded; all nodes and links if left out"
+
+    def read(self, given: Any, setting: Setting) -> tuple[Any, ...]:
+        if not isinstance(given, (list, tuple)):
+            raise ValueError(f'{show(given)} is no list; wanted one such as ["gate.pressure"]')
+        return tuple(given)
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"type": "string"}}
+
+
+class Output(Table):
+    """`[output]`: when and what is recorded, and in which units it is shown."""
+
+    every: Annotated[float | None, Quantity("time", positive, "between rows of the history [s]")] = None
+    fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none")] = (
+        DEFAULT_FRAMES
+    )
+    probes: Annotated[Any, Names()] = None
+    units: Annotated[dict[str, str], OutputUnits()] = {}
+
+    def table(self) -> dict[str, Any]:
+        """What the file would say."""
+        made = {**super().table(), "probes": [probe.text for probe in self.probes]}
+        return made if self.units else {key: value for key, value in made.items() if key != "units"}

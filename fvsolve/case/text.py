@@ -1,0 +1,59 @@
+"""A case as TOML text. Knows how TOML is written; knows no part."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+
+def write(table: dict[str, Any]) -> str:
+    """TOML text of nested dicts; tables down to the second level get a header, deeper ones stand in line."""
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in table.items() if not isinstance(value, dict)]
+    for key, value in table.items():
+        if isinstance(value, dict):
+            lines += _section(key, value)
+    return "\n".join(lines) + "\n"
+
+
+def path(keys: tuple[Any, ...]) -> str:
+    """A key path as a message shows it: `links.main.length`, `output.probes[2]`."""
+    text = ""
+    for key in keys:
+        text += f"[{key}]" if isinstance(key, int) else ("." if text else "") + _key(str(key))
+    return text
+
+
+def _section(key: str, table: dict[str, Any]) -> list[str]:
+    deep = key in ("nodes", "links", "signals")
+    if deep:
+        lines = []
+        for name, part in table.items():
+            if isinstance(part, dict):
+                lines += ["", f"[{_key(key)}.{_key(name)}]"]
+                lines += [f"{_key(k)} = {_value(v)}" for k, v in part.items()]
+        plain = [f"{_key(k)} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict)]
+        return (["", f"[{_key(key)}]", *plain] if plain else []) + lines
+    return ["", f"[{_key(key)}]"] + [f"{_key(k)} = {_value(v)}" for k, v in table.items()]
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, dict):
+        return (
+            "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }" if value else "{}"
+        )
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_value(one) for one in value) + "]"
+    return repr(value)
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,43 @@
+"""The command line: the only room that prints or exits. Knows commands; computes nothing."""
+
+from __future__ import annotations
+
+import sys
+
+from fvsolve.errors import FvsolveError
+
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Entry point of `fvsolve`: every failure is a message on standard error and an exit code, no traceback.
+
+    0: done. 1: a run stopped early or an expectation failed. 2: bad input. 130: interrupted.
+    """
+    try:
+        from fvsolve.cli.commands import app
+
+        app(prog_name="fvsolve")
+    except FvsolveError as error:
+        _leave(str(error), 2)
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output has gone: nobody to tell
+        sys.exit(0)
+    except OSError as error:
+        _leave(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
+    except MemoryError:
+        _leave("out of memory: fewer cells, fewer probes, or a larger [output] every", 1)
+    except Exception as error:  # a fault of ours: say where, so that it can be reported
+        _leave(f"internal error in {_where(error)}: {type(error).__name__}: {error}; please report it", 1)
+
+
+def _leave(message: str, code: int) -> None:
+    print(message, file=sys.stderr)
+    sys.exit(code)
+
+
+def _where(error: Exception) -> str:
+    trace = error.__traceback__
+    while trace.tb_next is not None:
+        trace = trace.tb_next
+    return f"{trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno}"

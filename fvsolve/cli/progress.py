@@ -1,0 +1,72 @@
+"""How a run is doing, while it runs, and Ctrl-C. Knows the terminal; knows no numerics."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def watched(case) -> Iterator[Callable[[float, float, int], None]]:
+    """A `progress` function for a run of `case`: draws a bar on a terminal, ends the run at Ctrl-C.
+
+    The first Ctrl-C lets the run come to a checkpoint, the second one breaks it off.
+    """
+    stop = threading.Event()
+    bar = Bar(case) if sys.stderr.isatty() else None
+
+    def progress(t: float, seconds: float, steps: int) -> None:
+        if bar:
+            bar(t, seconds)
+        if stop.is_set():
+            raise KeyboardInterrupt
+
+    with _caught(stop), bar.shown if bar else _nothing():
+        yield progress
+
+
+@contextmanager
+def _caught(stop: threading.Event) -> Iterator[None]:
+    def handle(number, frame) -> None:
+        stop.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _nothing() -> Iterator[None]:
+    yield
+
+
+class Bar:
+    """A rich bar with simulated time, speed and what remains."""
+
+    def __init__(self, case):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self.start, self.end = case.numerics.start, case.numerics.end
+        self.first: tuple[float, float] | None = None
+        self.shown = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[now]}"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self.task = self.shown.add_task(case.name, total=self.end - self.start, now="")
+
+    def __call__(self, t: float, seconds: float) -> None:
+        self.first = self.first or (t, seconds)
+        spent = seconds - self.first[1]
+        speed = f", {(t - self.first[0]) / spent:.3g} s per s" if spent > 0.0 else ""
+        self.shown.update(self.task, completed=t - self.start, now=f"{t:.4g} of {self.end:.4g} s{speed}")

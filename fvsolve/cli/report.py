@@ -1,0 +1,136 @@
+"""What the terminal says about runs, cases and differences. Knows words and tables; computes nothing."""
+
+from __future__ import annotations
+
+import sys
+
+ROWS = 20  # of a table at most; the rest is on disk
+WIDTH = 140  # of output that goes to no terminal
+
+
+def result(one) -> None:
+    """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps, files."""
+    said = one.summary
+    console = _console()
+    if said["title"]:
+        console.print(said["title"], style="bold", highlight=False)
+    _extremes(console, one)
+    for mark in said["marks"]:
+        _line(
+            console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow"
+        )
+    for name, ledger in said["ledgers"].items():
+        _line(console, f"{name} ledger: {_ledger(ledger)}")
+    for claim in said["expectations"]:
+        _line(console, _claim(claim), "green" if claim["ok"] else "bold red")
+    for measured in said["comparisons"]:
+        _line(console, _comparison(measured))
+    for warning in said["warnings"]:
+        _line(console, f"note: {warning}")
+    _line(
+        console, f"{said['reason']} at t = {said['t']:.6g} s; {_cost(said)}", None if one.ok else "bold red"
+    )
+    if one.directory:
+        _line(console, f"{one.directory}: {', '.join(said['files'])}")
+    if said["reason"].startswith("interrupted"):
+        _line(console, "go on with the same command and --resume")
+
+
+def exit_code(one) -> int:
+    """0, or 1 where the run stopped early or a claim fails, or 130 where it was interrupted."""
+    if one.reason.startswith("interrupted"):
+        return 130
+    return 0 if one.ok and all(claim["ok"] for claim in one.expectations) else 1
+
+
+def titles(found: dict[str, str]) -> None:
+    """The shipped cases."""
+    _table(["case", "title"], [[name, title] for name, title in found.items()])
+
+
+def differences(found: dict) -> None:
+    """Differences of two runs, per shared probe."""
+    rows = [
+        [name, one["unit"], _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
+        for name, one in found["probes"].items()
+    ]
+    _table(["probe", "unit", "greatest difference", "at [s]", "rms"], rows)
+    for key in ("only_a", "only_b"):
+        if found[key]:
+            _line(_console(), f"only in {found[key[-1]]}: {', '.join(found[key])}")
+
+
+def _extremes(console, one) -> None:
+    rows = [[name, one.units[name], *map(_number, found)] for name, found in one.extremes.items()]
+    if rows:
+        _table(["probe", "unit", "least", "at [s]", "greatest", "at [s]"], rows[:ROWS], console)
+    if len(rows) > ROWS:
+        where = f"in {one.directory / 'summary.json'}" if one.directory else "in Result.extremes"
+        _line(console, f"... {len(rows) - ROWS} more {where}")
+
+
+def _ledger(ledger: dict) -> str:
+    kept = f"remainder {_number(ledger['remainder'])}"
+    return f"{kept}, {_number(ledger['relative'])} of the contents" if "relative" in ledger else kept
+
+
+def _claim(one: dict) -> str:
+    verdict = "holds" if one["ok"] else "FAILS"
+    return (
+        f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
+        f"{_number(one['tolerance'])}: found {_number(one['found'])}"
+    )
+
+
+def _comparison(one: dict) -> str:
+    if one["rms"] is None:
+        return f"{one['probe']} against {one['file']}: no measured time lies within the run"
+    unit = one["unit"]
+    return (
+        f"{one['probe']} against {one['file']}: rms {_number(one['rms'])} {unit}, greatest difference "
+        f"{_number(one['greatest_difference'])} {unit} at {_number(one['t_greatest_difference'])} s; peak "
+        f"{_number(one['computed_peak'])} at {_number(one['t_computed_peak'])} s, measured "
+        f"{_number(one['measured_peak'])} at {_number(one['t_measured_peak'])} s"
+    )
+
+
+def _cost(said: dict) -> str:
+    rejected = f", {said['rejections']} rejected" if said["rejections"] else ""
+    cells = f", {said['cells']} cells" if said["cells"] else ""
+    cost = f" ({_number(said['cost'])} ns per cell and step)" if said["cells"] and said["cost"] else ""
+    return f"{said['steps']} steps{rejected}{cells}, {said['seconds']:.3g} s{cost}"
+
+
+def _number(value) -> str:
+    return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _line(console, text: str, style: str | None = None) -> None:
+    console.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
+
+
+def _table(headers: list[str], rows: list[list[str]], console=None) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
+    for i, header in enumerate(headers):
+        text = all(not _numeric(row[i]) for row in rows)
+        table.add_column(Text(header), justify="left" if text else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    (console or _console()).print(table)
+
+
+def _numeric(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _console():
+    from rich.console import Console
+
+    return Console() if sys.stdout.isatty() else Console(width=WIDTH, no_color=True)

@@ -1,0 +1,147 @@
+"""history.png and envelope.png. Knows columns of numbers and matplotlib; knows no run and no files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.draw import style
+
+PANELS = 6  # quantities drawn at most
+LINES = 8  # probes drawn per panel at most
+PIPES = 6  # pipes drawn at most, the longest
+POINTS = 4000  # rows drawn as they are; of longer tables least and greatest per bin
+
+
+def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
+    """Probes over time, one panel per quantity and unit.
+
+    `t : float64[k]` in `time_unit`, `values : float64[k, n]`, `probes` their (name, unit); `measured` maps a
+    probe to (times, values), dotted; from the first of `marks`, (time, cause), on
+    the ground is shaded: not to be trusted.
+    """
+    panels: dict[tuple[str, str], list[int]] = {}
+    for i, (name, unit) in enumerate(probes):
+        panels.setdefault((quantity(name), unit), []).append(i)
+    drawn = list(panels.items())[:PANELS]
+    figure = style.figure(0.7 + 2.1 * max(len(drawn), 1) + (0.5 if len(drawn) == 1 else 0.0))
+    rows = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, ((name, unit), picked) in zip(rows, drawn, strict=False):
+        _panel(axes, t, values, probes, picked, measured or {})
+        axes.set_ylabel(f"{name.replace('_', ' ')} [{unit}]", fontsize=8.5, color=style.INK)
+    for axes in rows:
+        _shade(axes, t, marks, first=axes is rows[0])
+    rows[-1].set_xlabel(f"time [{time_unit}]", fontsize=8.5, color=style.INK)
+    figure.align_ylabels(rows)
+    style.title(figure, title)
+    return figure
+
+
+def envelope_figure(envelope, units, title=""):
+    """Least and greatest head along each of the longest pipes, with elevation and the head at the start.
+
+    `envelope` maps a pipe to float64[cells] arrays named as in envelope.csv, in `units`.
+    """
+    longest = sorted(envelope, key=lambda pipe: -envelope[pipe]["distance"][-1])[:PIPES]
+    names = [pipe for pipe in envelope if pipe in longest]
+    across = 1 if len(names) < 3 else 2
+    down = -(-len(names) // across)
+    figure = style.figure(0.9 + (2.9 if down == 1 else 2.2 * down))
+    grid = figure.subplots(down, across, squeeze=False, sharey=True)
+    for axes, pipe in zip(grid.flat, names, strict=False):
+        _profile(axes, envelope[pipe])
+        axes.set_title(pipe, fontsize=9, color=style.INK, loc="left", pad=4)
+    for axes in list(grid.flat)[len(names) :]:
+        axes.set_visible(False)
+    for axes in grid[:, 0]:
+        axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)
+    figure.supxlabel(f"distance from its start [{units['distance']}]", fontsize=8.5, color=style.INK)
+    handles = {
+        label: handle
+        for axes in grid.flat
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        handles.values(), handles.keys(), loc="outside upper right", ncols=4, frameon=False, fontsize=8
+    )
+    more = len(envelope) - len(names)
+    style.title(figure, title + (f"\n(the {len(names)} longest of {len(envelope)} pipes)" if more else ""))
+    return figure
+
+
+def quantity(probe: str) -> str:
+    """`pressure` of `main.pressure@0.5`."""
+    return probe.partition("@")[0].rpartition(".")[2]
+
+
+def thinned(t, values):
+    """Long series as least and greatest per bin of rows, so that no peak is lost and pictures stay small."""
+    bins = POINTS // 2
+    if len(t) <= POINTS:
+        return t, values
+    edges = np.linspace(0, len(t), bins + 1).astype(int)
+    low = np.array([a + np.argmin(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    high = np.array([a + np.argmax(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    picked = np.unique(np.concatenate([[0], low, high, [len(t) - 1]]))
+    return t[picked], values[picked]
+
+
+def _panel(axes, t, values, probes, picked, measured) -> None:
+    style.dress(axes)
+    for i, one in enumerate(picked[:LINES]):
+        name, colour = probes[one][0], style.COLOURS[i % len(style.COLOURS)]
+        place, _, fraction = name.partition("@")
+        label = place.rpartition(".")[0] + (f" at {fraction}" if fraction else "")
+        axes.plot(*thinned(t, values[:, one]), color=colour, linewidth=1.0, label=label)
+        if name in measured:
+            axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{label}, measured")
+    if len(picked) > LINES:
+        axes.plot([], [], " ", label=f"... {len(picked) - LINES} more in the table")
+    low, high = axes.get_ylim()
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # a line at rest, not its round-off magnified
+        middle, half = 0.5 * (low + high), max(abs(low), abs(high)) * 1e-3
+        axes.set_ylim(middle - half, middle + half)
+    if len(t) > 1:
+        axes.set_xlim(t[0], t[-1])
+    style.legend(axes)
+
+
+def _shade(axes, t, marks, first: bool) -> None:
+    if not marks or not len(t):
+        return
+    begun, cause = min(marks)
+    axes.axvspan(begun, t[-1], color=style.DOUBT, alpha=0.08, linewidth=0)
+    axes.axvline(begun, color=style.DOUBT, linewidth=0.8)
+    late = begun > 0.5 * (t[0] + t[-1])
+    if first:
+        axes.annotate(
+            f"not to be trusted from here: {cause}",
+            (begun, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(-4 if late else 4, 2),
+            textcoords="offset points",
+            ha="right" if late else "left",
+            va="bottom",
+            fontsize=7.5,
+            color=style.DOUBT,
+        )
+
+
+def _profile(axes, arrays) -> None:
+    style.dress(axes)
+    x, ground = arrays["distance"], arrays["elevation"]
+    low, high = arrays["least_head"], arrays["greatest_head"]
+    blue = style.COLOURS[0]
+    axes.fill_between(x, low, high, color=blue, alpha=0.10, linewidth=0)
+    axes.plot(x, high, color=blue, linewidth=1.2, label="greatest head")
+    if "initial_head" in arrays:
+        axes.plot(
+            x,
+            arrays["initial_head"],
+            color=style.INK,
+            linewidth=0.9,
+            linestyle=(0, (5, 3)),
+            label="at the start",
+        )
+    axes.plot(x, low, color=style.COLOURS[1], linewidth=1.2, label="least head")
+    axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
+    axes.set_xlim(0.0, x[-1] + x[0])

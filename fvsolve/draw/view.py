@@ -1,0 +1,93 @@
+"""A field of one frame as a picture, drawn off screen. Knows .vtu files and PyVista; knows no run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from fvsolve.errors import FvsolveError, did_you_mean, listing
+
+SIZE = (1500, 900)  # of the picture [pixels]
+UNITS = {"pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s"}
+UNITS |= {"least_pressure": "Pa", "greatest_pressure": "Pa"}
+TUBE = 0.006  # radius of a pipe as part of the picture's diagonal
+FLAT = 0.08  # a network lower than this part of its width is looked at from above
+REMEDY = (
+    "PyVista found no OpenGL to draw with off screen; on Debian or Ubuntu "
+    "`apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
+)
+
+
+def view(frame: Path, field: str, out: Path, caption: str) -> None:
+    """Write the picture `out` of `field` on the pipes of the .vtu file `frame`.
+
+    Drawn in a process of its own: without an OpenGL library VTK ends the process it is in. FvsolveError where
+    the field is unknown or nothing can be drawn.
+    """
+    if field not in UNITS:
+        raise FvsolveError(f"no field {field!r}{did_you_mean(field, UNITS)}; fields are {listing(UNITS)}")
+    package = str(Path(__file__).resolve().parents[2])
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([package, *sys.path])}
+    if sys.platform.startswith("linux") and not environment.get("DISPLAY"):
+        environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    command = [sys.executable, "-m", __spec__.name, str(frame), field, str(out), caption]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    if done.returncode < 0 or "OSMesa" in done.stderr or "EGL" in done.stderr:
+        raise FvsolveError(REMEDY)
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise FvsolveError(f"{out} could not be drawn: {last}")
+
+
+def draw(frame: str, field: str, out: str, caption: str) -> None:
+    """Draw in this process."""
+    import pyvista
+
+    mesh = pyvista.read(frame)
+    mesh.set_active_scalars(field, preference="cell")
+    wide = max(mesh.length, 1e-9)
+    plotter = pyvista.Plotter(off_screen=True, window_size=SIZE)
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_parallel_projection()
+    plotter.add_mesh(
+        mesh.extract_surface(algorithm=None).tube(radius=TUBE * wide),
+        scalars=field,
+        cmap="viridis",
+        smooth_shading=True,
+        scalar_bar_args={"title": f"{field.replace('_', ' ')} [{UNITS[field]}]", **BAR},
+    )
+    plotter.add_text(caption, font_size=12, color="#1f2933", position="upper_left")
+    _look(plotter, mesh.bounds)
+    plotter.screenshot(out)
+
+
+BAR = {
+    "color": "#1f2933",
+    "fmt": "%.4g",
+    "n_labels": 5,
+    "title_font_size": 22,
+    "label_font_size": 18,
+    "width": 0.5,
+    "height": 0.09,
+    "position_x": 0.25,
+    "position_y": 0.03,
+}
+
+
+def _look(plotter, bounds) -> None:
+    """From above where the network is flat, from the side where it is one straight line, else aslant."""
+    x, y, z = bounds[1] - bounds[0], bounds[3] - bounds[2], bounds[5] - bounds[4]
+    if z <= FLAT * max(x, y):
+        plotter.view_xy()
+    elif y <= FLAT * max(x, z):
+        plotter.view_xz()
+    else:
+        plotter.view_isometric()
+    plotter.camera.zoom(1.25)
+
+
+if __name__ == "__main__":
+    draw(*sys.argv[1:])

@@ -1,0 +1,76 @@
+"""What can go wrong, in words. Knows how a fault is worded; knows nothing of what it is about."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of a case file: the key path, what was found and wanted, and the line in the file."""
+
+    place: str
+    message: str
+    line: int | None = None
+    override: bool = False  # the value came from --set, not from the file
+
+    def __str__(self) -> str:
+        where = "--set " if self.override else f"line {self.line}: " if self.line else ""
+        return f"{where}{self.place}: {self.message}" if self.place else f"{where}{self.message}"
+
+
+class FvsolveError(Exception):
+    """Base of every error fvsolve raises on purpose; `str` is what a person reads."""
+
+
+class CaseError(FvsolveError):
+    """A case that cannot be read: all its faults at once, in the order of the file."""
+
+    def __init__(self, faults: Iterable[Fault], file: str = "case"):
+        self.faults = sorted(faults, key=lambda fault: (fault.override, fault.line or 0))
+        self.file = str(file)
+        super().__init__(self.faults, self.file)
+
+    def __str__(self) -> str:
+        count = len(self.faults)
+        head = f"{self.file}: {count} fault{'' if count == 1 else 's'}"
+        return "\n".join([head, *(f"  {fault}" for fault in self.faults)])
+
+
+class FluidError(FvsolveError):
+    """A fluid that cannot be had as asked; `key` is the key of `[fluid]` that is to blame."""
+
+    def __init__(self, key: str, message: str):
+        self.key = key
+        self.message = message
+        super().__init__(key, message)
+
+    def __str__(self) -> str:
+        return f"fluid.{self.key}: {self.message}"
+
+
+class RunError(FvsolveError):
+    """A run that cannot start or go on: a finished run in the way, a restart that does not fit, ..."""
+
+
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """The valid name that was probably meant by `name`, or None."""
+    names = list(dict.fromkeys(names))
+    folded = {other.casefold().replace("_", "-"): other for other in names}
+    close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)
+    return folded[close[0]] if close else None
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """'; did you mean "opening"?' where a valid name is near, else the empty string."""
+    close = nearest(name, names)
+    return f'; did you mean "{close}"?' if close else ""
+
+
+def listing(names: Iterable[str], limit: int = 12) -> str:
+    """The names in one line, sorted, cut where there are many."""
+    names = sorted(names)
+    more = f", ... ({len(names)} in all)" if len(names) > limit else ""
+    return ", ".join(names[:limit]) + more

@@ -1,0 +1,109 @@
+"""Fluid properties at one state. The only door to CoolProp; knows no part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fvsolve.errors import FluidError, did_you_mean
+from fvsolve.fluid.cache import cached
+from fvsolve.fluid.coolprop import celsius
+from fvsolve.fluid.table import FluidTable
+
+__all__ = ["LAWS", "Fluid", "FluidTable", "properties"]
+
+LAWS = ("linear", "log", "table")
+USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user")
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """A fluid at its reference state.
+
+    temperature [K], pressure [Pa] absolute, density [kg/m3], bulk_modulus = rho a^2 at constant entropy [Pa],
+    viscosity, dynamic [Pa s] (None where nobody knows it), vapor_pressure [Pa] (0 where there is none).
+    """
+
+    name: str
+    law: str
+    temperature: float
+    pressure: float
+    density: float
+    bulk_modulus: float
+    viscosity: float | None
+    vapor_pressure: float
+    table: FluidTable | None
+    source: str
+
+    @property
+    def sound_speed(self) -> float:
+        """Isentropic speed of sound, sqrt(bulk_modulus / density) [m/s]."""
+        return math.sqrt(self.bulk_modulus / self.density)
+
+
+def properties(
+    name: str,
+    temperature: float,
+    pressure: float,
+    law: str = "linear",
+    density: float | None = None,
+    bulk_modulus: float | None = None,
+    viscosity: float | None = None,
+    vapor_pressure: float | None = None,
+) -> Fluid:
+    """Properties of a CoolProp fluid, of "INCOMP::..." or of "user", at temperature [K] and pressure [Pa].
+
+    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] stand in place of
+    CoolProp's; "user" has nothing else. Raises FluidError with the key that is to blame.
+    """
+    given = dict(
+        density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure
+    )
+    given = {key: float(value) for key, value in given.items() if value is not None}
+    state = dict(temperature=float(temperature), pressure=float(pressure))
+    _check_numbers(given | state, law)
+    _check_table(name, law, given)
+    found = USER if name == "user" else cached(name, state["temperature"], state["pressure"], law)
+    boiling = max(found["vapor_pressure"], given.get("vapor_pressure", 0.0))
+    if state["pressure"] <= boiling:
+        raise FluidError("pressure", _not_liquid(name, boiling, **state))
+    fluid = Fluid(name=name, law=law, **(found | state | given))
+    for key in ("density", "bulk_modulus"):
+        if getattr(fluid, key) is None:
+            raise FluidError(key, _missing(name, key))
+    return fluid
+
+
+def _check_numbers(numbers: dict[str, float], law: str) -> None:
+    if law not in LAWS:
+        laws = f"{did_you_mean(law, LAWS)}; laws are {', '.join(LAWS)}"
+        raise FluidError("law", f'"{law}" is no density law{laws}')
+    for key, value in numbers.items():
+        if not math.isfinite(value) or value < 0.0 or (value == 0.0 and key != "vapor_pressure"):
+            raise FluidError(key, f"{value:g} is not a positive, finite number")
+
+
+def _check_table(name: str, law: str, given: dict[str, float]) -> None:
+    """A table is CoolProp's own density: it needs a fluid that has one, and nothing that contradicts it."""
+    if law != "table":
+        return
+    if name == "user" or name.startswith("INCOMP::"):
+        text = f'"table" wants a compressible CoolProp fluid, "{name}" is none; use "linear" or "log"'
+        raise FluidError("law", text)
+    for key in ("density", "bulk_modulus"):
+        if key in given:
+            text = f'law = "table" takes it from CoolProp; leave {key} out, or use law = "log"'
+            raise FluidError(key, text)
+
+
+def _missing(name: str, key: str) -> str:
+    if name == "user":
+        return f'a "user" fluid needs density [kg/m3] and bulk_modulus [Pa]; {key} is missing'
+    return f'CoolProp has no compressibility for "{name}"; give {key}, for example "1.5 GPa"'
+
+
+def _not_liquid(name: str, boiling: float, temperature: float, pressure: float) -> str:
+    return (
+        f"{pressure:.6g} Pa is not above the vapour pressure of {name} at {celsius(temperature)}, "
+        f"{boiling:.6g} Pa; wanted a liquid (pressures are absolute)"
+    )

@@ -1,0 +1,61 @@
+"""Fluid properties kept on disk, a file per fluid, state, law and CoolProp version. Knows no physics."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from fvsolve.fluid.coolprop import ask
+from fvsolve.fluid.table import FluidTable
+from fvsolve.jit import cache_folder
+
+FORMAT = 1  # of the files and of what they hold; raise it when either changes
+
+
+def cached(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
+    """What CoolProp says, from the disk where it was asked before: a warm hit does not import CoolProp."""
+    from importlib.metadata import version
+
+    key = json.dumps([FORMAT, version("CoolProp"), name, temperature, pressure, law])
+    stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
+    path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
+    found = _read(path, key)
+    if found is None:
+        found = ask(name, temperature, pressure, law) | {"source": f"CoolProp {version('CoolProp')}"}
+        _write(path, key, found)
+    return found
+
+
+def _read(path: Path, key: str) -> dict[str, Any] | None:
+    """The properties in a cache file; None where it is absent, damaged or of another key."""
+    try:
+        digest, body = path.read_text(encoding="utf-8").split("\n", 1)
+        if digest != hashlib.sha256(body.encode()).hexdigest():
+            return None
+        held, found = json.loads(body)
+        found["table"] = found["table"] and FluidTable(**found["table"])
+        return found if held == key else None
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _write(path: Path, key: str, found: dict[str, Any]) -> None:
+    """Write a cache file whole or not at all; a folder that cannot be written costs only time."""
+    body = json.dumps(
+        [key, found], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item)
+    )
+    text = hashlib.sha256(body.encode()).hexdigest() + "\n" + body
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(dir=path.parent, suffix=".part")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(part, path)
+    except OSError:
+        return

@@ -1,0 +1,131 @@
+"""What CoolProp says of a fluid, its refusals put into words. Imports CoolProp only when asked."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from fvsolve.errors import FluidError, did_you_mean
+from fvsolve.fluid.table import isentrope, known
+
+
+def ask(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
+    """The keys of Fluid that CoolProp knows; None: density where the fluid boils, bulk_modulus of INCOMP."""
+    backend, _, rest = name.rpartition("::")
+    if backend not in ("", "HEOS", "INCOMP"):
+        raise FluidError("name", f'"{name}": wanted a CoolProp fluid without a prefix, or "INCOMP::..."')
+    if backend == "INCOMP":
+        return _ask_incompressible(name, temperature, pressure)
+    return _ask_pure(rest, temperature, pressure, law)
+
+
+def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
+    from CoolProp import CoolProp
+
+    state = _pure_state(name)
+    _check_range(state, name, temperature, pressure)
+    vapor_pressure = _vapor_pressure(state, temperature)
+    found = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None)
+    if pressure <= vapor_pressure:
+        return found
+    try:
+        state.update(CoolProp.PT_INPUTS, pressure, temperature)
+    except ValueError as error:
+        raise FluidError("pressure", f"{name} is two-phase there, or unknown (CoolProp: {error})") from None
+    found |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
+    found["viscosity"] = known(state.viscosity)
+    if law == "table":
+        found["table"] = isentrope(state, name, vapor_pressure)
+    return found
+
+
+def _pure_state(name: str) -> Any:
+    """CoolProp's state of a pure (or pseudo-pure) fluid; raises FluidError for mixtures and unknown names."""
+    from CoolProp import AbstractState
+
+    if "&" in name or "[" in name or name.endswith(".mix"):
+        text = f'"{name}" is a mixture; only pure fluids and "INCOMP::..." solutions are known'
+        raise FluidError("name", text)
+    try:
+        return AbstractState("HEOS", name)
+    except ValueError:
+        raise FluidError("name", f'"{name}" is no CoolProp fluid{_suggestion(name)}') from None
+
+
+def _suggestion(name: str) -> str:
+    from CoolProp import CoolProp
+
+    pure = CoolProp.get_global_param_string("FluidsList").split(",")
+    oils = _incompressible_names()
+    if name in oils:
+        return f'; did you mean "INCOMP::{name}"?'
+    if name.startswith("INCOMP::"):
+        return did_you_mean(name, [f"INCOMP::{oil}" for oil in oils])
+    aliases = ",".join(CoolProp.get_fluid_param_string(fluid, "aliases") for fluid in pure).split(",")
+    return did_you_mean(name, ["user", *filter(None, aliases), *pure])
+
+
+def _incompressible_names() -> list[str]:
+    from CoolProp import CoolProp
+
+    lists = ("incompressible_list_pure", "incompressible_list_solution")
+    return [name for one in lists for name in CoolProp.get_global_param_string(one).split(",")]
+
+
+def _check_range(state: Any, name: str, temperature: float, pressure: float) -> None:
+    from CoolProp import CoolProp
+
+    _check_temperature(name, temperature, state.Tmin(), state.Tmax())
+    if pressure > state.pmax():
+        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {state.pmax():g} Pa")
+    melting = known(lambda: state.melting_line(CoolProp.iT, CoolProp.iP, pressure))
+    if melting is not None and temperature < melting:
+        where = f"{celsius(temperature)} and {pressure:g} Pa"
+        raise FluidError("temperature", f"{name} is solid at {where}; it melts at {celsius(melting)}")
+
+
+def _check_temperature(name: str, temperature: float, least: float, greatest: float) -> None:
+    if not least <= temperature <= greatest:
+        span = f"{celsius(least)} to {celsius(greatest)}"
+        raise FluidError("temperature", f"{celsius(temperature)} is outside the range of {name}, {span}")
+
+
+def _vapor_pressure(state: Any, temperature: float) -> float:
+    """Pressure of the boiling liquid [Pa]; 0 above the critical temperature, where nothing boils."""
+    from CoolProp import CoolProp
+
+    if temperature >= state.T_critical():
+        return 0.0
+    state.update(CoolProp.QT_INPUTS, 0.0, temperature)
+    return state.p()
+
+
+def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[str, Any]:
+    """Density, viscosity and, where there is one, vapour pressure; INCOMP fluids have no compressibility."""
+    from CoolProp.CoolProp import PropsSI
+
+    bare = re.sub(r"(\[[^]]*\]|-[0-9.]+%)$", "", name.removeprefix("INCOMP::"))
+    if bare not in _incompressible_names():
+        raise FluidError("name", f'"{name}" is no CoolProp fluid{_suggestion("INCOMP::" + bare)}')
+    _check_temperature(name, temperature, *(PropsSI(key, f"INCOMP::{bare}") for key in ("TMIN", "TMAX")))
+    try:
+        density = PropsSI("D", "T", temperature, "P", pressure, name)
+    except ValueError as error:
+        reason = str(error).split(" : PropsSI")[0]
+        raise FluidError(_blame(reason), f"{name}: {reason}") from None
+    viscosity = known(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
+    vapor_pressure = known(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
+    found = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
+    # CoolProp answers exactly 1 Pa s, exp(0), for those that have no viscosity, such as LiBr.
+    return found | dict(viscosity=None if viscosity == 1.0 else viscosity)
+
+
+def _blame(reason: str) -> str:
+    if "composition" in reason or "fraction" in reason:
+        return "name"
+    return "pressure" if "ressure" in reason else "temperature"
+
+
+def celsius(temperature: float) -> str:
+    """A temperature [K] as a message says it."""
+    return f"{temperature - 273.15:.6g} degC"

@@ -1,0 +1,133 @@
+"""The package's one `njit`, and the folder its caches live in. Knows numba's cache; knows no physics.
+
+Numba looks only at the file that holds a jitted function, so an edit in *another* file that it calls
+would go unnoticed and the old machine code would run. Here every function is cached in a folder named
+by the hash of every source that compiled code can depend on, and site-packages stays clean.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+__all__ = ["cache_folder", "njit", "source_hash"]
+
+KEPT = 3  # generations of compiled code kept beside the present one
+
+PACKAGE = Path(__file__).resolve().parent
+# What compiled code can depend on: the rooms that compile and, by the import contract, all they may import.
+ROOMS = ("kernels", "steppers", "jit", "units", "errors")
+
+
+@functools.cache
+def cache_folder() -> Path:
+    """Folder for everything that fvsolve may compute again: compiled code and fluid properties.
+
+    `FVSOLVE_CACHE` if set, else the user's cache folder, else (not writable) one below the temporary folder.
+    """
+    for folder in (_wanted_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
+        if _writable(folder):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="fvsolve-cache-"))
+
+
+@functools.cache
+def source_hash() -> str:
+    """Sixteen hexadecimal digits that change with any source of `ROOMS`: sha256 over names and bytes."""
+    digest = hashlib.sha256()
+    for path in _sources():
+        digest.update(str(path.relative_to(PACKAGE)).encode() + b"\0")
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def njit(function: Callable | None = None, /, **options: Any) -> Callable:
+    """`numba.njit` as the package wants it: `error_model="numpy"`, cached in a folder named by the sources.
+
+    Used bare or with numba's own options. With `NUMBA_DISABLE_JIT=1` the plain function comes back.
+    Only functions of `ROOMS` are cached: the hash does not see other files, and `exec` has none.
+    """
+    if function is None:
+        return functools.partial(njit, **options)
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return function
+    numba = _numba()
+    cache = Path(function.__code__.co_filename).resolve() in _sources()
+    options = {"error_model": "numpy", "cache": cache} | options
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_code_folder()) if options["cache"] else before
+    try:
+        return numba.njit(**options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+@functools.cache
+def _sources() -> tuple[Path, ...]:
+    rooms = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")]
+    modules = [path for room in ROOMS if (path := PACKAGE / f"{room}.py").is_file()]
+    return tuple(sorted(rooms + modules))
+
+
+@functools.cache
+def _numba():
+    """Numba itself, imported at the first decoration, its notice about first-class functions silenced."""
+    import numba
+    from numba.core.errors import NumbaExperimentalFeatureWarning
+
+    warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+    return numba
+
+
+@functools.cache
+def _code_folder() -> Path:
+    """This generation's folder of compiled code; the oldest of the others are deleted."""
+    folder = cache_folder() / "code" / source_hash()
+    folder.mkdir(parents=True, exist_ok=True)
+    os.utime(folder)
+    _prune(folder)
+    return folder
+
+
+def _prune(present: Path) -> None:
+    """Delete all but the newest generations beside `present`; another process may be doing the same."""
+    others = []
+    for path in present.parent.iterdir():
+        try:
+            others.append((path.stat().st_mtime, path))
+        except OSError:
+            continue
+    others = sorted((item for item in others if item[1] != present), reverse=True)
+    for _, path in others[KEPT:]:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _wanted_folder() -> Path:
+    if stated := os.environ.get("FVSOLVE_CACHE"):
+        return Path(stated).expanduser().absolute()
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fvsolve" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "fvsolve"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fvsolve"
+
+
+def _user() -> str:
+    return str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False

@@ -1,0 +1,1 @@
+"""Compiled functions of floats, arrays and codes. Knows no strings, no classes and no files."""

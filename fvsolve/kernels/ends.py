@@ -1,0 +1,150 @@
+"""Pipe ends: the wave that goes out, and the cells a scheme imagines beyond an end. Knows polynomials.
+
+A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last
+cells gives its value at the end; where it enters, the node's value is the datum of the polynomial. (From
+cells alone the closure is slightly unstable; with the datum no growing mode is known: tests/test_ends.py.)
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.reconstruction import value_muscl, value_weno5
+from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
+
+GREATEST = 4  # degree of the steepest polynomial
+GHOSTS = 3
+
+
+def solve_fractions(matrix, right):
+    """Rows of right * matrix^-1, in fractions."""
+    n = len(matrix)
+    rows = [list(row) + [Fraction(int(i == j)) for j in range(n)] for i, row in enumerate(matrix)]
+    for i in range(n):
+        pivot = next(k for k in range(i, n) if rows[k][i] != 0)
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        rows[i] = [value / rows[i][i] for value in rows[i]]
+        for k in range(n):
+            if k != i and rows[k][i] != 0:
+                rows[k] = [a - rows[k][i] * b for a, b in zip(rows[k], rows[i], strict=True)]
+    inverse = [row[n:] for row in rows]
+    return [[float(sum(a * inverse[k][j] for k, a in enumerate(row))) for j in range(n)] for row in right]
+
+
+def averages(cell, degree):
+    """Averages of 1, x, x^2, ... over the unit cell [cell, cell + 1]."""
+    return [Fraction((cell + 1) ** (k + 1) - cell ** (k + 1), k + 1) for k in range(degree + 1)]
+
+
+def end_weights():
+    """Weights of the value at an end and of three cells beyond it, by degree; nearest cell first."""
+    value = np.zeros((GREATEST + 1, GREATEST + 1))
+    leaving = np.zeros((GREATEST + 1, GHOSTS, GREATEST + 1))
+    entering = np.zeros((GREATEST + 1, GHOSTS, GREATEST + 1))
+    for d in range(GREATEST + 1):
+        at_end = [Fraction(int(k == 0)) for k in range(d + 1)]
+        beyond = [averages(-1 - g, d) for g in range(GHOSTS)]
+        cells = [averages(k, d) for k in range(d + 1)]
+        solved = solve_fractions(cells, [at_end, *beyond])
+        value[d, : d + 1] = solved[0]
+        leaving[d, :, : d + 1] = solved[1:]
+        entering[d, :, : d + 1] = solve_fractions([at_end, *cells[:d]], beyond)
+    return value, leaving, entering
+
+
+END_VALUE, END_LEAVING, END_ENTERING = end_weights()
+
+
+@njit
+def near(c, right, k):
+    """The k-th cell from the left or right end."""
+    return c[c.size - 1 - k] if right else c[k]
+
+
+@njit
+def end_degree(scheme, degree, n):
+    """Degree that n cells bear: below five cells the fifth-order closure would grow, the third-order one not."""
+    return min(min(degree, 2) if n < 5 else degree, n - 1)
+
+
+@njit
+def roughness(d1, d2, d3, d4, small):
+    """From 0, smooth, to 1, a jump: high undivided differences against low ones."""
+    ratio = 4.0 * (d3 * d3 + d4 * d4) / (d1 * d1 + d2 * d2 + small)
+    return ratio * ratio / (1.0 + ratio * ratio)
+
+
+@njit
+def leaving_cells(c, right, family, degree, limiter, small, ghosts):
+    """Three cells beyond an end that the wave leaves by, nearest first."""
+    n = c.size
+    if family == UPWIND or family == LINEAR:
+        d = end_degree(family, degree, n)
+        for g in range(3):
+            total = 0.0
+            for k in range(d + 1):
+                total += END_LEAVING[d, g, k] * near(c, right, k)
+            ghosts[g] = total
+        return
+    a, b = near(c, right, 0), near(c, right, min(1, n - 1))
+    e = near(c, right, min(2, n - 1))
+    low = 3.0 * a - 3.0 * b + e if n > 2 else 2.0 * a - b
+    slope = value_muscl(limiter, b, a, low) - a
+    ghosts[0] = low
+    ghosts[1] = low
+    ghosts[2] = low
+    if family == WENO5:
+        d3, d4 = near(c, right, 3), near(c, right, 4)
+        rough = roughness(a - b, a - 2.0 * b + e, a - 3.0 * b + 3.0 * e - d3,
+                          a - 4.0 * b + 6.0 * e - 4.0 * d3 + d4, small)  # fmt: skip
+        for g in range(3):
+            high = 0.0
+            for k in range(5):
+                high += END_LEAVING[4, g, k] * near(c, right, k)
+            ghosts[g] = high + rough * (a + 2.0 * (g + 1.0) * slope - high)
+
+
+@njit
+def entering_cells(c, right, family, degree, datum, small, ghosts):
+    """Three cells beyond an end that the wave enters by with the value `datum`, nearest first."""
+    n = c.size
+    if family == UPWIND or family == LINEAR:
+        d = min(min(degree, 2) if n < 5 else degree, n)
+        for g in range(3):
+            total = END_ENTERING[d, g, 0] * datum
+            for k in range(d):
+                total += END_ENTERING[d, g, k + 1] * near(c, right, k)
+            ghosts[g] = total
+        return
+    a = near(c, right, 0)
+    ghosts[0] = 2.0 * datum - a
+    ghosts[1] = ghosts[0]
+    ghosts[2] = ghosts[0]
+    if family == WENO5:
+        b, e, d3 = near(c, right, 1), near(c, right, 2), near(c, right, 3)
+        bend = 5.5 * a - 3.5 * b + e - 3.0 * datum  # zero for every parabola
+        rough = roughness(2.0 * (a - datum), b - a, bend, a - 3.0 * b + 3.0 * e - d3, small)
+        for g in range(3):
+            high = END_ENTERING[4, g, 0] * datum
+            for k in range(4):
+                high += END_ENTERING[4, g, k + 1] * near(c, right, k)
+            ghosts[g] = high + rough * (datum - high)
+
+
+@njit
+def end_value(c, right, family, degree, limiter, small, ghosts):
+    """Value at an end of the wave that leaves by it."""
+    n = c.size
+    if family == UPWIND or family == LINEAR:
+        d = end_degree(family, degree, n)
+        total = 0.0
+        for k in range(d + 1):
+            total += END_VALUE[d, k] * near(c, right, k)
+        return total
+    if n == 1:
+        return c[0]
+    leaving_cells(c, right, family, degree, limiter, small, ghosts)
+    if family == WENO5:
+        return value_weno5(near(c, right, 2), near(c, right, 1), near(c, right, 0), ghosts[0], ghosts[1], small)
+    return value_muscl(limiter, near(c, right, 1), near(c, right, 0), ghosts[0])

@@ -1,0 +1,177 @@
+"""The right-hand side of a scene under the linear density law. Knows the tables; solves no steps.
+
+out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s], net flow into nodes
+[kg/s], four wave values a pipe (r and l at `from`, r and l at `to`), valve flows, column flows].
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.ends import end_value
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.nodes import close_nodes
+from fvsolve.kernels.pipes import family_of, pipe_rates
+from fvsolve.kernels.records import (
+    CHAMBER,
+    FIXED,
+    I_COLUMNS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_SCRATCH,
+    I_SETTINGS,
+    I_VALVES,
+    JUNCTION,
+    OK,
+    RATE,
+    STATUS,
+    TANK,
+    WHERE,
+)
+from fvsolve.kernels.valves import flow_slope, valve_conductance
+
+
+@njit
+def waves_out(y, out, tables):
+    """Outgoing waves of all pipes into out[ends], and what they carry into their nodes into out[net]."""
+    settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
+    nodes, scratch = tables[I_NODES], tables[I_SCRATCH]
+    for i in range(nodes.size):
+        out[layout["net"] + i] = 0.0
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        n, at = pipe["cells"], layout["ends"] + 4 * i
+        r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
+        family = family_of(settings, n)
+        degree, limiter, small = settings["degree"], settings["limiter"], pipe["noise"]
+        l_out = end_value(l, False, family, degree, limiter, small, scratch[16:19])
+        r_out = end_value(r, True, family, degree, limiter, small, scratch[16:19])
+        out[at + 1], out[at + 2] = l_out, r_out
+        admittance = pipe["admittance"]
+        out[layout["net"] + pipe["from_node"]] += 2.0 * l_out - admittance * pipe["from_offset"]
+        out[layout["net"] + pipe["to_node"]] += 2.0 * r_out - admittance * pipe["to_offset"]
+
+
+@njit
+def waves_in(out, tables):
+    """Waves that the nodes send back: incoming = Y (p' + offset) - outgoing."""
+    layout, pipes = tables[I_LAYOUT][0], tables[I_PIPES]
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        at = layout["ends"] + 4 * i
+        p_from = out[layout["pressure"] + pipe["from_node"]] + pipe["from_offset"]
+        p_to = out[layout["pressure"] + pipe["to_node"]] + pipe["to_offset"]
+        out[at] = pipe["admittance"] * p_from - out[at + 1]
+        out[at + 3] = pipe["admittance"] * p_to - out[at + 2]
+
+
+@njit
+def net_flows(out, tables):
+    """Net flow into every node from its links [kg/s], total, profile included."""
+    layout, pipes, nodes = tables[I_LAYOUT][0], tables[I_PIPES], tables[I_NODES]
+    valves, columns = tables[I_VALVES], tables[I_COLUMNS]
+    net = layout["net"]
+    for i in range(nodes.size):
+        out[net + i] = nodes[i]["inflow"]
+    for i in range(pipes.size):
+        at = layout["ends"] + 4 * i
+        out[net + pipes[i]["from_node"]] -= out[at] - out[at + 1]
+        out[net + pipes[i]["to_node"]] += out[at + 2] - out[at + 3]
+    for k in range(valves.size):
+        change = out[layout["valve"] + k] - valves[k]["flow"]
+        out[net + valves[k]["from_node"]] -= change
+        out[net + valves[k]["to_node"]] += change
+    for k in range(columns.size):
+        change = out[layout["column"] + k] - columns[k]["flow"]
+        out[net + columns[k]["from_node"]] -= change
+        out[net + columns[k]["to_node"]] += change
+
+
+@njit
+def stored_rates(y, dydt, out, tables):
+    """d/dt of stored masses; what reservoirs give, tanks spill, and dry tanks are asked for goes to supply."""
+    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
+    for i in range(nodes.size):
+        kind, net = nodes[i]["kind"], out[layout["net"] + i]
+        if kind == JUNCTION:
+            continue
+        supply = 0.0
+        if kind == FIXED:
+            supply = -net
+        elif kind == TANK:
+            stored = nodes[i]["mass"] + y[nodes[i]["y"]]
+            if (stored >= nodes[i]["full"] and net > 0.0) or (stored <= 0.0 and net < 0.0):
+                supply = -net
+        if kind != FIXED:
+            dydt[nodes[i]["y"]] = net + supply
+        out[layout["supply"] + i] = supply
+
+
+@njit
+def column_rates(y, dydt, out, tables):
+    """d/dt of the flow in rigid columns: (A / L) (drop') - drag'."""
+    layout, columns, pressure = tables[I_LAYOUT][0], tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
+    for k in range(columns.size):
+        column = columns[k]
+        change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]] + column["offset"]
+        pull = drag(
+            column["friction"],
+            column["loss"],
+            column["rough"],
+            column["roughness"],
+            column["reynolds"],
+            out[layout["column"] + k],
+        )
+        dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
+
+
+@njit
+def greatest_rate(t, out, tables):
+    """Greatest rate of the scene [1/s]: waves over cells, and stored masses against what touches them."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    rate = tables[I_SETTINGS][0]["rate"]
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == CHAMBER or nodes[i]["kind"] == TANK:
+            rate = max(rate, nodes[i]["stiffness"] * nodes[i]["admittance"])
+    for k in range(valves.size):
+        valve = valves[k]
+        i, j = valve["from_node"], valve["to_node"]
+        stiff = nodes[i]["stiffness"] + nodes[j]["stiffness"]
+        if stiff > 0.0:
+            drop = valve["drop"] + (out[layout["pressure"] + i] - out[layout["pressure"] + j])
+            slope = flow_slope(valve_conductance(tables, k, t), valve["transition"], drop)
+            soft = 0.0
+            if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
+                soft += 1.0 / nodes[i]["admittance"]
+            if nodes[j]["kind"] == JUNCTION and nodes[j]["admittance"] > 0.0:
+                soft += 1.0 / nodes[j]["admittance"]
+            rate = max(rate, stiff * slope / (1.0 + soft * slope))
+    return rate
+
+
+@njit
+def rhs_linear(t, y, dydt, out, tables):
+    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch."""
+    settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
+    out[STATUS], out[WHERE] = OK, -1.0
+    waves_out(y, out, tables)
+    close_nodes(t, y, out, tables)
+    waves_in(out, tables)
+    net_flows(out, tables)
+    stored_rates(y, dydt, out, tables)
+    column_rates(y, dydt, out, tables)
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
+        pipe_rates(
+            settings,
+            pipe,
+            y[o : o + n],
+            y[o + n : o + 2 * n],
+            out[at],
+            out[at + 1],
+            out[at + 2],
+            out[at + 3],
+            tables[I_SCRATCH],
+            dydt[o : o + n],
+            dydt[o + n : o + 2 * n],
+        )
+    out[RATE] = greatest_rate(t, out, tables)

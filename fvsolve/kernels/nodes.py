@@ -1,0 +1,261 @@
+"""Nodes under the linear density law: from the waves that arrive to pressures and flows. Knows no cells.
+
+A pipe end offers its outgoing wave w; with node deviation p' it carries 2 w - Y p' [kg/s] into the node,
+Y = area / speed. A node without storage makes these and the flows of its other links add up to zero.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.records import (
+    ALONE,
+    CHAMBER,
+    CLUSTER,
+    FIXED,
+    I_CLUSTERS,
+    I_COLUMNS,
+    I_FLOATS,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_SETTINGS,
+    I_VALVES,
+    JUNCTION,
+    NO_SOLUTION,
+    NOT_CONVERGED,
+    STATUS,
+    TANK,
+    WHERE,
+)
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.tanks import tank_level
+from fvsolve.kernels.valves import (
+    flow_at_drop,
+    flow_change,
+    flow_change_laminar,
+    flow_slope,
+    valve_conductance,
+)
+
+@njit
+def stored_pressures(t, y, out, tables):
+    """Deviations [Pa] of given pressures, tanks and chambers."""
+    settings, layout, nodes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES]
+    for i in range(nodes.size):
+        node = nodes[i]
+        at = layout["pressure"] + i
+        if node["kind"] == FIXED:
+            out[at] = schedule_value(tables, node["schedule"], t) - node["pressure"]
+        elif node["kind"] == TANK:
+            level = tank_level(node, tables[I_FLOATS], settings["rho"], y[node["y"]])
+            out[at] = settings["rho"] * settings["gravity"] * (level - node["level"])
+        elif node["kind"] == CHAMBER:
+            out[at] = node["stiffness"] * y[node["y"]]
+
+
+@njit
+def junction_flows(t, y, out, tables):
+    """Change of flow into each node without storage at p' = 0, less its demand; kept in out[net]."""
+    layout, nodes, columns = tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS]
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == JUNCTION:
+            demand = schedule_value(tables, nodes[i]["schedule"], t)
+            out[layout["supply"] + i] = -demand
+            out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
+    for k in range(columns.size):
+        change = y[columns[k]["y"]]
+        out[layout["column"] + k] = columns[k]["flow"] + change
+        out[layout["net"] + columns[k]["from_node"]] -= change
+        out[layout["net"] + columns[k]["to_node"]] += change
+
+
+@njit
+def close_alone(out, tables):
+    """Nodes that no valve touches: p' = (sum of what arrives) / Y."""
+    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == JUNCTION and nodes[i]["solve"] == ALONE:
+            out[layout["pressure"] + i] = out[layout["net"] + i] / nodes[i]["admittance"]
+
+
+@njit
+def side_of(out, layout, nodes, i):
+    """Pressure deviation of a node at no change of valve flow, and how much a unit of outflow lowers it."""
+    if nodes[i]["kind"] != JUNCTION:
+        return out[layout["pressure"] + i], 0.0
+    return out[layout["net"] + i] / nodes[i]["admittance"], 1.0 / nodes[i]["admittance"]
+
+
+@njit
+def close_single(t, out, tables):
+    """Valves with at most one node without storage at each end, that no other valve touches: closed roots."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    for k in range(valves.size):
+        valve = valves[k]
+        if valve["solve"] == CLUSTER:
+            continue
+        i, j = valve["from_node"], valve["to_node"]
+        pi, zi = side_of(out, layout, nodes, i)
+        pj, zj = side_of(out, layout, nodes, j)
+        g = valve_conductance(tables, k, t)
+        if valve["transition"] > 0.0:
+            base = flow_at_drop(valve["open"], valve["transition"], valve["drop"]) - valve["flow"]
+            x = flow_change_laminar(
+                g, valve["transition"], zi + zj, valve["flow"], base, valve["drop"] + (pi - pj)
+            )
+        else:
+            surplus = (g - valve["open"]) * valve["drop"] + g * (pi - pj)
+            x = flow_change(g, zi + zj, valve["flow"], surplus)
+        out[layout["valve"] + k] = valve["flow"] + x
+        if nodes[i]["kind"] == JUNCTION:
+            out[layout["pressure"] + i] = pi - zi * x
+        if nodes[j]["kind"] == JUNCTION:
+            out[layout["pressure"] + j] = pj + zj * x
+
+
+@njit
+def solve_dense(a, b, n):
+    """b <- a^-1 b by elimination with partial pivoting; False where a is singular. Overwrites both."""
+    for i in range(n):
+        pivot = i
+        for k in range(i + 1, n):
+            if abs(a[k, i]) > abs(a[pivot, i]):
+                pivot = k
+        if a[pivot, i] == 0.0:
+            return False
+        if pivot != i:
+            for k in range(n):
+                a[i, k], a[pivot, k] = a[pivot, k], a[i, k]
+            b[i], b[pivot] = b[pivot], b[i]
+        for k in range(i + 1, n):
+            f = a[k, i] / a[i, i]
+            if f != 0.0:
+                for m in range(i, n):
+                    a[k, m] -= f * a[i, m]
+                b[k] -= f * b[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+    return True
+
+
+@njit
+def valve_step(valve, g, x, change):
+    """a, s with dx = a + s d(p_i' - p_j') for the next Newton step of one valve in a cluster.
+
+    g : conductance now; x : change of flow; change : p_i' - p_j' [Pa]. The chord of the square root stands
+    for its slope: between the flow now and the flow the drop asks for, it is finite and never too steep.
+    """
+    flow, opened = valve["flow"], valve["open"]
+    if valve["transition"] > 0.0:
+        drop = valve["drop"] + change
+        base = flow_at_drop(opened, valve["transition"], valve["drop"])
+        target = flow_at_drop(g, valve["transition"], drop) - base
+        return target - x, flow_slope(g, valve["transition"], drop)
+    if opened <= 0.0 and valve["leak"] == g:
+        opened = g
+        flow = flow_at_drop(g, 0.0, valve["drop"])
+    asked = (g - opened) * valve["drop"] + g * change
+    present = abs(flow + x) * (flow + x) - abs(flow) * flow
+    chord = abs(flow + x) + sqrt(abs(abs(flow) * flow + asked))
+    chord = max(chord, 1e-6 * sqrt(g))  # the flow at a drop of 1e-12 Pa
+    return (asked - present) / chord, g / chord
+
+
+@njit
+def inner_row(nodes, i):
+    """Row of a node in its cluster, -1 where its pressure is known."""
+    return nodes[i]["row"] if nodes[i]["kind"] == JUNCTION else -1
+
+
+@njit
+def assemble(cluster, tables, out, g, x, p, a, s, matrix, right):
+    """Linear system for the change of the cluster's pressures, with the valves' changes put in."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    integers = tables[I_INTEGERS]
+    matrix[:, :] = 0.0
+    for i in range(p.size):
+        node = integers[cluster["first_node"] + i]
+        right[i] = out[layout["net"] + node] - nodes[node]["admittance"] * p[i]
+        matrix[i, i] = nodes[node]["admittance"]
+    for e in range(x.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        a[e], s[e] = -x[e] - valve["flow"], 0.0
+        if g[e] > 0.0:
+            pi = p[i] if i >= 0 else out[layout["pressure"] + valve["from_node"]]
+            pj = p[j] if j >= 0 else out[layout["pressure"] + valve["to_node"]]
+            a[e], s[e] = valve_step(valve, g[e], x[e], pi - pj)
+        if i >= 0:
+            right[i] -= x[e] + a[e]
+            matrix[i, i] += s[e]
+        if j >= 0:
+            right[j] += x[e] + a[e]
+            matrix[j, j] += s[e]
+        if i >= 0 and j >= 0:
+            matrix[i, j] -= s[e]
+            matrix[j, i] -= s[e]
+
+
+@njit
+def close_cluster(t, out, tables, which):
+    """Nodes without storage that several valves join, by Newton on pressures and flows together.
+
+    Valve k: |M + x| (M + x) = |M| M + (G - G0) dp0 + G (p_i' - p_j'); node i: net_i - Y_i p_i' = outgoing x
+    (the gradient method of Todini and Pilati 1988). It starts from no change, so the rhs stays pure.
+    """
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    integers, cluster = tables[I_INTEGERS], tables[I_CLUSTERS][which]
+    n, m = cluster["nodes"], cluster["valves"]
+    matrix, right, p = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    g, x, a, s = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
+    scale = 1e-300
+    for e in range(m):
+        k = integers[cluster["first_valve"] + e]
+        g[e] = max(valve_conductance(tables, k, t), valves[k]["leak"])
+        scale = max(scale, abs(valves[k]["flow"]))
+    for i in range(n):
+        scale = max(scale, abs(out[layout["net"] + integers[cluster["first_node"] + i]]))
+    moved = 1.0
+    for _ in range(100):
+        assemble(cluster, tables, out, g, x, p, a, s, matrix, right)
+        if not solve_dense(matrix, right, n):
+            out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
+            return
+        moved = 0.0
+        for i in range(n):
+            p[i] += right[i]
+        for e in range(m):
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
+            x[e] += step
+            scale = max(scale, abs(x[e]))
+            moved = max(moved, abs(step))
+        if moved <= 1e-14 * scale:
+            break
+    if moved > 1e-9 * scale:
+        out[STATUS], out[WHERE] = NOT_CONVERGED, integers[cluster["first_node"]]
+    for i in range(n):
+        out[layout["pressure"] + integers[cluster["first_node"] + i]] = p[i]
+    for e in range(m):
+        k = integers[cluster["first_valve"] + e]
+        if g[e] == valves[k]["leak"]:
+            if abs(valves[k]["flow"] + x[e]) > 1e-9 * scale:
+                out[STATUS], out[WHERE] = NO_SOLUTION, valves[k]["from_node"]
+            x[e] = -valves[k]["flow"]
+        out[layout["valve"] + k] = valves[k]["flow"] + x[e]
+
+
+@njit
+def close_nodes(t, y, out, tables):
+    """Pressure deviation of every node and flow of every valve, from out[net] and the stored masses."""
+    stored_pressures(t, y, out, tables)
+    junction_flows(t, y, out, tables)
+    close_alone(out, tables)
+    close_single(t, out, tables)
+    for which in range(tables[I_CLUSTERS].size):
+        close_cluster(t, out, tables, which)

@@ -1,0 +1,144 @@
+"""What is read off a state: probes, least and greatest values, marks and events. Changes no state."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.records import (
+    COLUMN_FLOW,
+    I_ENVELOPE,
+    I_EXTREMES,
+    I_FLOATS,
+    I_LAYOUT,
+    I_MARKS,
+    I_NODES,
+    I_PIPES,
+    I_PROBES,
+    I_PROFILE,
+    I_SETTINGS,
+    LEVEL,
+    PIPE_FLOW,
+    PIPE_PRESSURE,
+    PRESSURE,
+    TANK,
+    VALVE_FLOW,
+    WHERE,
+)
+from fvsolve.kernels.tanks import tank_level
+
+BLOCK = 64
+STOP_HERE = -2.0  # in out[WHERE]: the run is to end
+
+
+@njit
+def wave_sum(probe, pipe, sign, which, y, out, tables):
+    """r + l or r - l of a pipe at a place: at an end from the node, inside from a polynomial over cells."""
+    at = tables[I_LAYOUT][0]["ends"] + 4 * which
+    if probe["side"] < 0:
+        return out[at] + sign * out[at + 1]
+    if probe["side"] > 0:
+        return out[at + 2] + sign * out[at + 3]
+    total, n = 0.0, pipe["cells"]
+    for k in range(probe["count"]):
+        cell = pipe["y"] + probe["cell"] + k
+        total += tables[I_FLOATS][probe["weights"] + k] * (y[cell] + sign * y[cell + n])
+    return total
+
+
+@njit
+def observe_linear(t, y, out, tables, values):
+    """values[k] = scale * quantity + offset of every probe."""
+    layout, probes = tables[I_LAYOUT][0], tables[I_PROBES]
+    for k in range(probes.size):
+        probe = probes[k]
+        kind, i = probe["kind"], probe["index"]
+        value = 0.0
+        if kind == PRESSURE:
+            value = out[layout["pressure"] + i]
+        elif kind == LEVEL:
+            node = tables[I_NODES][i]
+            value = tank_level(node, tables[I_FLOATS], tables[I_SETTINGS][0]["rho"], y[node["y"]])
+        elif kind == PIPE_PRESSURE:
+            pipe = tables[I_PIPES][i]
+            value = wave_sum(probe, pipe, 1.0, i, y, out, tables)
+        elif kind == PIPE_FLOW:
+            pipe = tables[I_PIPES][i]
+            value = pipe["flow"] + wave_sum(probe, pipe, -1.0, i, y, out, tables)
+        elif kind == VALVE_FLOW:
+            value = out[layout["valve"] + i]
+        elif kind == COLUMN_FLOW:
+            value = out[layout["column"] + i]
+        values[k] = probe["scale"] * value + probe["offset"]
+
+
+@njit
+def widen(envelope, c, t, value):
+    """Let the least and greatest value of column c, and their times, include a value."""
+    if value < envelope[0, c]:
+        envelope[0, c], envelope[1, c] = value, t
+    if value > envelope[2, c]:
+        envelope[2, c], envelope[3, c] = value, t
+
+
+@njit
+def outside(r, l, least, greatest):
+    """How many of the cells lie outside of what was seen before."""
+    count = 0
+    for i in range(r.size):
+        s = r[i] + l[i]
+        count += (s < least[i]) + (s > greatest[i])
+    return count
+
+
+@njit
+def record_pipe(t, r, l, pipe, which, tables):
+    """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
+    envelope, profile = tables[I_ENVELOPE], tables[I_PROFILE]
+    vapor, marks = tables[I_SETTINGS][0]["vapor"], tables[I_MARKS]
+    start, at = 0, pipe["cell"]
+    while start < r.size:
+        stop = min(start + BLOCK, r.size)
+        low, high = envelope[0, at + start : at + stop], envelope[2, at + start : at + stop]
+        if outside(r[start:stop], l[start:stop], low, high) > 0:
+            for i in range(start, stop):
+                s = r[i] + l[i]
+                widen(envelope, at + i, t, s)
+                if profile[at + i] + s / pipe["admittance"] < vapor and marks[which] != marks[which]:
+                    marks[which] = t
+        start = stop
+
+
+@njit
+def record_linear(t, y, out, tables, values):
+    """Extremes of probes, envelopes of pipes and first times of marks, after every accepted step.
+
+    marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
+    """
+    observe_linear(t, y, out, tables, values)
+    pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
+    marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
+    for k in range(values.size):
+        widen(extremes, k, t, values[k])
+    for i in range(pipes.size):
+        n, o = pipes[i]["cells"], pipes[i]["y"]
+        record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
+    for i in range(nodes.size):
+        at = pipes.size + i
+        if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
+            marks[at] = t
+        if nodes[i]["kind"] == TANK and out[layout["supply"] + i] != 0.0:
+            at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
+            if marks[at] != marks[at]:
+                marks[at] = t
+    if tables[I_SETTINGS][0]["stop_below"] == 1:
+        for i in range(pipes.size + nodes.size):
+            if marks[i] == marks[i]:
+                out[WHERE] = STOP_HERE
+
+
+@njit
+def events(t, y, tables, g):
+    """Functions that are located where they fall through zero: a tank's content, and its room below the rim."""
+    nodes, k = tables[I_NODES], 0
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == TANK:
+            stored = nodes[i]["mass"] + y[nodes[i]["y"]]
+            g[k], g[k + 1] = stored, nodes[i]["full"] - stored
+            k += 2

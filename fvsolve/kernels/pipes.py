@@ -1,0 +1,142 @@
+"""One pipe under the linear density law: two waves, each carried by its own side. Knows no nodes.
+
+State, per cell: forward r = (c m' + M') / 2 and backward l = (c m' - M') / 2 [kg/s], deviations of mass per
+length m = rho A and mass flow M from the profile. r_t + c r_x = -drag'/2, l_t - c l_x = drag'/2.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.ends import entering_cells, leaving_cells
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.reconstruction import faces
+from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH, MUSCL, UPWIND, WENO5
+
+GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell widths from its centre
+
+
+@njit
+def family_of(settings, n):
+    """Scheme family that a pipe of n cells bears."""
+    family = settings["scheme"]
+    return MUSCL if family == WENO5 and n < 5 else family
+
+
+@njit
+def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
+    """Values of one wave at all faces, from its cells c and three imagined cells beyond each end."""
+    n = c.size
+    if n <= 5:
+        pad = scratch[: n + 6]
+        for k in range(n):
+            pad[k + 3] = c[k]
+        for g in range(3):
+            pad[2 - g], pad[n + 3 + g] = left[g], right[g]
+        faces(settings, family, small, backward, pad, f)
+        return
+    pad = scratch[:8]
+    for k in range(5):
+        pad[k + 3] = c[k]
+    for g in range(3):
+        pad[2 - g] = left[g]
+    faces(settings, family, small, backward, pad, f[:3])
+    faces(settings, family, small, backward, c, f[3 : n - 2])
+    for k in range(5):
+        pad[k] = c[n - 5 + k]
+    for g in range(3):
+        pad[5 + g] = right[g]
+    faces(settings, family, small, backward, pad, f[n - 2 :])
+
+
+@njit
+def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
+    """Face values of both waves; the values at the two ends are the nodes' and the outgoing ones."""
+    n, small = r.size, pipe["noise"]
+    family, degree, limiter = family_of(settings, n), settings["degree"], settings["limiter"]
+    left, right = scratch[16:19], scratch[19:22]
+    entering_cells(r, False, family, degree, r_in, small, left)
+    leaving_cells(r, True, family, degree, limiter, small, right)
+    wave_faces(settings, family, small, False, r, left, right, scratch, fr)
+    leaving_cells(l, False, family, degree, limiter, small, left)
+    entering_cells(l, True, family, degree, l_in, small, right)
+    wave_faces(settings, family, small, True, l, left, right, scratch, fl)
+    fr[0], fr[n] = r_in, r_out
+    fl[0], fl[n] = l_out, l_in
+
+
+@njit
+def rates_from_faces(k, flow, loss, base, r, l, fr, fl, dr, dl):
+    """dr, dl from face values; loss |M| M averaged by two Gauss points, fourth order and blind to no kink."""
+    half = 0.25 * loss
+    for i in range(r.size):
+        a = fr[i + 1] - fr[i]
+        b = fl[i + 1] - fl[i]
+        m = flow + (r[i] - l[i])
+        d = GAUSS * (a - b)
+        hi, lo = m + d, m - d
+        s = half * (abs(hi) * hi + abs(lo) * lo) - base
+        dr[i] = -k * a - s
+        dl[i] = k * b + s
+
+
+@njit
+def rates_from_faces_free(k, fr, fl, dr, dl):
+    """dr, dl from face values without friction."""
+    for i in range(dr.size):
+        dr[i] = -k * (fr[i + 1] - fr[i])
+        dl[i] = k * (fl[i + 1] - fl[i])
+
+
+@njit
+def rates_from_faces_any(k, pipe, base, r, l, fr, fl, dr, dl):
+    """dr, dl from face values with a friction law that follows the flow."""
+    kind, loss, rough = pipe["friction"], pipe["loss"], pipe["rough"]
+    e, reynolds, flow = pipe["roughness"], pipe["reynolds"], pipe["flow"]
+    for i in range(r.size):
+        a = fr[i + 1] - fr[i]
+        b = fl[i + 1] - fl[i]
+        m = flow + (r[i] - l[i])
+        d = GAUSS * (a - b)
+        both = drag(kind, loss, rough, e, reynolds, m + d) + drag(kind, loss, rough, e, reynolds, m - d)
+        s = 0.25 * both - base
+        dr[i] = -k * a - s
+        dl[i] = k * b + s
+
+
+@njit
+def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
+    """First order: each wave takes the cell it comes from; one loop, no face arrays."""
+    n = r.size
+    half = 0.5 * loss
+    m = flow + (r[0] - l[0])
+    dr[0] = -k * (r[0] - r_in) - (half * (abs(m) * m) - base)
+    head, body, out = r[: n - 1], r[1:], dr[1:]
+    meet = l[1:]
+    for i in range(n - 1):
+        m = flow + (body[i] - meet[i])
+        out[i] = -k * (body[i] - head[i]) - (half * (abs(m) * m) - base)
+    head, body, out = l[1:], l[: n - 1], dl[: n - 1]
+    meet = r[: n - 1]
+    for i in range(n - 1):
+        m = flow + (meet[i] - body[i])
+        out[i] = k * (head[i] - body[i]) + (half * (abs(m) * m) - base)
+    m = flow + (r[n - 1] - l[n - 1])
+    dl[n - 1] = k * (l_in - l[n - 1]) + (half * (abs(m) * m) - base)
+
+
+@njit
+def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
+    """d/dt of both waves of one pipe from its cells and the four wave values at its ends."""
+    n = r.size
+    k = pipe["speed"] / pipe["dx"]
+    base = 0.5 * pipe["drag"]
+    plain = pipe["friction"] != FRICTION_ROUGH and pipe["friction"] != FRICTION_HAZEN
+    if settings["scheme"] == UPWIND and plain:
+        rates_upwind(k, pipe["flow"], pipe["loss"], base, r, l, r_in, l_in, dr, dl)
+        return
+    fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
+    both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)
+    if not plain:
+        rates_from_faces_any(k, pipe, base, r, l, fr, fl, dr, dl)
+    elif pipe["loss"] == 0.0:
+        rates_from_faces_free(k, fr, fl, dr, dl)
+    else:
+        rates_from_faces(k, pipe["flow"], pipe["loss"], base, r, l, fr, fl, dr, dl)

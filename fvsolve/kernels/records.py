@@ -1,0 +1,227 @@
+"""The one fixed record type of each table that a model is made of. Knows layouts; knows no laws.
+
+A model is the tuple `tables` of these arrays, in the order of `TABLES`. The tuple's type is part of every
+compiled signature, so it is fixed here once and a new scene compiles nothing.
+"""
+
+import functools
+
+import numpy as np
+
+# Codes of kinds, as the kernels see them.
+FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
+FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
+UPWIND, LINEAR, MUSCL, WENO5 = 0, 1, 2, 3  # scheme families; LINEAR ones are six weights
+MINMOD, VAN_LEER, MONOTONIZED_CENTRAL = 0, 1, 2
+ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
+LAW_LINEAR, LAW_LOG, LAW_TABLE = 0, 1, 2
+
+# Status codes that travel up; the message is made in Python.
+OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE = 0, 1, 2, 3
+
+SETTINGS = np.dtype(
+    [
+        ("scheme", "i8"),
+        ("limiter", "i8"),
+        ("degree", "i8"),  # of the polynomials next to an end
+        ("w0", "f8"),  # weights of cells i-3 .. i+2 in the value at face i, for waves that run forward
+        ("w1", "f8"),
+        ("w2", "f8"),
+        ("w3", "f8"),
+        ("w4", "f8"),
+        ("w5", "f8"),
+        ("rho", "f8"),  # reference density [kg/m3]
+        ("viscosity", "f8"),  # dynamic [Pa s]
+        ("ambient", "f8"),  # ambient pressure [Pa]
+        ("gravity", "f8"),
+        ("vapor", "f8"),  # vapour pressure [Pa]
+        ("rate", "f8"),  # greatest wave rate that does not change, speed / dx [1/s]
+        ("stop_below", "i8"),  # 1: a pressure below vapour pressure ends the run
+        ("limit", "f8"),  # end of the segment: schedules take their left limit from here on [s]
+        ("law", "i8"),
+        ("beta", "f8"),  # bulk modulus of the fluid [Pa]
+        ("reference", "f8"),  # pressure at which rho holds [Pa]
+        ("table", "i8"),  # offset of the density table in `floats`, its length and pressure step
+        ("table_size", "i8"),
+        ("table_start", "f8"),
+        ("table_step", "f8"),
+    ],
+    align=True,
+)
+
+PIPE = np.dtype(
+    [
+        ("y", "i8"),  # offset of the forward wave in y; the backward wave follows it
+        ("cells", "i8"),
+        ("cell", "i8"),  # offset of its cells in per-cell arrays
+        ("from_node", "i8"),
+        ("to_node", "i8"),
+        ("dx", "f8"),
+        ("speed", "f8"),  # wave speed [m/s]
+        ("area", "f8"),
+        ("diameter", "f8"),
+        ("admittance", "f8"),  # area / speed [kg/s per Pa]
+        ("flow", "f8"),  # mass flow of the profile [kg/s]
+        ("from_offset", "f8"),  # node pressure less the profile's pressure at that end [Pa]
+        ("to_offset", "f8"),
+        ("friction", "i8"),
+        ("loss", "f8"),  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
+        ("rough", "f8"),  # dM/dt = -rough f(Re) |M| M  [1/kg]
+        ("roughness", "f8"),  # relative roughness
+        ("reynolds", "f8"),  # Reynolds number per mass flow [s/kg]
+        ("drag", "f8"),  # friction of the profile [kg/s2]
+        ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
+        ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
+        ("slope", "f8"),  # rise per length
+        ("face", "i8"),  # offset of its faces in per-face arrays of the profile
+    ],
+    align=True,
+)
+
+NODE = np.dtype(
+    [
+        ("kind", "i8"),
+        ("y", "i8"),  # offset of the stored mass in y
+        ("schedule", "i8"),  # pressure [Pa] of a fixed node, mass demand [kg/s] of a junction; -1 for none
+        ("solve", "i8"),  # ALONE, SINGLE or CLUSTER
+        ("pressure", "f8"),  # of the profile [Pa]
+        ("elevation", "f8"),
+        ("demand", "f8"),  # of the profile [kg/s]
+        ("inflow", "f8"),  # sum of the profile's link flows into it less demand, snapped to zero [kg/s]
+        ("admittance", "f8"),  # sum over its pipe ends [kg/s per Pa]
+        ("stiffness", "f8"),  # chamber and prism: pressure per stored mass [Pa/kg]
+        ("area", "f8"),  # tank [m2]
+        ("level", "f8"),  # tank, of the profile [m]
+        ("mass", "f8"),  # stored in the profile [kg]
+        ("full", "f8"),  # stored mass above which a tank spills [kg]
+        ("shape", "i8"),  # offset of a shaped tank's table in `floats` (levels, areas, volumes); -1 for a prism
+        ("shapes", "i8"),  # rows of that table
+        ("volume", "f8"),  # chamber [m3]
+        ("row", "i8"),  # row in its cluster
+        ("head_given", "i8"),  # the schedule is a head [m]
+    ],
+    align=True,
+)
+
+VALVE = np.dtype(
+    [
+        ("from_node", "i8"),
+        ("to_node", "i8"),
+        ("schedule", "i8"),
+        ("characteristic", "i8"),  # 0 linear, 1 equal-percentage, else table
+        ("table", "i8"),
+        ("table_size", "i8"),
+        ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
+        ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
+        ("transition", "f8"),  # mass flow below which the law is laminar [kg/s]; 0 where pipes soften the root
+        ("open", "f8"),  # conductance of the profile
+        ("flow", "f8"),  # of the profile [kg/s]
+        ("drop", "f8"),  # of the profile [Pa]
+        ("leak", "f8"),  # conductance when shut beside a node with no other hold, else 0; its flow counts as 0
+    ],
+    align=True,
+)
+
+COLUMN = np.dtype(
+    [
+        ("y", "i8"),
+        ("from_node", "i8"),
+        ("to_node", "i8"),
+        ("area", "f8"),
+        ("length", "f8"),
+        ("friction", "i8"),
+        ("loss", "f8"),
+        ("rough", "f8"),
+        ("roughness", "f8"),
+        ("reynolds", "f8"),
+        ("flow", "f8"),
+        ("drag", "f8"),
+        ("offset", "f8"),  # driving pressure of the profile that friction does not balance [Pa]
+    ],
+    align=True,
+)
+
+SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
+# Piece: start, kind (0 polynomial in t - origin, 1 power), origin, then a, b, c, d or v0, v1, duration, exponent
+PIECE_COLUMNS = 7
+
+CLUSTER_RECORD = np.dtype(
+    [("first_node", "i8"), ("nodes", "i8"), ("first_valve", "i8"), ("valves", "i8")], align=True
+)
+
+LAYOUT = np.dtype(
+    [
+        ("pressure", "i8"),  # offsets in `out`
+        ("supply", "i8"),
+        ("net", "i8"),
+        ("ends", "i8"),
+        ("valve", "i8"),
+        ("column", "i8"),
+        ("size", "i8"),
+        ("ledger", "i8"),
+        ("ledgers", "i8"),
+    ],
+    align=True,
+)
+RATE, STATUS, WHERE = 0, 1, 2  # first entries of `out`
+OUT_HEAD = 4
+
+PROBE = np.dtype(
+    [
+        ("kind", "i8"),
+        ("index", "i8"),  # of the node, pipe, valve or column
+        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside
+        ("cell", "i8"),  # first of the cells that are read
+        ("count", "i8"),  # how many
+        ("weights", "i8"),  # offset of their weights in `floats`
+        ("scale", "f8"),
+        ("offset", "f8"),
+    ],
+    align=True,
+)
+PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW = 0, 1, 2, 3, 4, 5  # probe kinds
+
+RECORDS = {
+    "settings": SETTINGS,
+    "layout": LAYOUT,
+    "pipes": PIPE,
+    "nodes": NODE,
+    "valves": VALVE,
+    "columns": COLUMN,
+    "clusters": CLUSTER_RECORD,
+    "schedules": SCHEDULE,
+    "probes": PROBE,
+}
+ARRAYS = ("integers", "floats", "profile", "scratch", "marks")  # int64[:], then float64[:]
+MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
+TABLES = (*RECORDS, *ARRAYS, *MATRICES)
+(
+    I_SETTINGS,
+    I_LAYOUT,
+    I_PIPES,
+    I_NODES,
+    I_VALVES,
+    I_COLUMNS,
+    I_CLUSTERS,
+    I_SCHEDULES,
+    I_PROBES,
+    I_INTEGERS,
+    I_FLOATS,
+    I_PROFILE,
+    I_SCRATCH,
+    I_MARKS,
+    I_PIECES,
+    I_ENVELOPE,
+    I_EXTREMES,
+) = range(len(TABLES))
+
+
+@functools.cache
+def tables_type():
+    """Numba's type of `tables`."""
+    from numba import from_dtype, types
+
+    records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
+    flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
+    return types.Tuple((*records, *flats, *[types.Array(types.float64, 2, "C") for _ in MATRICES]))
+

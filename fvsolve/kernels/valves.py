@@ -1,0 +1,110 @@
+"""The valve equation, alone and against pipe ends. Knows one valve; knows no network.
+
+M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79).
+"""
+
+from math import exp, log, sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.records import I_FLOATS, I_VALVES
+from fvsolve.kernels.schedules import schedule_value
+
+
+@njit
+def relative_area(kind, floats, table, size, opening):
+    """Relative flow area at a stem position: linear, equal-percentage (rangeability 50, shut at 0), or a table."""
+    if kind == 0:
+        return opening
+    if kind == 1:
+        return exp(log(50.0) * (opening - 1.0)) if opening > 0.0 else 0.0
+    if opening <= floats[table]:
+        return floats[table + size]
+    for k in range(1, size):
+        if opening <= floats[table + k]:
+            s = (opening - floats[table + k - 1]) / (floats[table + k] - floats[table + k - 1])
+            low, high = floats[table + size + k - 1], floats[table + size + k]
+            return low + s * (high - low)
+    return floats[table + 2 * size - 1]
+
+
+@njit
+def valve_conductance(tables, index, t):
+    """G = 2 rho (Cd A)^2 at time t [kg2/s2/Pa]."""
+    valve = tables[I_VALVES][index]
+    opening = schedule_value(tables, valve["schedule"], t)
+    area = relative_area(valve["characteristic"], tables[I_FLOATS], valve["table"], valve["table_size"], opening)
+    return valve["conductance"] * area * area
+
+
+@njit
+def flow_at_drop(conductance, transition, drop):
+    """Mass flow at a pressure drop; below `transition` [kg/s] an odd polynomial with a bounded slope, C2 joined."""
+    if conductance <= 0.0:
+        return 0.0
+    size = conductance * abs(drop)
+    if transition > 0.0 and size < transition * transition:
+        x = size / (transition * transition)
+        flow = transition * x * (45.0 + x * x * (5.0 * x * x - 18.0)) / 32.0
+    else:
+        flow = sqrt(size)
+    return flow if drop >= 0.0 else -flow
+
+
+@njit
+def flow_slope(conductance, transition, drop):
+    """d flow / d drop [kg/s per Pa]."""
+    if conductance <= 0.0:
+        return 0.0
+    size = conductance * abs(drop)
+    if transition > 0.0 and size < transition * transition:
+        x = size / (transition * transition)
+        return conductance / transition * (45.0 + x * x * (25.0 * x * x - 54.0)) / 32.0
+    return 0.5 * conductance / sqrt(size) if size > 0.0 else 0.0
+
+
+@njit
+def flow_change(conductance, impedance, flow, surplus):
+    """Exact root x of |M + x| (M + x) - |M| M + G Z x = surplus: what a valve between pipe ends adds to M.
+
+    conductance G [kg2/s2/Pa]; impedance Z of the ends together [Pa s/kg], zero for given pressures;
+    surplus = (G - G0) dp0 + G dp', the drop that M does not use up yet, times G. Zero surplus gives zero.
+    """
+    if conductance <= 0.0:
+        return -flow
+    gz = conductance * impedance
+    total = surplus + abs(flow) * flow + gz * flow  # decides the sign of M + x
+    side = 1.0 if flow > 0.0 or (flow == 0.0 and surplus > 0.0) else -1.0
+    if side * total >= 0.0:
+        b = 2.0 * abs(flow) + gz
+        root = b + sqrt(max(b * b + 4.0 * side * surplus, 0.0))
+        return 2.0 * surplus / root if root > 0.0 else 0.0
+    return 2.0 * total / (gz + sqrt(gz * gz + 4.0 * abs(total))) - flow
+
+
+@njit
+def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
+    """x with M + x = law(drop - Z x): a law with a laminar part against pipe ends, by safeguarded Newton.
+
+    base is law(dp0) of the profile less M, so that nothing moves while nothing changes.
+    """
+    x = flow_at_drop(conductance, transition, drop) - flow - base
+    if impedance == 0.0 or x == 0.0:
+        return x
+    low, high = min(x, 0.0), max(x, 0.0)
+    if conductance <= 0.0:
+        return x
+    for _ in range(100):
+        rest = drop - impedance * x
+        g = flow + x + base - flow_at_drop(conductance, transition, rest)
+        if g > 0.0:
+            high = x
+        else:
+            low = x
+        step = g / (1.0 + impedance * flow_slope(conductance, transition, rest))
+        new = x - step
+        if not (low <= new <= high):
+            new = 0.5 * (low + high)
+        if abs(new - x) <= 1e-15 * (abs(flow) + abs(new)):
+            return new
+        x = new
+    return x

@@ -1,0 +1,323 @@
+"""From a case to a model: the one place where names meet numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import CaseError, Fault
+from fvsolve.kernels import records as rec
+from fvsolve.model.hydraulics import Hydraulics
+from fvsolve.model.model import Model, PipeMesh
+from fvsolve.model.probes import lower_probes
+from fvsolve.model.schedules import Schedules
+from fvsolve.model.schemes import scheme_settings
+from fvsolve.model.start import start_profile
+
+
+def build(case) -> Model:
+    """The model of a case, with the profile it starts from.
+
+    Raises CaseError where no start can be found: a frictionless pipe between unequal heads, a demand that nothing
+    can bring, a node joined only by rigid columns.
+    """
+    scene = Scene(case)
+    scene.nodes()
+    scene.links()
+    scene.settle()
+    return scene.model()
+
+
+class Scene:
+    """The tables of one model while they are filled."""
+
+    def __init__(self, case) -> None:
+        self.case, self.fluid = case, case.properties
+        self.law = Hydraulics(case)
+        self.schedules = Schedules()
+        self.floats: list[float] = []
+        self.node_index = {name: i for i, name in enumerate(case.nodes)}
+        self.faults: list[Fault] = []
+        self.warnings: list[str] = []
+        self.size = 0
+        self.state_names: list[str] = []
+        self.scale: list[float] = []
+
+    def fault(self, place: str, message: str) -> None:
+        self.faults.append(Fault(place, message))
+
+    def check(self) -> None:
+        if self.faults:
+            raise CaseError(self.faults, str(self.case.path or self.case.name))
+
+    def states(self, names: list[str], scale: float) -> int:
+        """Offset of new states."""
+        self.state_names += names
+        self.scale += [scale] * len(names)
+        self.size += len(names)
+        return self.size - len(names)
+
+    # nodes ------------------------------------------------------------------------------------------------
+
+    def nodes(self) -> None:
+        table = np.zeros(len(self.case.nodes), rec.NODE)
+        table["y"] = table["shape"] = table["schedule"] = table["row"] = -1
+        table["full"] = np.inf
+        for i, (name, node) in enumerate(self.case.nodes.items()):
+            row = table[i]
+            row["elevation"] = self.case.elevation(name)
+            getattr(self, "node_" + node.kind)(name, node, row)
+        self.node_table = table
+
+    def node_reservoir(self, name, node, row) -> None:
+        row["kind"] = rec.FIXED
+        if node.head is not None:
+            row["schedule"] = self.law.add_head(self.schedules, node.head, row["elevation"])
+        else:
+            row["schedule"] = self.schedules.add(node.pressure)
+
+    def node_junction(self, name, node, row) -> None:
+        row["kind"] = rec.JUNCTION
+        row["schedule"] = self.schedules.add(node.demand, self.fluid.density)
+
+    def node_inflow(self, name, node, row) -> None:
+        row["kind"] = rec.JUNCTION
+        row["schedule"] = self.schedules.add(node.flow, -self.fluid.density)
+
+    def node_tank(self, name, node, row) -> None:
+        rho = self.law.tank_density
+        row["kind"], row["level"] = rec.TANK, node.level
+        if hasattr(node.area, "area"):
+            level, area = node.area.level, node.area.area
+            volume = np.concatenate(([0.0], np.cumsum(np.diff(level) * 0.5 * (area[1:] + area[:-1]))))
+            row["shape"], row["shapes"] = len(self.floats), len(level)
+            if len(level) == 1:
+                row["shape"] = -1
+            else:
+                self.floats += [*level, *area, *volume]
+            row["area"] = area.min()
+            if len(level) == 1:
+                row["area"] = area[0]
+            contents = lambda z: shaped_volume(level, area, volume, z)  # noqa: E731
+        else:
+            row["area"] = node.area
+            contents = lambda z: node.area * z  # noqa: E731
+        row["mass"] = rho * contents(node.level)
+        if node.height is not None:
+            row["full"] = rho * contents(node.height)
+        row["stiffness"] = self.case.gravity / row["area"]
+        row["y"] = self.states([f"{name}.mass"], 0.1 * rho * row["area"])
+
+    def node_chamber(self, name, node, row) -> None:
+        row["kind"], row["volume"] = rec.CHAMBER, node.volume
+        row["stiffness"] = self.fluid.bulk_modulus / (self.fluid.density * node.volume)
+        row["y"] = self.states([f"{name}.mass"], 1e5 / row["stiffness"])
+
+    # links ------------------------------------------------------------------------------------------------
+
+    def links(self) -> None:
+        by_kind: dict[str, list] = {"pipe": [], "rigid-column": [], "valve": []}
+        for name, link in self.case.links.items():
+            by_kind["valve" if link.kind == "orifice" else link.kind].append((name, link))
+        self.pipe_names = [name for name, _ in by_kind["pipe"]]
+        self.column_names = [name for name, _ in by_kind["rigid-column"]]
+        self.valve_names = [name for name, _ in by_kind["valve"]]
+        self.pipe_table = np.zeros(len(self.pipe_names), rec.PIPE)
+        self.column_table = np.zeros(len(self.column_names), rec.COLUMN)
+        self.valve_table = np.zeros(len(self.valve_names), rec.VALVE)
+        self.meshes: list[PipeMesh] = []
+        for k, (name, link) in enumerate(by_kind["pipe"]):
+            self.pipe(name, link, self.pipe_table[k])
+        for k, (name, link) in enumerate(by_kind["rigid-column"]):
+            self.column(name, link, self.column_table[k])
+        for k, (name, link) in enumerate(by_kind["valve"]):
+            self.valve(name, link, self.valve_table[k])
+        for row in self.pipe_table:
+            self.node_table["admittance"][row["from_node"]] += row["admittance"]
+            self.node_table["admittance"][row["to_node"]] += row["admittance"]
+
+    def ends(self, link, row) -> None:
+        row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
+
+    def pipe(self, name, link, row) -> None:
+        n, area = link.cells, math.pi / 4.0 * link.diameter**2
+        speed = self.case.wave_speed(name)
+        self.ends(link, row)
+        row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
+        row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
+        row["cell"], row["face"] = sum(mesh.cells for mesh in self.meshes), sum(m.cells + 1 for m in self.meshes)
+        z = self.node_table["elevation"][[row["from_node"], row["to_node"]]]
+        row["slope"] = (z[1] - z[0]) / link.length
+        row["noise"] = (1e-9 * self.fluid.density * area * speed) ** 2
+        row["compliance"] = 1.0 / (self.fluid.density * speed**2) - 1.0 / self.fluid.bulk_modulus
+        self.law.friction(name, link, row, self.fault)
+        names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
+        row["y"] = self.states(names, 0.5e5 * row["admittance"])
+        x = (np.arange(n) + 0.5) * (link.length / n)
+        self.meshes.append(
+            PipeMesh(
+                name, link.from_, link.to, link.length, link.diameter, n, speed, x,
+                np.linspace(0.0, link.length, n + 1), z[0] + row["slope"] * x,
+            )
+        )  # fmt: skip
+
+    def column(self, name, link, row) -> None:
+        self.ends(link, row)
+        row["area"], row["length"] = math.pi / 4.0 * link.diameter**2, link.length
+        self.law.friction(name, link, row, self.fault)
+        row["y"] = self.states([f"{name}.flow"], 0.1 * self.fluid.density * row["area"])
+
+    def valve(self, name, link, row) -> None:
+        self.ends(link, row)
+        row["schedule"] = self.schedules.add(link.opening)
+        row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
+        if link.characteristic == "equal-percentage":
+            row["characteristic"] = 1
+        elif link.characteristic != "linear":
+            row["characteristic"], row["table"] = 2, len(self.floats)
+            row["table_size"] = len(link.characteristic.opening)
+            self.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
+        if link.laminar_reynolds is not None:
+            row["transition"] = self.law.transition_flow(name, link, link.laminar_reynolds, self.fault)
+
+    # how nodes without storage are solved -------------------------------------------------------------------
+
+    def clusters(self) -> None:
+        """Sort nodes and valves into those with closed roots and those that Newton solves together."""
+        nodes, valves = self.node_table, self.valve_table
+        inner = nodes["kind"] == rec.JUNCTION
+        group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in valves
+                                   if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
+        touched: dict[int, list[int]] = {}
+        for k, v in enumerate(valves):
+            for i in {int(v["from_node"]), int(v["to_node"])}:
+                if inner[i]:
+                    touched.setdefault(group[i], [])
+                    if k not in touched[group[i]]:
+                        touched[group[i]].append(k)
+        integers: list[int] = []
+        clusters = []
+        members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
+        nodes["solve"] = rec.ALONE
+        leak = 1e-30 * max(valves["conductance"], default=0.0)
+        for root, ks in touched.items():
+            soft = np.all(nodes["admittance"][members[root]] > 0.0)
+            single = len(ks) == 1 and soft
+            nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
+            valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
+            if not np.any(nodes["admittance"][members[root]] > 0.0):
+                self.soften(ks)
+            if single:
+                continue
+            for k in ks:
+                at = [valves[k]["from_node"], valves[k]["to_node"]]
+                if any(inner[i] and nodes["admittance"][i] == 0.0 for i in at):
+                    valves["leak"][k] = leak
+            nodes["row"][members[root]] = np.arange(len(members[root]))
+            clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
+            integers += members[root] + ks
+        stiff = [k for k, v in enumerate(valves) if not inner[v["from_node"]] and not inner[v["to_node"]]]
+        self.soften(stiff)
+        self.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
+        self.integers = integers
+        for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
+            if nodes["solve"][i] == rec.ALONE:
+                name = list(self.case.nodes)[i]
+                self.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
+                           "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+    def soften(self, ks) -> None:
+        """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10."""
+        for k in ks:
+            if self.valve_table["transition"][k] == 0.0:
+                name = self.valve_names[k]
+                flow = self.law.transition_flow(name, self.case.links[name], 10.0, self.fault)
+                self.valve_table["transition"][k] = flow
+
+    # the profile and the rest -------------------------------------------------------------------------------
+
+    def settle(self) -> None:
+        self.clusters()
+        self.check()
+        self.pack(np.zeros(sum(mesh.cells for mesh in self.meshes)))
+        self.steady = start_profile(self)
+        self.check()
+
+    def pack(self, profile: np.ndarray) -> None:
+        """Make the tuple of tables; records stay the same arrays, so later changes are seen."""
+        case, pipes = self.case, self.pipe_table
+        settings = np.zeros(1, rec.SETTINGS)
+        s = settings[0]
+        scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
+        s["rho"], s["beta"], s["reference"] = self.fluid.density, self.fluid.bulk_modulus, self.fluid.pressure
+        s["viscosity"] = self.fluid.viscosity or 0.0
+        s["ambient"], s["gravity"], s["limit"] = case.ambient_pressure, case.gravity, np.inf
+        s["vapor"] = self.fluid.vapor_pressure
+        s["stop_below"] = case.numerics.below_vapor == "stop"
+        s["law"] = {"linear": rec.LAW_LINEAR, "log": rec.LAW_LOG, "table": rec.LAW_TABLE}[case.fluid.law]
+        s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"]), *self.column_rates()])
+        self.probe_table = lower_probes(self)
+        schedules, pieces = self.schedules.tables()
+        most, cells = max(pipes["cells"], default=0), len(profile)
+        layout = np.zeros(1, rec.LAYOUT)
+        at = rec.OUT_HEAD
+        for name, size in (
+            ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("net", len(self.node_table)),
+            ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
+        ):  # fmt: skip
+            layout[name], at = at, at + size
+        layout["size"], layout["ledger"], layout["ledgers"] = at, layout["supply"], len(self.node_table)
+        marks = np.full(len(pipes) + 3 * len(self.node_table), np.nan)
+        envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
+        for array in (envelope, extremes):
+            array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
+        self.tables = (
+            settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
+            schedules, self.probe_table, np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float),
+            profile, np.zeros(2 * most + 64), marks, pieces, envelope, extremes,
+        )  # fmt: skip
+
+    def column_rates(self):
+        stiff = self.node_table["stiffness"]
+        for row in self.column_table:
+            k = stiff[row["from_node"]] + stiff[row["to_node"]]
+            yield math.sqrt(k * row["area"] / row["length"])
+
+    def model(self) -> Model:
+        case = self.case
+        inside = sorted(
+            (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t < case.numerics.end
+        )
+        return Model(
+            case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
+            list(case.nodes), list(case.links), self.valve_names, self.column_names,
+            {name: case.elevation(name) for name in case.nodes}, case.probes, self.warnings, self.steady,
+        )  # fmt: skip
+
+
+def shaped_volume(level, area, volume, z: float) -> float:
+    """Volume below level z [m3] of a tank whose areas are linear between levels and held above the last."""
+    if z >= level[-1]:
+        return float(volume[-1] + (z - level[-1]) * area[-1])
+    k = int(np.searchsorted(level, z, side="right")) - 1
+    s = z - level[k]
+    return float(volume[k] + s * (area[k] + 0.5 * s * (area[k + 1] - area[k]) / (level[k + 1] - level[k])))
+
+
+def union(n: int, pairs) -> list[int]:
+    """Label of the set that each of n things belongs to when pairs are joined."""
+    label = list(range(n))
+
+    def root(i: int) -> int:
+        while label[i] != i:
+            i = label[i]
+        return i
+
+    for i, j in pairs:
+        label[root(int(i))] = root(int(j))
+    return [root(i) for i in range(n)]
+
+
+__all__ = ["Any", "build"]

@@ -1,0 +1,66 @@
+"""Friction, transitions and hydrostatics of a case in numbers. Knows the fluid; knows no network."""
+
+from __future__ import annotations
+
+import math
+
+from fvsolve.kernels import records as rec
+
+HAZEN_WILLIAMS = 10.67  # h / L = 10.67 q^1.852 / (C^1.852 D^4.8704), SI
+
+
+class Hydraulics:
+    """What the fluid and gravity of a case make of sizes."""
+
+    def __init__(self, case) -> None:
+        self.case, self.fluid = case, case.properties
+        self.rho, self.gravity, self.ambient = self.fluid.density, case.gravity, case.ambient_pressure
+
+    @property
+    def tank_density(self) -> float:
+        """Density of what tanks hold [kg/m3]."""
+        return self.rho
+
+    def add_head(self, schedules, head, elevation: float) -> int:
+        """A schedule of head [m] as one of pressure [Pa] at an elevation [m]."""
+        weight = self.rho * self.gravity
+        return schedules.add(head, weight, self.ambient - weight * elevation)
+
+    def friction(self, name: str, link, row, fault) -> None:
+        """Friction of a pipe or column: dM/dt = -(loss |M| M + ...), kernels.friction; `steady` by roughness waits."""
+        area = math.pi / 4.0 * link.diameter**2
+        law, row["loss"] = link.friction, link.minor_loss / (2.0 * self.rho * area**2 * link.length) * area
+        per_factor = 1.0 / (2.0 * link.diameter * self.rho * area)
+        row["friction"] = rec.FRICTION_NONE if row["loss"] == 0.0 else rec.FRICTION_FACTOR
+        if law.model == "none":
+            return
+        if law.model == "hazen-williams":
+            row["friction"] = rec.FRICTION_HAZEN
+            row["rough"] = (
+                area * self.rho * self.gravity * HAZEN_WILLIAMS
+                / (self.rho**1.852 * law.coefficient**1.852 * link.diameter**4.8704)
+            )  # fmt: skip
+        elif law.factor is not None:
+            row["friction"] = rec.FRICTION_FACTOR
+            row["loss"] += per_factor * law.factor
+        elif not self.fluid.viscosity:
+            fault(f"links.{name}.friction", "roughness needs the fluid's viscosity; give fluid.viscosity, or a factor")
+        else:
+            row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
+            row["roughness"] = law.roughness / link.diameter
+            row["reynolds"] = link.diameter / (area * self.fluid.viscosity)
+
+    def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
+        """Mass flow [kg/s] at a Reynolds number of the full opening, Re = 4 M / (pi d mu)."""
+        area = link.flow_area()
+        if link.diameter is not None:
+            area = math.pi / 4.0 * link.diameter**2
+        elif link.area is not None:
+            area = link.area
+        diameter = math.sqrt(4.0 * area / math.pi)
+        viscosity = self.fluid.viscosity
+        if not viscosity:
+            if link.laminar_reynolds is not None:
+                fault(f"links.{name}.laminar_reynolds", "needs the fluid's viscosity; give fluid.viscosity")
+            viscosity = 1e-6 * self.rho  # bounds the slope at zero drop only: no more viscous than water
+        return reynolds * math.pi / 4.0 * diameter * viscosity

@@ -1,0 +1,185 @@
+"""A model and a state: what `solve` and every study hold in their hands. Knows indices and names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from fvsolve.case import Case
+
+
+@dataclass(frozen=True)
+class PipeMesh:
+    """Cells of one pipe, from its `from` end: x centres, edges [m] and elevation of centres [m]."""
+
+    name: str
+    from_: str
+    to: str
+    length: float
+    diameter: float
+    cells: int
+    wave_speed: float
+    x: np.ndarray
+    edges: np.ndarray
+    elevation: np.ndarray
+
+
+@dataclass
+class State:
+    """Time [s], the flat vector y, and the integrator's memory in one flat array (empty: a fresh start)."""
+
+    t: float
+    y: np.ndarray
+    memory: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A case made ready; frozen.
+
+    tables : the arrays that kernels read, in the order of `kernels.records.TABLES`
+    scale : float64[n]  what counts as a small deviation of each state is measured against
+    breaks : (time [s], whether a value jumps), rising, inside the run
+    """
+
+    case: Case
+    tables: tuple
+    state_names: list[str]
+    scale: np.ndarray
+    breaks: list[tuple[float, bool]]
+    step_max: float
+    pipes: list[PipeMesh]
+    node_names: list[str]
+    link_names: list[str]
+    valve_names: list[str]
+    column_names: list[str]
+    elevation: dict[str, float]
+    probes: list[Any]
+    warnings: list[str]
+    steady: dict[str, Any]  # what the start looks like, for `check`
+
+    @property
+    def y_size(self) -> int:
+        """Number of states."""
+        return len(self.state_names)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of all pipes."""
+        return sum(pipe.cells for pipe in self.pipes)
+
+    @property
+    def layout(self):
+        """Offsets of what the rhs writes beside dydt."""
+        from fvsolve.kernels.records import I_LAYOUT
+
+        return self.tables[I_LAYOUT][0]
+
+    def functions(self) -> tuple:
+        """(rhs, observe, record, events) for the density law of the case, compiled."""
+        from fvsolve.kernels.functions import functions
+
+        return functions(self.case.fluid.law)
+
+    def new_out(self) -> np.ndarray:
+        """An array for what the rhs writes beside dydt."""
+        return np.zeros(int(self.layout["size"]))
+
+    def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
+        """dy/dt = f(t, y) : float64[n]; schedules take their right-hand value."""
+        return self.evaluate(t, y)[0]
+
+    def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+        """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
+        from fvsolve.kernels.records import I_SETTINGS
+
+        self.tables[I_SETTINGS][0]["limit"] = limit
+        dydt, out = np.zeros(self.y_size), self.new_out()
+        self.functions()[0](float(t), np.ascontiguousarray(y, dtype=np.float64), dydt, out, self.tables)
+        return dydt, out
+
+    def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
+        """df/dy : float64[n, n] by central differences of the scaled states."""
+        n = self.y_size
+        found = np.empty((n, n))
+        for j in range(n):
+            step = 1e-6 * (self.scale[j] + abs(y[j]))
+            high, low = y.copy(), y.copy()
+            high[j] += step
+            low[j] -= step
+            found[:, j] = (self.rhs(t, high) - self.rhs(t, low)) / (high[j] - low[j])
+        return found
+
+    def observe(self, t: float, y: np.ndarray, limit: float = np.inf) -> np.ndarray:
+        """Values of all probes : float64[probes] [SI]."""
+        out = self.evaluate(t, y, limit)[1]
+        values = np.zeros(len(self.probes))
+        self.functions()[1](float(t), y, out, self.tables, values)
+        return values
+
+    # what the numbers mean ----------------------------------------------------------------------------------
+
+    def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
+        """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
+        from fvsolve.kernels.records import I_PIPES, I_PROFILE
+
+        row = self.tables[I_PIPES][k]
+        return self.tables[I_PROFILE][row["cell"] + np.arange(self.pipes[k].cells)] + waves / row["admittance"]
+
+    def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
+        """Head [m] of the case's fluid above datum, measured from ambient."""
+        weight = self.case.properties.density * self.case.gravity
+        return (pressure - self.case.ambient_pressure) / weight + elevation
+
+    def frame(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
+        """Fields of all pipes and pressures of all nodes at a state, SI."""
+        from fvsolve.kernels.records import I_ENVELOPE, I_NODES, I_PIPES
+
+        found, rho = {}, self.case.properties.density
+        for k, pipe in enumerate(self.pipes):
+            row = self.tables[I_PIPES][k]
+            n, o = pipe.cells, row["y"]
+            cells = row["cell"] + np.arange(n)
+            r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
+            pressure, flow = self.cell_pressure(k, r + l), (row["flow"] + (r - l)) / rho
+            low, high = (self.cell_pressure(k, self.tables[I_ENVELOPE][i, cells]) for i in (0, 2))
+            found[pipe.name] = {
+                "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / row["area"],
+                "flow": flow, "least_pressure": np.minimum(low, pressure),
+                "greatest_pressure": np.maximum(high, pressure),
+            }  # fmt: skip
+        nodes = self.tables[I_NODES]
+        at = int(self.layout["pressure"])
+        found["nodes"] = {}
+        for i, name in enumerate(self.node_names):
+            pressure = float(nodes[i]["pressure"] + out[at + i])
+            found["nodes"][name] = {"pressure": pressure, "head": float(self.head(pressure, self.elevation[name]))}
+        return found
+
+    def contents(self, y: np.ndarray) -> tuple[float, float]:
+        """Mass stored in the profile and by how much the state deviates from it [kg]."""
+        from fvsolve.kernels.records import I_NODES, I_PIPES, I_PROFILE
+
+        fluid, initial, change = self.case.properties, 0.0, 0.0
+        for k, pipe in enumerate(self.pipes):
+            row = self.tables[I_PIPES][k]
+            p = self.tables[I_PROFILE][row["cell"] + np.arange(pipe.cells)]
+            stiffness = fluid.density * row["speed"] ** 2
+            initial += float(np.sum(fluid.density * row["area"] * row["dx"] * (1 + (p - fluid.pressure) / stiffness)))
+            o, n = row["y"], pipe.cells
+            change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
+        for row in self.tables[I_NODES]:
+            if row["y"] >= 0:
+                initial += float(row["mass"])
+                change += float(y[row["y"]])
+        return initial, change
+
+    @property
+    def checks(self) -> dict[str, Any]:
+        """What was understood, for `fvsolve check`."""
+        from fvsolve.model.checks import checks
+
+        return checks(self)

@@ -1,0 +1,68 @@
+"""Probes lowered to records: what to read and how to weigh it. Knows units of nothing but SI."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.schemes import ORDER
+
+
+def lower_probes(scene) -> np.ndarray:
+    """The probe table of a scene; pressures of the profile are filled in later by `probe_offsets`."""
+    table = np.zeros(len(scene.case.probes), rec.PROBE)
+    for row, probe in zip(table, scene.case.probes, strict=True):
+        if probe.part == "nodes":
+            row["index"] = scene.node_index[probe.name]
+            row["kind"] = rec.LEVEL if probe.quantity == "level" else rec.PRESSURE
+        elif probe.name in scene.valve_names:
+            row["index"], row["kind"] = scene.valve_names.index(probe.name), rec.VALVE_FLOW
+        elif probe.name in scene.column_names:
+            row["index"], row["kind"] = scene.column_names.index(probe.name), rec.COLUMN_FLOW
+        else:
+            row["index"] = scene.pipe_names.index(probe.name)
+            row["kind"] = rec.PIPE_FLOW if probe.quantity in ("flow", "velocity") else rec.PIPE_PRESSURE
+            place(scene, row, probe.fraction)
+    return table
+
+
+def place(scene, row, fraction: float) -> None:
+    """Where along its pipe a probe reads: an end, or cells with the weights of the scheme's polynomial."""
+    if fraction in (0.0, 1.0):
+        row["side"] = -1 if fraction == 0.0 else 1
+        return
+    n = int(scene.pipe_table[row["index"]]["cells"])
+    degree = min(max(ORDER[scene.case.numerics.scheme] - 1, 1), n - 1)
+    x = fraction * n
+    first = int(np.clip(round(x - 0.5 * (degree + 1)), 0, n - degree - 1))
+    row["cell"], row["count"], row["weights"] = first, degree + 1, len(scene.floats)
+    scene.floats += list(reading_weights(x - first, degree))
+
+
+def reading_weights(x: float, degree: int) -> np.ndarray:
+    """Weights w with sum w_k (average over [k, k+1]) = value at x, exact for polynomials up to `degree`."""
+    powers = np.arange(degree + 1)
+    cells = np.arange(degree + 1)[:, None]
+    averages = ((cells + 1.0) ** (powers + 1) - cells ** (powers + 1.0)) / (powers + 1)
+    return np.linalg.solve(averages.T, float(x) ** powers)
+
+
+def probe_offsets(scene) -> None:
+    """Scale and offset of every probe, once the profile is known."""
+    weight = scene.fluid.density * scene.case.gravity
+    for row, probe in zip(scene.probe_table, scene.case.probes, strict=True):
+        row["scale"], row["offset"] = 1.0, 0.0
+        if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW):
+            row["scale"] = 1.0 / scene.fluid.density
+            if probe.quantity == "velocity":
+                row["scale"] /= scene.pipe_table[row["index"]]["area"]
+        elif row["kind"] != rec.LEVEL:
+            if row["kind"] == rec.PRESSURE:
+                base, z = (scene.node_table[row["index"]][key] for key in ("pressure", "elevation"))
+            else:
+                base, z = scene.profile_at(row["index"], probe.fraction)
+                row["scale"] = 1.0 / scene.pipe_table[row["index"]]["admittance"]
+            row["offset"] = base - (0.0 if probe.quantity == "pressure" else scene.case.ambient_pressure)
+            if probe.quantity == "head":
+                row["scale"] /= weight
+                row["offset"] = row["offset"] / weight + z

@@ -1,0 +1,99 @@
+"""Schedules lowered to pieces, and the times at which no step may straddle them. Knows no parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fvsolve.kernels.records import PIECE_COLUMNS, SCHEDULE
+
+LONG = 32  # more entries than this are samples of something smooth
+MARKED = 0.2  # change of slope, relative to the greatest, that forces a step in samples
+
+
+@dataclass
+class Schedules:
+    """The table of all schedules of a model, filled one by one."""
+
+    records: list[tuple[int, int]] = field(default_factory=list)
+    rows: list[list[float]] = field(default_factory=list)
+    breaks: dict[float, bool] = field(default_factory=dict)  # time -> whether a value jumps there
+    spacing: float = np.inf  # greatest step that does not leap over samples [s]
+
+    def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
+        """Index of a schedule whose value is scale * value + offset."""
+        pieces = lower(schedule)
+        pieces[:, 3:] = scaled(pieces, scale, offset)
+        self.records.append((len(self.rows), len(pieces)))
+        self.rows += pieces.tolist()
+        for time, jump in break_times(schedule):
+            self.breaks[time] = self.breaks.get(time, False) or jump
+        if len(schedule.time) > LONG:
+            self.spacing = min(self.spacing, 4.0 * float(np.median(np.diff(schedule.time))))
+        return len(self.records) - 1
+
+    def tables(self) -> tuple[np.ndarray, np.ndarray]:
+        """The two arrays that kernels read."""
+        rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
+        return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
+
+
+def lower(schedule) -> np.ndarray:
+    """float64[pieces, 7]: start, kind, origin, then a, b, c, d of a polynomial or v0, v1, duration, exponent."""
+    t, v = schedule.time, schedule.value
+    hold = [[-np.inf, 0, 0.0, v[0], 0, 0, 0]]
+    last = [[t[-1], 0, t[-1], v[-1], 0, 0, 0]]
+    if schedule.kind == "constant":
+        return np.array(hold)
+    if schedule.kind == "ramp":
+        span = t[1] - t[0]
+        return np.array([*hold, [t[0], 1, t[0], v[0], v[1], span, schedule.exponent], *last])
+    if schedule.kind == "step":
+        return np.array([*hold, *[[t[k], 0, t[k], v[k], 0, 0, 0] for k in range(1, len(t))]])
+    if schedule.kind == "linear":
+        slope = np.diff(v) / np.diff(t)
+        inner = [[t[k], 0, t[k], v[k], slope[k], 0, 0] for k in range(len(t) - 1)]
+        return np.array([*hold, *inner, *last])
+    from scipy.interpolate import PchipInterpolator
+
+    c = PchipInterpolator(t, v).c
+    inner = [[t[k], 0, t[k], c[3, k], c[2, k], c[1, k], c[0, k]] for k in range(len(t) - 1)]
+    return np.array([*hold, *inner, *last])
+
+
+def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
+    """Coefficients of scale * value + offset."""
+    values = pieces[:, 3:] * scale
+    power = pieces[:, 1] == 1
+    values[:, 0] += offset
+    values[power, 1] += offset
+    values[power, 2:] = pieces[power, 5:]
+    return values
+
+
+def break_times(schedule) -> list[tuple[float, bool]]:
+    """(time, whether the value jumps) of all kinks and jumps that steps must end at."""
+    t, v = schedule.time, schedule.value
+    if schedule.kind == "constant":
+        return []
+    if schedule.kind == "ramp":
+        return [(float(t[0]), False), (float(t[1]), False)]
+    if schedule.kind == "step":
+        return [(float(t[k]), True) for k in range(1, len(t)) if v[k] != v[k - 1]]
+    slope = np.diff(v) / np.diff(t)
+    if schedule.kind == "smooth":
+        pieces = lower(schedule)[1:-1]
+        ends = pieces[0, 4], piece_slope(pieces[-1], t[-1])
+        change = np.zeros(len(t))
+        change[0], change[-1] = ends
+    else:
+        change = np.diff(np.concatenate(([0.0], slope, [0.0])))
+    least = (MARKED if len(t) > LONG else 1e-9) * np.max(np.abs(slope), initial=0.0)
+    return [(float(time), False) for time, step in zip(t, change, strict=True) if abs(step) > least]
+
+
+def piece_slope(piece: np.ndarray, t: float) -> float:
+    """d/dt of a polynomial piece."""
+    s = t - piece[2]
+    return piece[4] + s * (2.0 * piece[5] + s * 3.0 * piece[6])

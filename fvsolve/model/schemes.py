@@ -1,0 +1,31 @@
+"""Schemes as data: the family that computes them and, for linear ones, their weights. Knows no fields."""
+
+from fvsolve.kernels import records as rec
+
+# Value at the face after cell u from cells u-2 .. u+2, and the degree of polynomial it is exact for.
+LINEAR = {
+    "linear-upwind": ((0, -1 / 2, 3 / 2, 0, 0), 1),
+    "fromm": ((0, -1 / 4, 1, 1 / 4, 0), 1),
+    "central": ((0, 0, 1 / 2, 1 / 2, 0), 1),
+    "upwind3": ((0, -1 / 6, 5 / 6, 1 / 3, 0), 2),
+    "upwind5": ((2 / 60, -13 / 60, 47 / 60, 27 / 60, -3 / 60), 4),
+}
+FAMILIES = {"upwind": (rec.UPWIND, 0), "muscl": (rec.MUSCL, 1), "weno5": (rec.WENO5, 4)}
+LIMITERS = {
+    "minmod": rec.MINMOD,
+    "van-leer": rec.VAN_LEER,
+    "monotonized-central": rec.MONOTONIZED_CENTRAL,
+}
+ORDER = {name: degree + 1 for name, (_, degree) in (LINEAR | FAMILIES).items()}
+
+
+def scheme_settings(settings, scheme: str, limiter: str) -> None:
+    """Write family, weights, degree and limiter into the settings record."""
+    settings["limiter"] = LIMITERS[limiter]
+    if scheme in LINEAR:
+        weights, settings["degree"] = LINEAR[scheme]
+        settings["scheme"] = rec.LINEAR
+        for k, weight in enumerate(weights):
+            settings[f"w{k}"] = weight
+    else:
+        settings["scheme"], settings["degree"] = FAMILIES[scheme]

@@ -1,0 +1,244 @@
+"""The profile a run starts from and whose deviation is the state: pressures, flows, what will move."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
+from fvsolve.model.probes import probe_offsets
+from fvsolve.steady import Edge, solve_steady
+
+PRESSURE_SCALE = 1e5
+SNAP = 1e-12  # flows below this share of the scene's are zero
+
+
+def start_profile(scene) -> dict[str, Any]:
+    """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
+    start = Start(scene)
+    start.solve()
+    start.freeze_factors()
+    start.fill_nodes()
+    start.fill_pipes()
+    start.fill_columns()
+    start.fill_valves()
+    scene.profile_at = start.profile_at
+    probe_offsets(scene)
+    return start.report()
+
+
+class Start:
+    """The steady problem of one scene under the linear law and its answer."""
+
+    def __init__(self, scene) -> None:
+        self.scene, self.case = scene, scene.case
+        self.nodes, self.pipes = scene.node_table, scene.pipe_table
+        self.columns, self.valves = scene.column_table, scene.valve_table
+        self.rest = self.case.numerics.initial == "rest"
+        self.t = self.case.numerics.start
+        scene.tables[rec.I_SETTINGS][0]["limit"] = self.t
+        self.weight = scene.fluid.density * self.case.gravity
+        sizes = [1e-9, *(scene.fluid.density * self.pipes["area"]), *(scene.fluid.density * self.columns["area"])]
+        sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
+        self.flow_scale = max(sizes)
+
+    def solve(self) -> None:
+        held, self.demand = self.givens()
+        pipes = [self.wall_edge(name, row, row["dx"] * row["cells"]) for name, row in
+                 zip(self.scene.pipe_names, self.pipes, strict=True)]  # fmt: skip
+        columns = [self.wall_edge(name, row, row["length"]) for name, row in
+                   zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
+        valves = [self.valve_edge(k) for k in range(len(self.valves))]
+        self.edges = [*pipes, *columns, *valves]
+        self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, self.flow_scale))
+        self.report_faults(held)
+        flow = self.answer.flow
+        flow[np.abs(flow) <= SNAP * self.flow_scale] = 0.0
+        self.tolerance = SNAP * (self.flow_scale + np.max(np.abs(flow), initial=0.0))
+        self.inflow = -self.demand.copy()
+        for edge, value in zip(self.edges, flow, strict=True):
+            self.inflow[edge.i] -= value
+            self.inflow[edge.j] += value
+        self.inflow[np.abs(self.inflow) <= 10.0 * self.tolerance] = 0.0
+        n, m = len(pipes), len(pipes) + len(columns)
+        self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m:]
+
+    def givens(self) -> tuple[np.ndarray, np.ndarray]:
+        """Potentials that are held (nan: to be found) and demands of junctions [kg/s]."""
+        held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
+        for i, (node, row) in enumerate(zip(self.case.nodes.values(), self.nodes, strict=True)):
+            lift = self.weight * row["elevation"]
+            if row["kind"] == rec.FIXED:
+                held[i] = schedule_value(self.scene.tables, int(row["schedule"]), self.t) + lift
+            elif row["kind"] == rec.TANK:
+                held[i] = self.case.ambient_pressure + self.weight * node.level + lift
+            elif row["kind"] == rec.CHAMBER and node.initial_pressure is not None:
+                held[i] = node.initial_pressure + lift
+            elif row["kind"] == rec.JUNCTION:
+                demand[i] = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
+        return held, np.zeros_like(demand) if self.rest else demand
+
+    def wall_edge(self, name: str, row, length: float) -> Edge:
+        """A pipe or column: drop = (L / A) drag(M)."""
+        law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
+        per = length / row["area"]
+        least = drag_slope(*law, 1e-6 * self.flow_scale)
+        link = self.case.links[name]
+
+        def drop(flow):
+            return per * drag(*law, flow)
+
+        def newton(flow, present):
+            return per * max(drag_slope(*law, flow), least), 1.0, present - drop(flow)
+
+        i, j = int(row["from_node"]), int(row["to_node"])
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        if link.initial_flow is not None:
+            return Edge(i, j, None, link.initial_flow * self.scene.fluid.density, drop=drop)
+        return Edge(i, j, newton, self.scene.fluid.density * row["area"], drop=drop)
+
+    def valve_edge(self, k: int) -> Edge:
+        """A valve: M |M| = G dP, with the chord of the root as slope."""
+        row = self.valves[k]
+        g = valve_conductance(self.scene.tables, k, self.t)
+        transition = float(row["transition"])
+        row["open"] = g
+        i, j = int(row["from_node"]), int(row["to_node"])
+        if g <= 0.0:
+            return Edge(i, j, None, 0.0, shut=True)
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+
+        def newton(flow, present):
+            target = flow_at_drop(g, transition, present)
+            if transition > 0.0 and abs(target) < transition:
+                slope = flow_slope(g, transition, present)
+                return 1.0 / slope, 1.0, (target - flow) / slope
+            chord = max(abs(target) + abs(flow), 1e-6 * math.sqrt(g))
+            return chord / g, 1.0, present - abs(flow) * flow / g
+
+        return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
+
+    def report_faults(self, held) -> None:
+        names = list(self.case.nodes)
+        for i in self.answer.no_solution:
+            self.scene.fault(f"nodes.{names[i]}", f"no steady state: {self.demand[i] / self.scene.fluid.density:.4g} "
+                             "m3/s are drawn here but every way to it is shut; open a valve, or use initial = \"rest\"")  # fmt: skip
+        for name, row in zip(self.scene.pipe_names, self.pipes, strict=True):
+            i, j = int(row["from_node"]), int(row["to_node"])
+            free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
+            if free and not self.rest and abs(held[i] - held[j]) > 1e-6 * PRESSURE_SCALE:
+                heads = [(held[k] - self.case.ambient_pressure) / self.weight for k in (i, j)]
+                self.scene.fault(f"links.{name}", f"no steady state: it has no friction, and heads of {heads[0]:.6g} m and "
+                                 f"{heads[1]:.6g} m at its ends; give it friction or initial_flow, or use initial = \"rest\"")  # fmt: skip
+        if not self.scene.faults and not self.answer.converged:
+            self.scene.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
+                             'and frictionless ways between unequal heads, or use "rest"')  # fmt: skip
+        if self.answer.split:
+            self.scene.warnings.append("loops without friction: flow in them is the least-norm split")
+        self.scene.check()
+
+    def freeze_factors(self) -> None:
+        """`steady` friction by roughness: the factor of the starting flow, at rest the fully rough one."""
+        rows = [*zip(self.scene.pipe_names, self.pipes, self.pipe_flow, strict=True),
+                *zip(self.scene.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
+        for name, row, flow in rows:
+            if row["friction"] != rec.FRICTION_ROUGH or self.case.links[name].friction.model != "steady":
+                continue
+            reynolds = row["reynolds"] * abs(flow)
+            if reynolds > 0.0:
+                factor = factor_times_reynolds(reynolds, row["roughness"]) / reynolds
+            else:
+                e = row["roughness"]
+                factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
+                self.scene.warnings.append(f"{name}: no flow at the start; its steady factor is the fully rough one, "
+                                           f"{factor:.4g}")  # fmt: skip
+            row["loss"] += row["rough"] * factor
+            row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
+
+    def fill_nodes(self) -> None:
+        self.nodes["pressure"] = self.answer.potential - self.weight * self.nodes["elevation"]
+        self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
+        fluid = self.scene.fluid
+        for row in self.nodes[self.nodes["kind"] == rec.CHAMBER]:
+            pass
+        chambers = self.nodes["kind"] == rec.CHAMBER
+        self.nodes["mass"][chambers] = fluid.density * self.nodes["volume"][chambers] * (
+            1.0 + (self.nodes["pressure"][chambers] - fluid.pressure) / fluid.bulk_modulus)  # fmt: skip
+
+    def pipe_drop(self, row) -> float:
+        law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
+        return drag(*law)
+
+    def fill_pipes(self) -> None:
+        profile = self.scene.tables[rec.I_PROFILE]
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
+            row["flow"] = self.pipe_flow[k]
+            row["drag"] = self.pipe_drop(row)
+            slope = row["drag"] / row["area"]
+            p = self.answer.potential[[row["from_node"], row["to_node"]]]
+            offset = p[1] - (p[0] - slope * mesh.length)
+            row["to_offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
+            cells = slice(int(row["cell"]), int(row["cell"]) + mesh.cells)
+            profile[cells] = p[0] - slope * mesh.x - self.weight * mesh.elevation
+
+    def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
+        """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""
+        row, mesh = self.pipes[k], self.scene.meshes[k]
+        z = self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
+        potential = self.answer.potential[row["from_node"]] - row["drag"] / row["area"] * fraction * mesh.length
+        return potential - self.weight * z, z
+
+    def fill_columns(self) -> None:
+        for row, flow in zip(self.columns, self.column_flow, strict=True):
+            row["flow"] = flow
+            row["drag"] = self.pipe_drop(row)
+            p = self.answer.potential[[row["from_node"], row["to_node"]]]
+            offset = (p[0] - p[1]) - row["drag"] * row["length"] / row["area"]
+            row["offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
+
+    def fill_valves(self) -> None:
+        for row, flow in zip(self.valves, self.valve_flow, strict=True):
+            row["flow"] = flow
+            row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            law = flow_at_drop(row["open"], row["transition"], row["drop"])
+            if abs(law - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
+                row["open"] = 0.0
+            elif row["transition"] == 0.0 and row["open"] > 0.0:
+                row["drop"] = abs(flow) * flow / row["open"]
+
+    def report(self) -> dict[str, Any]:
+        moving = []
+        fluid = self.scene.fluid
+        for name, row in zip(self.case.nodes, self.nodes, strict=True):
+            if row["inflow"] == 0.0 or row["kind"] == rec.FIXED:
+                continue
+            flow = row["inflow"] / fluid.density
+            if row["kind"] == rec.TANK:
+                what = "rises" if flow > 0 else "falls"
+                moving.append(f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s")
+            elif row["kind"] == rec.CHAMBER:
+                moving.append(f"chamber {name}: pressure changes by {row['stiffness'] * row['inflow']:.4g} Pa/s")
+            else:
+                moving.append(f"junction {name}: {flow:.4g} m3/s more flow in than out")
+        for name, row in zip(self.scene.pipe_names, self.pipes, strict=True):
+            if row["to_offset"] != 0.0:
+                moving.append(f"pipe {name}: {row['to_offset']:.4g} Pa too little at its end for its flow")
+        for name, row in zip(self.scene.column_names, self.columns, strict=True):
+            if row["offset"] != 0.0:
+                moving.append(f"rigid column {name}: {row['offset']:.4g} Pa drive it unbalanced")
+        for name, row in zip(self.scene.valve_names, self.valves, strict=True):
+            if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
+                g = valve_conductance(self.scene.tables, self.scene.valve_names.index(name), self.t)
+                if g > 0.0:
+                    moving.append(f"valve {name}: open with {row['drop']:.4g} Pa across it and no flow")
+        if self.case.numerics.initial == "equilibrium":
+            for text in moving:
+                self.scene.fault("numerics.initial", f'"equilibrium" wants nothing to move, but {text}')
+        return {"moving": moving}

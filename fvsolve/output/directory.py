@@ -1,0 +1,157 @@
+"""The sink that writes a run directory. Knows when which file is written; knows no physics."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from fvsolve.errors import RunError
+from fvsolve.output.column import probe_columns, time_column
+from fvsolve.output.envelope import read_envelope, write_envelope
+from fvsolve.output.fields import FieldSeries
+from fvsolve.output.history import HistoryFile, read_table
+from fvsolve.output.restart import Restart, identity, read_restart, write_restart
+from fvsolve.output.summary import read_summary
+
+OWN = ("restart.npz", "history.csv", "envelope.csv", "fields.pvd", "case.toml")
+ENDED = "summary.json"
+PICTURES = ("history.png", "envelope.png")
+
+
+class RunDirectory:
+    """Sink of a run: history.csv and fields are streamed, restart.npz is replaced at every checkpoint.
+
+    While summary.json is absent the run is unfinished. RunError where the directory holds something that
+    must not be lost, or a restart that does not fit.
+    """
+
+    def __init__(self, folder: Path, model, force: bool = False, resume: bool = False):
+        self.folder = Path(folder)
+        self.model = model
+        _refuse_names(model.case)
+        self.who = identity(model.case)
+        self.restart = self._checkpoint() if resume else None
+        if self.restart is None:
+            _refuse(self.folder, force, resume)
+        self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
+        drawn = model.case.output.fields > 0 and len(model.pipes) > 0
+        self.fields = FieldSeries(self.folder, model) if drawn else None
+
+    @property
+    def ended(self) -> bool:
+        """True where there is nothing to go on with: the run in the directory came to its end."""
+        there = self.restart is not None and (self.folder / ENDED).is_file()
+        return there and self.restart.t >= self.model.case.numerics.end
+
+    def begin(self, model, state, resume=None) -> None:
+        """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
+        (self.folder / ENDED).unlink(missing_ok=True)
+        if self.restart is None:
+            self._start()
+        else:
+            self.history.continue_from(self.restart.rows, self.restart.history_bytes)
+            if self.fields:
+                self.fields.continue_from(self.restart.frames)
+        self._write_case()
+
+    def rows(self, t, values) -> None:
+        """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
+        self.history.write(t, values)
+
+    def field(self, t: float, frame: dict) -> None:
+        """Write a frame of all pipes at time `t` [s]."""
+        if self.fields:
+            self.fields.write(t, frame)
+
+    def checkpoint(self, state, extra: dict) -> None:
+        """Replace restart.npz by one that knows this state and all rows and frames so far."""
+        size = self.history.flush()
+        frames = self.fields.frames if self.fields else 0
+        restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
+        write_restart(self.folder / "restart.npz", restart, self.who)
+
+    def end(self, summary) -> None:
+        """Close the history and write the envelope; summary.json is the caller's last word."""
+        self.history.close()
+        if summary.envelope:
+            write_envelope(self.folder / "envelope.csv", summary.envelope, self.model.case)
+
+    def close(self) -> None:
+        """Let go of open files, also when a run broke off."""
+        self.history.close()
+
+    def table(self):
+        """`float64[rows, 1 + probes]`: time and probes as history.csv has them."""
+        return read_table(self.folder / "history.csv")
+
+    def envelope(self) -> dict:
+        """Pipe -> quantity -> float64[cells] as envelope.csv has them, empty where there is none."""
+        return _envelope(self.folder)
+
+    def files(self) -> list[str]:
+        """Names of the files that a reader will look for, as far as they are there."""
+        names = [*OWN, *PICTURES, *self.model.case.copies]
+        there = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
+        return sorted([*there, ENDED])
+
+    def _checkpoint(self) -> Restart | None:
+        path = self.folder / "restart.npz"
+        return read_restart(path, self.who) if path.is_file() else None
+
+    def _start(self) -> None:
+        clear(self.folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.history.start()
+        if self.fields:
+            self.fields.start()
+
+    def _write_case(self) -> None:
+        case = self.model.case
+        (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
+        for name, path in case.copies.items():
+            copy = self.folder / name
+            if copy.resolve() != Path(path).resolve():
+                shutil.copyfile(path, copy)
+
+
+def read_directory(folder: Path) -> tuple:
+    """(summary, table(), envelope(), folder) of a run that ended; RunError where there is none."""
+    return (
+        read_summary(folder / ENDED),
+        lambda: read_table(folder / "history.csv"),
+        lambda: _envelope(folder),
+        folder,
+    )
+
+
+def _envelope(folder: Path) -> dict:
+    path = folder / "envelope.csv"
+    return read_envelope(path) if path.is_file() else {}
+
+
+def clear(folder: Path) -> None:
+    """Delete what an earlier run left in `folder`, and nothing else."""
+    for name in (ENDED, *OWN, *PICTURES):
+        (folder / name).unlink(missing_ok=True)
+    for path in (folder / "fields").glob("*.vtu"):
+        path.unlink()
+
+
+def _refuse_names(case) -> None:
+    for name, path in case.copies.items():
+        if name in (ENDED, *OWN, *PICTURES):
+            raise RunError(f"{path} has the name of a file that every run writes; give it another name")
+
+
+def _refuse(folder: Path, force: bool, resume: bool) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise RunError(f"{folder} is a file; state another place with --out DIR")
+    if force or not folder.is_dir():
+        return
+    if (folder / ENDED).exists():
+        raise RunError(f"{folder} holds a run; replace it with --force, or keep it and state --out DIR")
+    if (folder / "restart.npz").exists():
+        raise RunError(
+            f"{folder} holds an unfinished run; go on with --resume, start again with --force, "
+            "or state another place with --out DIR"
+        )

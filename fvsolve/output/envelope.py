@@ -1,0 +1,54 @@
+"""envelope.csv: what each cell of each pipe has met, least and greatest. Knows columns; knows no solver."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.output.column import Column, column, split_header
+
+QUANTITIES = {
+    "distance": "length",
+    "elevation": "head",
+    "initial_head": "head",
+    "least_pressure": "pressure",
+    "t_least": "time",
+    "greatest_pressure": "pressure",
+    "t_greatest": "time",
+    "least_head": "head",
+    "greatest_head": "head",
+}
+
+
+def envelope_columns(case) -> list[Column]:
+    """The columns of envelope.csv after `pipe`, in the units that the case asks for."""
+    return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
+
+
+def write_envelope(path: Path, envelope: dict, case) -> None:
+    """One row per cell: pipe, distance from `from`, elevation, extremes and their times.
+
+    `envelope` maps a pipe to `float64[cells]` arrays in SI named as in `QUANTITIES`.
+    """
+    columns = [
+        one for one in envelope_columns(case) if all(one.name in arrays for arrays in envelope.values())
+    ]
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["pipe", *(one.header for one in columns)])
+        for pipe, arrays in envelope.items():
+            values = [one.from_si(np.asarray(arrays[one.name], float)).tolist() for one in columns]
+            table.writerows([pipe, *map(repr, row)] for row in zip(*values, strict=True))
+
+
+def read_envelope(path: Path) -> dict:
+    """Pipe -> quantity -> float64[cells] as the file has them."""
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = csv.reader(file)
+        names = [split_header(header)[0] for header in next(rows)]
+        pipes: dict[str, list] = {}
+        for row in rows:
+            pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
+    return {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}

@@ -1,0 +1,99 @@
+"""fields.pvd and its .vtu frames: what every cell is doing at a time. Knows VTK files; knows no physics.
+
+Pipes are chains of line cells along the layout, elevation upwards; cell data are in SI, pressures absolute.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import RunError
+from fvsolve.output import layout
+
+QUANTITIES = ("pressure", "head", "velocity", "flow", "least_pressure", "greatest_pressure")
+
+HEAD = """<?xml version="1.0"?>
+<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
+<Collection>
+"""
+TAIL = "</Collection>\n</VTKFile>\n"
+
+
+class FieldSeries:
+    """Writes one .vtu per frame; the .pvd beside them is whole after each."""
+
+    def __init__(self, folder: Path, model):
+        self.folder = folder
+        self.frames = 0
+        self.points, self.lines = geometry(model)
+        self.pipes = [pipe.name for pipe in model.pipes]
+        cells = [pipe.cells for pipe in model.pipes]
+        self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
+
+    def start(self) -> None:
+        """Begin an empty series."""
+        (self.folder / "fields").mkdir(exist_ok=True)
+        (self.folder / "fields.pvd").write_text(HEAD + TAIL)
+
+    def continue_from(self, frames: int) -> None:
+        """Keep the first `frames` of a series, drop what came after its checkpoint."""
+        lines = (self.folder / "fields.pvd").read_text().splitlines(keepends=True)
+        kept = [line for line in lines if line.startswith("<DataSet")][:frames]
+        if len(kept) < frames:
+            raise RunError(f"{self.folder / 'fields.pvd'} lacks frames; start the run again with --force")
+        for path in (self.folder / "fields").glob("*.vtu"):
+            if int(path.stem) >= frames:
+                path.unlink()
+        (self.folder / "fields.pvd").write_text(HEAD + "".join(kept) + TAIL)
+        self.frames = frames
+
+    def write(self, t: float, frame: dict) -> None:
+        """Add the frame at time `t` [s]: pipe -> quantity -> float64[cells], SI."""
+        import meshio
+
+        data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in QUANTITIES}
+        data["pipe"] = [self.pipe]
+        name = f"fields/{self.frames:06d}.vtu"
+        meshio.Mesh(self.points, [("line", self.lines)], cell_data=data).write(self.folder / name)
+        self._list(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
+        self.frames += 1
+
+    def _list(self, line: str) -> None:
+        # One write over the closing tags: killed before or after it, the file is whole.
+        with open(self.folder / "fields.pvd", "r+b", buffering=0) as file:
+            file.seek(-len(TAIL), 2)
+            file.write((line + TAIL).encode())
+
+
+def geometry(model) -> tuple[np.ndarray, np.ndarray]:
+    """Points float64[n, 3] [m] and lines int[cells, 2]; pipes meet in the point of their node."""
+    lengths = {pipe.name: pipe.length for pipe in model.pipes}
+    places = layout.positions(model.case, lengths)
+    bends = layout.bends(model.case.links)
+    ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
+    index = {name: i for i, name in enumerate(ends)}
+    points = [np.array([[*places[layout.place(name)], model.elevation[name]] for name in ends])]
+    lines, count = [], len(ends)
+    for pipe in model.pipes:
+        fractions = np.asarray(pipe.edges[1:-1]) / pipe.length
+        start, end = (places[layout.place(name)] for name in (pipe.from_, pipe.to))
+        low, high = model.elevation[pipe.from_], model.elevation[pipe.to]
+        inner = layout.path(start, end, fractions, bends[pipe.name])
+        points.append(np.column_stack([inner, low + fractions * (high - low)]))
+        chain = [index[pipe.from_], *range(count, count + pipe.cells - 1), index[pipe.to]]
+        lines.append(np.column_stack([chain[:-1], chain[1:]]))
+        count += pipe.cells - 1
+    return np.concatenate(points), np.concatenate(lines)
+
+
+def read_series(path: Path) -> list[tuple[float, Path]]:
+    """(time [s], file) of every frame of a .pvd."""
+    from xml.etree import ElementTree
+
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        raise RunError(f"{path} cannot be read: {error}") from None
+    return [(float(one.get("timestep")), path.parent / one.get("file")) for one in root.iter("DataSet")]

@@ -1,0 +1,85 @@
+"""history.csv: the probes over time, written row by row. Knows columns and bytes; keeps nothing in memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import RunError
+from fvsolve.output.column import Column, converted, split_header
+
+
+class HistoryFile:
+    """Appends rows to a CSV file whose numbers read back to the last bit."""
+
+    def __init__(self, path: Path, time: Column, columns: list[Column]):
+        self.path = path
+        self.time = time
+        self.columns = columns
+        self.rows = 0
+        self._file = None
+
+    def start(self) -> None:
+        """Begin an empty file with its header."""
+        self._file = open(self.path, "wb")
+        headers = ",".join(_quoted(one.header) for one in [self.time, *self.columns])
+        self._file.write(f"{headers}\n".encode())
+
+    def continue_from(self, rows: int, size: int) -> None:
+        """Open the file that a checkpoint left, cut to `size` bytes; RunError where it is shorter."""
+        if not self.path.is_file() or self.path.stat().st_size < size:
+            raise RunError(
+                f"{self.path} is shorter than its checkpoint says; start the run again with --force"
+            )
+        self._file = open(self.path, "r+b")
+        self._file.truncate(size)
+        self._file.seek(size)
+        self.rows = rows
+
+    def write(self, t: np.ndarray, values: np.ndarray) -> None:
+        """Append rows; `t : float64[k]` [s], `values : float64[k, n]` in SI."""
+        times = self.time.from_si(t).tolist()
+        table = converted(self.columns, values).tolist()
+        lines = [",".join(map(repr, [time, *row])) for time, row in zip(times, table, strict=True)]
+        if lines:
+            self._file.write(("\n".join(lines) + "\n").encode())
+            self.rows += len(lines)
+
+    def flush(self) -> int:
+        """Hand all rows to the operating system; the size of the file [bytes]."""
+        self._file.flush()
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Close the file; closing twice does no harm."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+def read_headers(path: Path) -> list[tuple[str, str]]:
+    """(name, unit) of every column of a table, `t` first."""
+    import csv
+
+    try:
+        with open(path, encoding="utf-8", newline="") as file:
+            return [split_header(header) for header in next(csv.reader(file), [])]
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror}; is this a run directory?") from None
+
+
+def read_table(path: Path) -> np.ndarray:
+    """`float64[k, columns]`: all rows of a table without its header."""
+    names = len(read_headers(path))
+    with open(path, encoding="utf-8") as file:
+        file.readline()
+        try:
+            table = np.loadtxt(file, delimiter=",", ndmin=2)
+        except ValueError as error:
+            raise RunError(f"{path} cannot be read: {error}") from None
+    return table if table.size else np.empty((0, names))
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if any(sign in text for sign in ',"\n') else text

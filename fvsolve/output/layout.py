@@ -1,0 +1,176 @@
+"""Where a network is drawn: plan positions of nodes, paths of links. Knows lengths; knows no physics.
+
+Stated positions are used where every node has one. Otherwise nodes are laid out so that their distances
+in the plan come near the lengths along the network (classical scaling, then stress majorization; Gansner,
+Koren and North 2004). The same network is always laid out alike.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+
+ROUNDS = 200  # of majorization
+DENSE = 400  # nodes up to which all pairs are laid out at once
+SHORT = 0.02  # drawn length of links without one, as part of the longest pipe
+BOW = 0.15  # how far parallel links bend aside, as part of their length
+
+
+def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
+    """Plan position float64[2] [m] of every node; `lengths` are those of the links that have one [m]."""
+    stated = {name: node.position for name, node in case.nodes.items() if node.position is not None}
+    if len(stated) == len(case.nodes):
+        return {name: np.array(place, float) for name, place in stated.items()}
+    names = list(case.nodes)
+    index = {name: i for i, name in enumerate(names)}
+    short = SHORT * max(lengths.values(), default=1.0)
+    edges = [
+        (index[place(one)], index[place(other)], max(lengths.get(name, short), short))
+        for name, link in case.links.items()
+        for one, other in [_ends(link)]
+        if place(one) in index and place(other) in index
+    ]
+    plan = _plan(len(names), edges)
+    return dict(zip(names, plan, strict=True))
+
+
+def place(port: str) -> str:
+    """The part that owns a place: `cyl` of `cyl.A`."""
+    return port.partition(".")[0]
+
+
+def path(start: np.ndarray, end: np.ndarray, fractions: np.ndarray, aside: float) -> np.ndarray:
+    """Points float64[k, 2] of a link at `fractions` of its length, bent aside by `aside` of its length."""
+    along = end - start
+    normal = np.array([-along[1], along[0]])
+    straight = start + fractions[:, None] * along
+    return straight + (4.0 * BOW * aside) * (fractions * (1.0 - fractions))[:, None] * normal
+
+
+def bends(links: dict) -> dict[str, float]:
+    """How far each link bends aside, in steps, so that links between the same two nodes stay apart."""
+    between: dict[tuple, list[str]] = {}
+    for name, link in links.items():
+        between.setdefault(tuple(sorted(_ends(link))), []).append(name)
+    found = {}
+    for ends, names in between.items():
+        for i, name in enumerate(names):
+            step = i - 0.5 * (len(names) - 1)
+            found[name] = step if _ends(links[name])[0] == ends[0] else -step
+    return found
+
+
+def _ends(link) -> tuple[str, str]:
+    ports = list(link.ports.values())
+    return ports[0], ports[-1]
+
+
+def _plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
+    if count == 1:
+        return np.zeros((1, 2))
+    if count > DENSE:
+        return _rings(count, edges)
+    distance = _distances(count, edges)
+    plan = _majorized(_scaled(distance), distance)
+    plan = _turned(plan)
+    return np.round(plan, 6 - int(np.ceil(np.log10(distance.max()))))
+
+
+def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
+    """Lengths of the shortest ways between all nodes (Floyd 1962)."""
+    distance = np.full((count, count), np.inf)
+    np.fill_diagonal(distance, 0.0)
+    for i, j, length in edges:
+        distance[i, j] = distance[j, i] = min(distance[i, j], length)
+    for k in range(count):
+        np.minimum(distance, distance[:, k, None] + distance[None, k], out=distance)
+    apart = np.isinf(distance)
+    distance[apart] = 2.0 * distance[~apart].max() if apart.any() else 0.0
+    return distance
+
+
+def _scaled(distance: np.ndarray) -> np.ndarray:
+    """Classical scaling: the plan nearest to the distances in the sense of least squares (Torgerson 1952)."""
+    count = len(distance)
+    centre = np.eye(count) - 1.0 / count
+    values, vectors = np.linalg.eigh(-0.5 * centre @ distance**2 @ centre)
+    plan = np.zeros((count, 2))
+    for column in range(min(2, count)):
+        vector = vectors[:, -1 - column]
+        largest = np.argmax(np.abs(vector) > 0.999 * np.abs(vector).max())
+        plan[:, column] = vector * np.sign(vector[largest]) * np.sqrt(max(values[-1 - column], 0.0))
+    # Branches of equal length fall on one another in two directions; a fixed nudge parts them.
+    angle = 2.399963 * np.arange(count)
+    return plan + 1e-3 * distance.max() * np.column_stack([np.cos(angle), np.sin(angle)]) * _bushy(distance)
+
+
+def _bushy(distance: np.ndarray) -> float:
+    """0 for a chain, which stays straight, else 1."""
+    farthest = np.unravel_index(np.argmax(distance), distance.shape)
+    off = distance[farthest[0]] + distance[farthest[1]] - distance[farthest]
+    return float(off.max() > 1e-9 * distance.max())
+
+
+def _majorized(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Lower the stress sum((|x_i - x_j| - d_ij)^2 / d_ij^2) by Guttman's transform, weights 1/d^2."""
+    weight = np.where(distance > 0.0, 1.0 / np.where(distance > 0.0, distance, 1.0) ** 2, 0.0)
+    laplacian = np.diag(weight.sum(1)) - weight
+    inverse = np.linalg.pinv(laplacian)
+    for _ in range(ROUNDS):
+        gap = np.linalg.norm(plan[:, None] - plan[None], axis=2)
+        ratio = -weight * distance / np.where(gap > 1e-12, gap, np.inf)
+        np.fill_diagonal(ratio, 0.0)
+        np.fill_diagonal(ratio, -ratio.sum(1))
+        plan = inverse @ (ratio @ plan)
+    return plan
+
+
+def _turned(plan: np.ndarray) -> np.ndarray:
+    """Turned so that the longer side lies along x, the first node to the left, the corner at the origin."""
+    plan = plan - plan.mean(0)
+    _, _, axes = np.linalg.svd(plan, full_matrices=False)
+    plan = plan @ axes.T
+    plan *= np.where(plan[0] > 0.0, -1.0, 1.0)
+    return plan - plan.min(0)
+
+
+def _rings(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
+    """Large networks: as far from the first node as the way is long, each branch in its own sector."""
+    reach, parent, order = _tree(count, edges)
+    leaves = np.zeros(count)
+    for i in reversed(order):
+        leaves[i] = max(leaves[i], 1)
+        if parent[i] >= 0:
+            leaves[parent[i]] += leaves[i]
+    used, middle, begun = np.zeros(count), np.zeros(count), 0.0
+    for i in order:
+        used[i] = used[parent[i]] if parent[i] >= 0 else begun
+        middle[i] = used[i] + 0.5 * leaves[i]
+        if parent[i] >= 0:
+            used[parent[i]] += leaves[i]
+        else:
+            begun += leaves[i]
+    angle = 2.0 * np.pi * middle / begun
+    plan = reach[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.round(plan - plan.min(0), 3)
+
+
+def _tree(count: int, edges: list[tuple[int, int, float]]) -> tuple[np.ndarray, list[int], list[int]]:
+    """Shortest ways from the first node (Dijkstra 1959): lengths, parents (-1: none), order of reach."""
+    near: list[list[tuple[int, float]]] = [[] for _ in range(count)]
+    for i, j, length in edges:
+        near[i].append((j, length))
+        near[j].append((i, length))
+    reach, parent, order = np.full(count, np.inf), [-1] * count, []
+    for root in range(count):
+        heap = [(0.0, root, -1)] if np.isinf(reach[root]) else []
+        while heap:
+            so_far, i, before = heapq.heappop(heap)
+            if so_far >= reach[i]:
+                continue
+            reach[i], parent[i] = so_far, before
+            order.append(i)
+            for j, length in near[i]:
+                heapq.heappush(heap, (so_far + length, j, i))
+    return reach, parent, order

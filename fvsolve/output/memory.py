@@ -1,0 +1,56 @@
+"""The sink of a run that writes nothing: rows in memory. Knows arrays; knows no files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.output.column import converted, probe_columns, time_column
+from fvsolve.output.envelope import envelope_columns
+
+
+class MemorySink:
+    """Keeps the probe rows and the envelope; fields and checkpoints are only for disk."""
+
+    folder = None
+    restart = None
+
+    def __init__(self, model):
+        self.model = model
+        self.time = time_column(model.case)
+        self.columns = probe_columns(model)
+        self._blocks: list[np.ndarray] = []
+        self._envelope: dict = {}
+
+    def begin(self, model, state, resume=None) -> None:
+        """Nothing to open."""
+
+    def rows(self, t, values) -> None:
+        """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
+        self._blocks.append(
+            np.column_stack([self.time.from_si(np.asarray(t)), converted(self.columns, np.asarray(values))])
+        )
+
+    def field(self, t: float, frame: dict) -> None:
+        """Not kept."""
+
+    def checkpoint(self, state, extra: dict) -> None:
+        """Not kept."""
+
+    def end(self, summary) -> None:
+        """Keep the envelope."""
+        self._envelope = summary.envelope
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def table(self) -> np.ndarray:
+        """`float64[rows, 1 + probes]`: time and probes in the columns' units."""
+        return np.concatenate([np.empty((0, 1 + len(self.columns))), *self._blocks])
+
+    def envelope(self) -> dict:
+        """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
+        columns = envelope_columns(self.model.case)
+        return {
+            pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns if one.name in arrays}
+            for pipe, arrays in self._envelope.items()
+        }

@@ -1,0 +1,110 @@
+"""restart.npz: all that a run needs to go on, bit for bit. Knows arrays and files; knows no physics."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import tomllib
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import RunError
+
+# Keys of the resolved case that change what is said about a run, not the run.
+SILENT = ("title", "expect", "compare")
+
+
+@dataclass(frozen=True)
+class Restart:
+    """A checkpoint: the state, the solver's own arrays, and how far the files had come."""
+
+    t: float
+    y: np.ndarray
+    memory: np.ndarray
+    extra: dict[str, np.ndarray]
+    rows: int
+    history_bytes: int
+    frames: int
+
+
+def identity(case) -> dict[str, str]:
+    """What has to be the same for a run to go on: the case but for its end time, and the versions."""
+    resolved = tomllib.loads(case.resolved())
+    for key in SILENT:
+        resolved.pop(key, None)
+    resolved.get("numerics", {}).pop("end", None)
+    digest = hashlib.sha256(json.dumps(resolved, sort_keys=True, default=str).encode())
+    for path in case.files:
+        digest.update(Path(path).read_bytes())
+    return {"case": digest.hexdigest()[:16]} | versions(case)
+
+
+def versions(case) -> dict[str, str]:
+    """Versions that the numbers of a run depend on."""
+    from fvsolve import jit
+
+    numba = sys.modules.get("numba")
+    return {
+        "fvsolve": _package_version(),
+        "sources": jit.source_hash(),
+        "python": sys.version.split()[0],
+        "numpy": np.__version__,
+        "numba": numba.__version__ if numba else "not used",
+        "fluid": case.properties.source,
+    }
+
+
+def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
+    """Replace the checkpoint: a kill at any moment leaves the old one or the new one, never half of one."""
+    arrays = {f"extra.{name}": np.asarray(value) for name, value in restart.extra.items()}
+    arrays |= {"t": np.float64(restart.t), "y": restart.y, "memory": restart.memory}
+    arrays["counts"] = np.array([restart.rows, restart.history_bytes, restart.frames])
+    arrays["identity"] = np.array(json.dumps(who))
+    fresh = path.with_suffix(".tmp")
+    with open(fresh, "wb") as file:
+        np.savez(file, **arrays)
+    os.replace(fresh, path)
+
+
+def read_restart(path: Path, who: dict[str, str]) -> Restart:
+    """The checkpoint at `path`; RunError where it belongs to another case or to other versions."""
+    try:
+        with np.load(path) as file:
+            arrays = {name: file[name] for name in file.files}
+        found = json.loads(str(arrays.pop("identity")))
+        rows, history_bytes, frames = (int(count) for count in arrays.pop("counts"))
+        t, y, memory = float(arrays.pop("t")), arrays.pop("y"), arrays.pop("memory")
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise RunError(f"{path} cannot be read ({error}); start the run again with --force") from None
+    _check(path, found, who)
+    extra = {name.removeprefix("extra."): value for name, value in arrays.items()}
+    return Restart(t, y, memory, extra, rows, history_bytes, frames)
+
+
+def _check(path: Path, found: dict[str, str], wanted: dict[str, str]) -> None:
+    if found.get("case") != wanted["case"]:
+        raise RunError(
+            f"{path} belongs to another case: more than numerics.end has changed since; "
+            "start again with --force, or keep both with --out DIR"
+        )
+    other = [name for name in wanted if found.get(name) != wanted[name]]
+    if other:
+        listed = ", ".join(f"{name} {found.get(name)} (now {wanted[name]})" for name in other)
+        raise RunError(
+            f"{path} was written by other versions, so the run would not go on bit for bit: {listed}; "
+            "start again with --force, or go on with the versions of then"
+        )
+
+
+def _package_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("fvsolve")
+    except PackageNotFoundError:
+        return "not installed"

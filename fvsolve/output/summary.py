@@ -1,0 +1,85 @@
+"""summary.json: what is to be said about a run, for people and programs. Knows words; knows no solver."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+from fvsolve.errors import RunError
+from fvsolve.output.column import probe_columns, time_column
+from fvsolve.output.envelope import envelope_columns
+
+
+def described(summary, model) -> dict:
+    """The summary of a solver as plain data: SI but for the extremes, which are in the columns' units."""
+    return {
+        "title": model.case.title,
+        "case": model.case.name,
+        "reason": summary.reason,
+        "ok": bool(summary.ok),
+        "t": float(summary.t),
+        "marks": [
+            {"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
+            for mark in summary.marks
+        ],
+        "probes": {one.name: {"dimension": one.dimension, "unit": one.unit} for one in probe_columns(model)},
+        "time_unit": time_column(model.case).unit,
+        "envelope_units": {one.name: one.unit for one in envelope_columns(model.case)},
+        "ambient_pressure": model.case.ambient_pressure,
+        "extremes": _extremes(summary, model),
+        "ledgers": plain(summary.ledgers),
+        "steps": int(summary.steps),
+        "rejections": int(summary.rejections),
+        "rhs": int(summary.rhs),
+        "cells": int(summary.cells),
+        "seconds": float(summary.seconds),
+        "seconds_setup": float(summary.seconds_setup),
+        "cost": plain(summary.cost),
+        "warnings": list(model.warnings),
+    }
+
+
+def plain(value):
+    """`value` with numpy numbers and arrays as Python's own, and what JSON cannot say (NaN) as None."""
+    if isinstance(value, dict):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, (str, int, bool, type(None))) else str(value)
+
+
+def write_summary(path: Path, summary: dict) -> None:
+    """Write summary.json in one move: a directory that has it holds a run that ended."""
+    fresh = path.with_suffix(".json.tmp")
+    fresh.write_text(json.dumps(plain(summary), indent=1) + "\n", encoding="utf-8")
+    os.replace(fresh, path)
+
+
+def read_summary(path: Path) -> dict:
+    """summary.json as it was written; RunError where there is none."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RunError(f"{path.parent} holds no ended run (no {path.name})") from None
+    except (OSError, ValueError) as error:
+        raise RunError(f"{path} cannot be read: {error}") from None
+
+
+def _extremes(summary, model) -> dict:
+    found = {}
+    for one in probe_columns(model):
+        least, t_least, greatest, t_greatest = summary.extremes[one.name]
+        found[one.name] = {
+            "unit": one.unit,
+            "least": plain(float(one.from_si(least))),
+            "t_least": plain(float(t_least)),
+            "greatest": plain(float(one.from_si(greatest))),
+            "t_greatest": plain(float(t_greatest)),
+        }
+    return found

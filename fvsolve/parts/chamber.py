@@ -1,0 +1,23 @@
+"""A closed volume of fluid. Knows its size; knows no link."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from fvsolve.parts.node import Node
+from fvsolve.parts.value import Quantity, positive
+
+
+class Chamber(Node, kind="chamber"):
+    """A rigid vessel full of fluid, (V / beta) dp/dt = net flow into it (80).
+
+    Ports: any number. Stored energy, p from ambient: V p^2 / (2 beta) [J] under the linear law,
+    V (beta (exp(p/beta) - 1) - p) under the log law. Dissipated energy: none.
+    """
+
+    fixes_pressure: ClassVar[bool] = True
+
+    volume: Annotated[float, Quantity("volume", positive, "fluid held [m3]")]
+    initial_pressure: Annotated[
+        float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium if left out")
+    ] = None

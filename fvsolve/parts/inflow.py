@@ -1,0 +1,17 @@
+"""A place that feeds a given flow. Knows its flow; knows no link."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fvsolve.parts.node import Node
+from fvsolve.parts.schedule import Schedule, Scheduled
+
+
+class Inflow(Node, kind="inflow"):
+    """A place without volume that feeds `flow(t)` into its links.
+
+    Ports: any number. Stored energy: none. Dissipated energy: none; it brings p times flow [W].
+    """
+
+    flow: Annotated[Schedule, Scheduled("flow", about="positive into the network [m3/s]")]

@@ -1,0 +1,34 @@
+"""A place with one potential. Knows what every node has; knows no link."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import Quantity, Rows
+
+
+class Node(Table):
+    """A place with one pressure; pressure is taken at its elevation.
+
+    Ports: those of the links that name it. Stored and dissipated energy: none, unless the kind says so.
+    """
+
+    kind: ClassVar[str] = ""
+    kinds: ClassVar[dict[str, type[Node]]] = {}
+    quantities: ClassVar[dict[str, str]] = {
+        "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
+    }  # fmt: skip
+    fixes_pressure: ClassVar[bool] = False
+
+    elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = (
+        None
+    )
+    position: Annotated[
+        tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")
+    ] = None
+
+    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        cls.kind = kind
+        Node.kinds[kind] = cls

@@ -1,0 +1,29 @@
+"""A node whose pressure or head is given. Knows nothing of who draws from it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.node import Node
+from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.table import at_least_one
+
+
+class Reservoir(Node, kind="reservoir"):
+    """A place of given pressure, p = pressure(t) or p = ambient + rho g (head(t) - elevation) [Pa].
+
+    Ports: any number; it takes or gives whatever flow they ask. Stored energy: none of its own; what passes
+    its ports enters the ledger as work done on the network. Dissipated energy: none.
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
+    fixes_pressure: ClassVar[bool] = True
+
+    pressure: Annotated[Schedule | None, Scheduled("pressure", about="at its elevation [Pa]")] = None
+    head: Annotated[
+        Schedule | None, Scheduled("head", about="of the fluid above datum, from ambient [m]")
+    ] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        return super().key_faults(given) + at_least_one(given, ("pressure", "head"))

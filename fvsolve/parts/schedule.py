@@ -1,0 +1,179 @@
+"""A value that may change with time. Knows its breakpoints; evaluates nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.series import copy_name, find_file, read_columns
+from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.value import (
+    NEEDED,
+    ROOT,
+    Choice,
+    Misfit,
+    Number,
+    Quantity,
+    Range,
+    Rows,
+    Setting,
+    Text,
+    Value,
+    anything,
+    check_rising,
+    nonnegative,
+    positive,
+)
+from fvsolve.units import show
+
+KINDS = ("linear", "step", "smooth")
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """A value over time: held before the first and after the last entry, right-continuous.
+
+    kind : constant | linear | step | smooth (monotone cubic) | ramp
+    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one
+    exponent : of a ramp, value = v1 + (v0 - v1) (1 - s)^exponent with s from 0 to 1 between its two times
+    origin : the table the file would say, in SI
+    """
+
+    kind: str
+    time: np.ndarray
+    value: np.ndarray
+    exponent: float = 1.0
+    origin: Any = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("time", "value"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Schedule):
+            return NotImplemented
+        mine, theirs = (self.kind, self.exponent), (other.kind, other.exponent)
+        return (
+            mine == theirs
+            and np.array_equal(self.time, other.time)
+            and np.array_equal(self.value, other.value)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.exponent, self.time.tobytes(), self.value.tobytes()))
+
+    @property
+    def first(self) -> float:
+        """The value before the first entry [SI]."""
+        return float(self.value[0])
+
+    @property
+    def constant(self) -> bool:
+        """Whether it never changes."""
+        return self.kind == "constant"
+
+    def table(self) -> Any:
+        """What the file would say: a number or a table, in SI."""
+        return self.first if self.origin is None else self.origin
+
+
+def constant(value: float) -> Schedule:
+    """The schedule that is always `value` [SI]."""
+    return Schedule("constant", np.zeros(1), np.array([value]))
+
+
+@dataclass(frozen=True)
+class Scheduled(Value):
+    """A schedule of a quantity: a number or text, a table, a file, a ramp, or a signal."""
+
+    dimension: str
+    range: Range = anything
+    about: str = ""
+
+    def read(self, given: Any, setting: Setting) -> Schedule:
+        if isinstance(given, Schedule):
+            return given
+        if not isinstance(given, dict):
+            return constant(Quantity(self.dimension, self.range).read(given, setting))
+        if "signal" in given:
+            return self._read_signal(given, setting)
+        if "file" in given:
+            return self._read_file(given, setting)
+        if any(key in given for key in ("start", "duration", "exponent")):
+            return self._read_ramp(given, setting)
+        return self._read_table(given, setting)
+
+    def forms(self) -> dict[str, dict[str, tuple[Value, Any]]]:
+        """The forms a table may have: per key its value and default."""
+        item, kind = (self.dimension, self.range), (Choice("kind of schedule", KINDS), "linear")
+        return {
+            "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},
+            "ramp": {
+                "start": (Quantity("time"), NEEDED),
+                "duration": (Quantity("time", nonnegative), NEEDED),
+                "value": (Rows(*item, length=2), NEEDED),
+                "exponent": (Number(positive), 1.0),
+            },
+            "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
+            "signal": {"signal": (Text(), NEEDED)},
+        }
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms().values())]}
+
+    def _read_table(self, given: dict[str, Any], setting: Setting) -> Schedule:
+        found = read_keys(given, self.forms()["table"], setting)
+        t, v, kind = found["time"], found["value"], found["kind"]
+        if len(t) != len(v):
+            raise Misfit([(("value",), f"{len(v)} values for {len(t)} times; wanted as many of both")])
+        try:
+            check_rising(t, given["time"], "times")
+        except ValueError as error:
+            raise Misfit([(("time",), str(error))]) from None
+        if len(v) == 1:
+            return constant(v[0])
+        return Schedule(kind, t, v, origin={"time": list(t), "value": list(v), "kind": kind})
+
+    def _read_ramp(self, given: dict[str, Any], setting: Setting) -> Schedule:
+        found = read_keys(given, self.forms()["ramp"], setting)
+        start, duration, v, exponent = (found[key] for key in ("start", "duration", "value", "exponent"))
+        origin = {**found, "value": list(v)}
+        if start + duration == start:  # no duration: a jump
+            return Schedule("step", (start - 1.0 - abs(start), start), v, origin=origin)
+        return Schedule("ramp", (start, start + duration), v, exponent, origin)
+
+    def _read_file(self, given: dict[str, Any], setting: Setting) -> Schedule:
+        found = read_keys(given, self.forms()["file"], setting)
+        kind = found["kind"]
+        try:
+            path = find_file(found["file"], setting)
+            t, v, *headers = read_columns(path, found["time"], found["value"], self.dimension, setting)
+            check_rising(t, t.tolist(), f"{path.name}: times")
+            for one in v.tolist():
+                self.range.check(one, one)
+        except ValueError as error:
+            raise Misfit([(("file",), str(error))]) from None
+        origin = {"file": copy_name(path, setting), "time": headers[0], "value": headers[1], "kind": kind}
+        return Schedule(kind if len(v) > 1 else "constant", t, v, origin=origin)
+
+    def _read_signal(self, given: dict[str, Any], setting: Setting) -> Schedule:
+        name = read_keys(given, self.forms()["signal"], setting)["signal"]
+        if name not in setting.signals:
+            near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
+            raise Misfit([(("signal",), f"no signal named {show(name)}{near}; signals are {names}")])
+        shared = setting.signals[name]
+        if isinstance(shared, dict) and "signal" in shared:
+            raise Misfit([(("signal",), f"signal {show(name)} names another signal; give it values")])
+        try:
+            made = self.read(shared, setting)
+        except Misfit as error:
+            raise Misfit([((ROOT, "signals", name, *below), text) for below, text in error.faults]) from None
+        except ValueError as error:
+            raise Misfit([((ROOT, "signals", name), str(error))]) from None
+        setting.used[name] = made.table()
+        return Schedule(made.kind, made.time, made.value, made.exponent, origin={"signal": name})

@@ -1,0 +1,127 @@
+"""A table of a case file. Knows keys and which of them go together; knows no part and no file."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.value import NEEDED, Misfit, Setting, Value
+from fvsolve.units import show
+
+
+def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: Setting) -> dict[str, Any]:
+    """The values of a table whose keys have a value and a default each; Misfit with all that does not fit."""
+    found = {key: default for key, (_, default) in keys.items()}
+    faults = [((key,), f"unknown key{_near(str(key), list(keys))}") for key in given if key not in keys]
+    for key, (value, default) in keys.items():
+        try:
+            if key in given:
+                found[key] = value.read(given[key], setting)
+            elif default is NEEDED:
+                faults.append(((), f"{key} is missing"))
+        except Misfit as error:
+            faults += [((key, *below), message) for below, message in error.faults]
+        except ValueError as error:
+            faults.append(((key,), str(error)))
+    if faults:
+        raise Misfit(faults)
+    return found
+
+
+def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:
+    """The JSON schema of such a table."""
+    return {
+        "type": "object",
+        "properties": {key: value.json() for key, (value, _) in keys.items()},
+        "required": [key for key, (_, default) in keys.items() if default is NEEDED],
+        "additionalProperties": False,
+    }
+
+
+def _near(name: str, keys: list[str]) -> str:
+    return did_you_mean(name, keys) or f"; keys are {listing(keys)}"
+
+
+class Table(BaseModel):
+    """Base of everything that is a table in a case file: frozen, every key known, all faults at once."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True
+    )
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # keys of which one at most is given
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        """Faults of keys that do not go together, as pairs of keys and message."""
+        return [fault for keys in cls.alternatives for fault in at_most_one(given, keys)]
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _all_at_once(cls, given: Any, handler: Any) -> Any:
+        if isinstance(given, cls):
+            return given
+        if not isinstance(given, dict):
+            raise Misfit([((), f"{show(given)} is no table; wanted keys of {listing(cls.keys())}")])
+        faults = cls.key_faults(given)
+        try:
+            made = handler(given)
+        except ValidationError as error:
+            raise Misfit(faults + misfits(error, cls.keys())) from None
+        if faults:
+            raise Misfit(faults)
+        return made
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """The keys the file may use."""
+        return [info.alias or name for name, info in cls.model_fields.items()]
+
+    def table(self) -> dict[str, Any]:
+        """The table that reads back as this object: SI numbers, defaults filled in, absent keys left out."""
+        made = {}
+        for name, info in type(self).model_fields.items():
+            value = plain(getattr(self, name))
+            if value is not None:
+                made[info.alias or name] = value
+        return made
+
+
+def plain(value: Any) -> Any:
+    """A field's value as the file would say it."""
+    if hasattr(value, "table"):
+        return value.table()
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    if isinstance(value, dict):
+        return {key: plain(one) for key, one in value.items()}
+    return value
+
+
+def at_most_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
+    """The fault of two of the keys given."""
+    found = [key for key in keys if key in given]
+    return [((found[1],), f"{' and '.join(found)} are given; keep one")] if len(found) > 1 else []
+
+
+def at_least_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
+    """The fault of none of the keys given."""
+    return [] if any(key in given for key in keys) else [((), f"wanted one of {', '.join(keys)}")]
+
+
+def misfits(error: ValidationError, keys: list[str]) -> list[tuple[tuple[Any, ...], str]]:
+    """Pydantic's errors in our words, with the keys they lie under."""
+    found = []
+    for one in error.errors(include_url=False):
+        place, cause = tuple(one["loc"]), one.get("ctx", {}).get("error")
+        if isinstance(cause, Misfit):
+            found += [(place + below, message) for below, message in cause.faults]
+        elif one["type"] == "missing":
+            found.append((place[:-1], f"{place[-1]} is missing"))
+        elif one["type"] == "extra_forbidden":
+            found.append((place, f"unknown key{_near(str(place[-1]), keys)}"))
+        else:
+            found.append((place, str(cause) if cause else one["msg"]))
+    return found

@@ -1,0 +1,88 @@
+"""An open vessel with a level. Knows its shape; knows nothing of who fills it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from fvsolve.parts.node import Node
+from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.value import (
+    NEEDED,
+    Misfit,
+    Quantity,
+    Rows,
+    Setting,
+    Value,
+    check_rising,
+    nonnegative,
+    positive,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class AreaTable:
+    """Free surface over level, linear between entries and held outside them.
+
+    level, area : float64[n]  level above the bottom, rising from 0 [m], and surface there [m2]
+    """
+
+    level: np.ndarray
+    area: np.ndarray
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, AreaTable) and self.table() == other.table()
+
+    def __hash__(self) -> int:
+        return hash((self.level.tobytes(), self.area.tobytes()))
+
+    def table(self) -> dict[str, list[float]]:
+        """What the file would say."""
+        return {"level": self.level.tolist(), "area": self.area.tolist()}
+
+
+class Surface(Value):
+    """A free surface: one area, or a table of areas over levels."""
+
+    about = "free surface [m2], or { level = [...], area = [...] }"
+    keys = {"level": (Rows("level", nonnegative), NEEDED), "area": (Rows("area", positive), NEEDED)}
+
+    def read(self, given: Any, setting: Setting) -> float | AreaTable:
+        if isinstance(given, AreaTable):
+            return given
+        if not isinstance(given, dict):
+            return Quantity("area", positive).read(given, setting)
+        found = read_keys(given, self.keys, setting)
+        level, area = found["level"], found["area"]
+        faults = []
+        if len(level) != len(area):
+            faults.append((("area",), f"{len(area)} areas for {len(level)} levels; wanted as many of both"))
+        if level[0] != 0:
+            faults.append((("level",), "levels count from the bottom; the first must be 0"))
+        try:
+            check_rising(level, given["level"], "levels")
+        except ValueError as error:
+            faults.append((("level",), str(error)))
+        if faults:
+            raise Misfit(faults)
+        return AreaTable(np.array(level), np.array(area))
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [Quantity("area").json(), keys_json(self.keys)]}
+
+
+class Tank(Node, kind="tank"):
+    """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at its bottom.
+
+    Ports: any number, all at the bottom. Stored energy: rho g times the integral of (elevation + level) area
+    over the level [J]. Dissipated energy: what spills over `height` leaves with its potential energy.
+    """
+
+    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "level": "level"}
+    fixes_pressure: ClassVar[bool] = True
+
+    area: Annotated[Any, Surface()]
+    level: Annotated[float, Quantity("level", nonnegative, "level at the start, above its bottom [m]")]
+    height: Annotated[float | None, Quantity("level", positive, "level above which it spills [m]")] = None

@@ -1,0 +1,150 @@
+"""A constriction with a stem. Knows its size, opening and characteristic; evaluates no flow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from fvsolve.parts.link import Link
+from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.value import (
+    NEEDED,
+    Choice,
+    Misfit,
+    Number,
+    Quantity,
+    Rows,
+    Setting,
+    Value,
+    between,
+    check_rising,
+    positive,
+)
+
+DISCHARGE_COEFFICIENT = 0.61  # sharp edge
+GALLON, PSI, MINUTE = 3.785411784e-3, 6894.757293168361, 60.0
+WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defined [kg/m3]
+
+
+@dataclass(frozen=True, eq=False)
+class Characteristic:
+    """Relative flow area over stem opening, linear between entries.
+
+    opening, flow_area : float64[n]  opening rising from 0 to 1, flow area from 0 [-]
+    """
+
+    opening: np.ndarray
+    flow_area: np.ndarray
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Characteristic) and self.table() == other.table()
+
+    def __hash__(self) -> int:
+        return hash((self.opening.tobytes(), self.flow_area.tobytes()))
+
+    def table(self) -> dict[str, list[float]]:
+        """What the file would say."""
+        return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
+
+
+class Trim(Value):
+    """A characteristic: one of two names, or a table."""
+
+    about = "relative flow area over opening"
+    names = Choice("characteristic", ("linear", "equal-percentage"))
+    keys = {
+        "opening": (Rows("number", between(0, 1)), NEEDED),
+        "flow_area": (Rows("number", between(0, 1)), NEEDED),
+    }
+
+    def read(self, given: Any, setting: Setting) -> str | Characteristic:
+        if isinstance(given, Characteristic):
+            return given
+        if not isinstance(given, dict):
+            return self.names.read(given, setting)
+        found = read_keys(given, self.keys, setting)
+        opening, flow_area = found["opening"], found["flow_area"]
+        faults = []
+        if len(opening) != len(flow_area):
+            faults.append((("flow_area",), f"{len(flow_area)} values for {len(opening)} openings"))
+        if opening[0] != 0 or opening[-1] != 1:
+            faults.append((("opening",), "openings must lead from 0 to 1"))
+        if flow_area[0] != 0:
+            faults.append((("flow_area",), "opening 0 is shut: the first flow area must be 0"))
+        try:
+            check_rising(opening, given["opening"], "openings")
+        except ValueError as error:
+            faults.append((("opening",), str(error)))
+        if faults:
+            raise Misfit(faults)
+        return Characteristic(np.array(opening), np.array(flow_area))
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [self.names.json(), keys_json(self.keys)]}
+
+
+class Valve(Link, kind="valve"):
+    """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
+
+    Ports: from, to; both directions alike; opening 0 is exactly no flow. Stored energy: none. Dissipated
+    power: dp q [W].
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("discharge_coefficient", "loss_coefficient", "Kv", "Cv"),
+        ("area", "diameter"),
+    )
+
+    discharge_coefficient: Annotated[
+        float | None, Number(between(0, 1, open=True), "Cd, with area or diameter")
+    ] = None
+    loss_coefficient: Annotated[float | None, Number(positive, "K on the velocity in area or diameter")] = (
+        None
+    )
+    Kv: Annotated[float | None, Number(positive, "m3/h of water at 1 bar")] = None
+    Cv: Annotated[float | None, Number(positive, "US gpm of water at 1 psi")] = None
+    area: Annotated[float | None, Quantity("area", positive, "of the opening [m2]")] = None
+    diameter: Annotated[float | None, Quantity("length", positive, "of the opening [m]")] = None
+    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = (
+        Field(default_factory=lambda: constant(1.0))
+    )
+    characteristic: Annotated[Any, Trim()] = "linear"
+    laminar_reynolds: Annotated[
+        float | None, Number(positive, "Reynolds number below which it is laminar")
+    ] = None
+
+    def model_post_init(self, _: Any) -> None:
+        if self.Kv is self.Cv is self.loss_coefficient is self.discharge_coefficient is None:
+            object.__setattr__(self, "discharge_coefficient", DISCHARGE_COEFFICIENT)
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given)
+        bare = next((key for key in ("Kv", "Cv") if key in given), None)
+        if bare:
+            stray = [key for key in ("area", "diameter") if key in given]
+            return faults + [((key,), f"{bare} says it all; leave {key} out") for key in stray]
+        if "area" in given or "diameter" in given:
+            return faults
+        alone = next((key for key in ("discharge_coefficient", "loss_coefficient") if key in given), None)
+        wanted = f"{alone} wants area or diameter" if alone else "no size; wanted area, diameter, Kv or Cv"
+        return faults + [((), wanted)]
+
+    def flow_area(self) -> float:
+        """Cd A at full opening, such that q = Cd A sqrt(2 dp / rho) [m2].
+
+        K gives A / sqrt(K); Kv gives Kv / 3600 / sqrt(2e5 / 1000); Cv likewise in gallons and psi at 60 degF.
+        """
+        if self.Kv is not None:
+            return self.Kv / 3600.0 / math.sqrt(2.0 * 1e5 / WATER_15)
+        if self.Cv is not None:
+            return self.Cv * GALLON / MINUTE / math.sqrt(2.0 * PSI / WATER_60F)
+        area = self.area if self.area is not None else math.pi / 4.0 * self.diameter**2
+        if self.loss_coefficient is not None:
+            return area / math.sqrt(self.loss_coefficient)
+        return self.discharge_coefficient * area

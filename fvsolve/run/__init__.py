@@ -1,0 +1,99 @@
+"""The public `run()`: case in, result out, files and pictures where asked. Knows no physics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from fvsolve.errors import RunError
+from fvsolve.output.directory import RunDirectory, read_directory
+from fvsolve.output.memory import MemorySink
+from fvsolve.output.restart import versions
+from fvsolve.output.summary import described, write_summary
+from fvsolve.run.claims import claims
+from fvsolve.run.result import Result
+
+__all__ = ["Result", "open_run", "run"]
+
+
+def run(
+    case,
+    set: Mapping | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    resume: bool = False,
+    progress: Callable[[float, float, int], None] | None = None,
+) -> Result:
+    """Solve a case from its start to its end and hand back what it has to show.
+
+    `case` is a path, a dict shaped like the file, a `Case` or a `Model`; `set` overrides keys, for example
+    `{"links.main.cells": 400}`. With `out` a run directory is written (docs/results.md); an earlier run in
+    it is only replaced with `force`, and goes on from its last checkpoint with `resume`.
+    `progress(t, seconds, steps)` is called about ten times a second; KeyboardInterrupt raised there ends the
+    run cleanly. A run that stops early still returns, `ok` False and its `reason` said.
+    Raises CaseError, FluidError, RunError.
+    """
+    begun = time.perf_counter()
+    model = _model(case, set)
+    if out is None:
+        if resume:
+            raise RunError("a run goes on in its directory: state it with out=")
+        sink = MemorySink(model)
+    else:
+        sink = RunDirectory(Path(out), model, force, resume)
+        if sink.ended:
+            return open_run(out)
+    try:
+        summary = _solve(model, sink, progress)
+    finally:
+        sink.close()
+    return _result(model, summary, sink, begun)
+
+
+def open_run(directory: str | Path) -> Result:
+    """Read a run directory back; RunError where it holds no run that ended."""
+    return Result(*read_directory(Path(directory)))
+
+
+def _model(case, set: Mapping | None):
+    from fvsolve.case import load
+    from fvsolve.model import Model, build
+
+    if not isinstance(case, Model):
+        return build(load(case, dict(set or {})))
+    if set:
+        raise RunError("a Model is made and cannot be overridden; give set= together with the case")
+    return case
+
+
+def _solve(model, sink, progress):
+    from fvsolve.model import State
+    from fvsolve.solve import initial_state, solve
+
+    if sink.restart is None:
+        return solve(model, initial_state(model), sink, progress)
+    state = State(sink.restart.t, sink.restart.y, sink.restart.memory)
+    return solve(model, state, sink, progress, resume=sink.restart.extra)
+
+
+def _result(model, summary, sink, begun: float) -> Result:
+    said = described(summary, model)
+    result = Result(said, sink.table, sink.envelope, sink.folder)
+    result.case = model.case
+    said |= claims(model, summary.extremes, result)
+    said["versions"] = versions(model.case)
+    if sink.folder is not None:
+        _draw(result)
+        said["files"] = sink.files()
+        said["seconds_total"] = time.perf_counter() - begun
+        write_summary(sink.folder / "summary.json", said)
+    return result
+
+
+def _draw(result: Result) -> None:
+    """Write the pictures of a run directory."""
+    if result.probes:
+        result.plot(result.directory / "history.png")
+    if result.envelope:
+        result.plot_envelope(result.directory / "envelope.png")

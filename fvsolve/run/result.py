@@ -1,0 +1,235 @@
+"""What a run has to show: probes over time, extremes, claims. Knows arrays and words; starts no run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError, RunError, did_you_mean
+from fvsolve.output.column import Column
+from fvsolve.output.fields import read_series
+
+
+class Mark(NamedTuple):
+    """First place and time [s] of what the model cannot follow: do not trust results from there on."""
+
+    what: str
+    place: str
+    time: float
+    text: str
+
+
+class Extremes(NamedTuple):
+    """Least and greatest over all accepted steps, in the unit of the probe, and when [s]."""
+
+    least: float
+    t_least: float
+    greatest: float
+    t_greatest: float
+
+
+class Expectation(NamedTuple):
+    """A claim of the case; `claimed`, `found` and `tolerance` in `unit`."""
+
+    text: str
+    claimed: float
+    found: float
+    tolerance: float
+    unit: str
+    ok: bool
+
+
+class Comparison(NamedTuple):
+    """A measured series held against its probe: differences and peaks in `unit`, times in s."""
+
+    probe: str
+    unit: str
+    file: str
+    shift: float
+    points: int
+    rms: float | None
+    greatest_difference: float | None
+    t_greatest_difference: float | None
+    measured_peak: float | None
+    t_measured_peak: float | None
+    computed_peak: float | None
+    t_computed_peak: float | None
+
+
+class Result:
+    """Probes over time and what is to be said about them, in the units of `[output]`.
+
+    `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
+    `.reason`, `.ok`, `.marks`, `.ledger`, `.extremes`, `.envelope`, `.expectations`, `.comparisons`; all but
+    the arrays as plain data in `result.summary`. `result.directory` is where it is on disk, or None.
+    """
+
+    def __init__(
+        self,
+        summary: dict,
+        table: Callable[[], np.ndarray],
+        envelope: Callable[[], dict],
+        directory: Path | None = None,
+    ):
+        self.summary = summary
+        self.units = {name: probe["unit"] for name, probe in summary["probes"].items()}
+        self.directory = directory
+        self._read_table = table
+        self._read_envelope = envelope
+
+    @property
+    def reason(self) -> str:
+        """`finished`, or why the run ended before its end."""
+        return self.summary["reason"]
+
+    @property
+    def ok(self) -> bool:
+        """True if the run came to its end."""
+        return self.summary["ok"]
+
+    @property
+    def marks(self) -> list[Mark]:
+        """First place and time from which results are not to be trusted, one per cause."""
+        return [Mark(**one) for one in self.summary["marks"]]
+
+    @property
+    def ledger(self) -> dict:
+        """What came in, went out and is stored, and the remainder, per ledger (`mass` [kg])."""
+        return self.summary["ledgers"]
+
+    @property
+    def extremes(self) -> dict[str, Extremes]:
+        """Least and greatest of each probe, and when."""
+        return {
+            name: Extremes(*(one[key] for key in Extremes._fields))
+            for name, one in self.summary["extremes"].items()
+        }
+
+    @property
+    def expectations(self) -> list[Expectation]:
+        """What the case claims, and whether it holds."""
+        return [Expectation(**one) for one in self.summary["expectations"]]
+
+    @property
+    def comparisons(self) -> list[Comparison]:
+        """How far each measured series is from its probe."""
+        return [Comparison(**one) for one in self.summary["comparisons"]]
+
+    @cached_property
+    def case(self):
+        """The case as resolved, read back from the run directory where it is not at hand."""
+        from fvsolve.case import load
+
+        return load(self.directory / "case.toml")
+
+    @cached_property
+    def envelope(self) -> dict:
+        """Pipe -> distance, elevation, least and greatest pressure and head, times: float64[cells]."""
+        return self._read_envelope()
+
+    @property
+    def probes(self) -> list[str]:
+        """Names of the probes, in the order of the table."""
+        return list(self.units)
+
+    @cached_property
+    def _table(self) -> np.ndarray:
+        return self._read_table()
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times of the rows, in s unless `[output]` says otherwise; at a jump two rows have the same time."""
+        return self._table[:, 0]
+
+    @property
+    def seconds(self) -> np.ndarray:
+        """Times of the rows [s]."""
+        return self._time.to_si(self.t)
+
+    @property
+    def _time(self) -> Column:
+        return Column("t", "time", self.summary["time_unit"])
+
+    def __getitem__(self, probe: str) -> np.ndarray:
+        if probe not in self.units:
+            raise FvsolveError(f"no probe {probe!r}{did_you_mean(probe, self.units)}; see Result.probes")
+        return self._table[:, 1 + self.probes.index(probe)]
+
+    def frame(self):
+        """The table as a pandas DataFrame, time as index; FvsolveError where pandas is not installed."""
+        try:
+            import pandas
+        except ImportError:
+            raise FvsolveError("Result.frame() needs pandas: pip install pandas") from None
+        index = pandas.Index(self.t, name=self._time.header)
+        headers = [f"{name} [{unit}]" for name, unit in self.units.items()]
+        return pandas.DataFrame(self._table[:, 1:], index=index, columns=headers)
+
+    def plot(self, path=None):
+        """The probes over time as a matplotlib Figure, also written to `path` where one is given."""
+        from fvsolve.draw.plot import history_figure
+
+        figure = history_figure(
+            self.t,
+            self._table[:, 1:],
+            list(self.units.items()),
+            time_unit=self._time.unit,
+            marks=[(self._time.from_si(one.time), f"{one.place} {one.what}") for one in self.marks],
+            measured=self._measured(),
+            title=self.summary["title"],
+        )
+        if path is not None:
+            figure.savefig(path)
+        return figure
+
+    def plot_envelope(self, path=None):
+        """Least and greatest head along the pipes as a matplotlib Figure, also written to `path`."""
+        from fvsolve.draw.plot import envelope_figure
+
+        figure = envelope_figure(self.envelope, self.summary["envelope_units"], self.summary["title"])
+        if path is not None:
+            figure.savefig(path)
+        return figure
+
+    def view(self, time: float | None = None, field: str = "pressure", path=None) -> Path:
+        """Draw `field` on the pipes at the frame nearest to `time` [s] (the last by default) with PyVista.
+
+        The path of the picture; RunError where there are no frames, FvsolveError where nothing can be drawn.
+        """
+        from fvsolve.draw.view import view
+
+        if self.directory is None or not (self.directory / "fields.pvd").is_file():
+            raise RunError("no frames to draw: state [output] fields = 50 and run into a directory")
+        frames = read_series(self.directory / "fields.pvd")
+        if not frames:
+            raise RunError(f"{self.directory / 'fields.pvd'} lists no frames")
+        t, frame = frames[-1] if time is None else min(frames, key=lambda one: abs(one[0] - time))
+        out = Path(path) if path else self.directory / f"{field}.png"
+        view(frame, field, out, f"{self.summary['title']}\n{field.replace('_', ' ')} at t = {t:.6g} s")
+        return out
+
+    def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        compared = self.case.compare if self.comparisons else {}
+        return {
+            one.probe.text: (
+                self._time.from_si(one.t + one.shift),
+                self.column(one.probe.text).from_si(one.v),
+            )
+            for one in compared.values()
+        }
+
+    def column(self, probe: str) -> Column:
+        """Name, dimension and unit of a probe, with the way to and from SI."""
+        return Column(probe, **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
+
+    def si(self, probe: str) -> np.ndarray:
+        """One probe in SI, pressures absolute: float64[rows]."""
+        return self.column(probe).to_si(self[probe])
+
+    def __repr__(self) -> str:
+        said = self.summary
+        return f"<Result {said['case']!r}: {self.reason}, t = {said['t']:g} s, {len(self.units)} probes>"

@@ -1,0 +1,217 @@
+"""Carry a state from the start of a case to its end, segment by segment. Knows no files and no pictures."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.model import Model, State
+from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.summary import Summary, find_envelope, find_extremes, find_marks, mass_ledger
+from fvsolve.steppers import erk
+
+CHECKPOINT_SECONDS = 1.0
+CHUNK_SECONDS = 0.1
+PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS)
+
+
+def initial_state(model: Model) -> State:
+    """The state a model starts from: no deviation from its profile."""
+    return State(model.case.numerics.start, np.zeros(model.y_size))
+
+
+def solve(model: Model, state: State, sink, progress=None) -> Summary:
+    """Step from `state` to the case's end, with rows, fields and checkpoints to `sink`.
+
+    progress(t, seconds, steps) is called about ten times a second. A state with memory is resumed bit for bit.
+    """
+    return Run(model, state, sink, progress).go()
+
+
+class Run:
+    """One run while it lasts."""
+
+    def __init__(self, model: Model, state: State, sink, progress) -> None:
+        self.model, self.sink, self.progress = model, sink, progress
+        self.began = time.perf_counter()
+        self.loop = Loop(model)
+        numerics, output = model.case.numerics, model.case.output
+        self.start, self.end = numerics.start, numerics.end
+        jumps = {t: jump for t, jump in model.breaks if self.start <= t < self.end}
+        self.starts_with_jump = jumps.pop(self.start, False)
+        self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
+        orders = self.loop.orders
+        orders[erk.START], orders[erk.EVERY] = self.start, output.every or (self.end - self.start) / 1000
+        orders[erk.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
+        orders[erk.FIELD_COUNT] = output.fields
+        self.segment, self.fresh = 0, state.memory.size == 0
+        self.loop.now[:] = state.y
+        self.loop.memory[erk.T] = state.t
+        for at, value in ((rec.I_EXTREMES, None), (rec.I_ENVELOPE, None)):
+            array = model.tables[at]
+            array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
+        model.tables[rec.I_MARKS][:] = np.nan
+        if not self.fresh:
+            self.remember(state.memory)
+        self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
+        self.setup = time.perf_counter() - self.began
+
+    # memory -------------------------------------------------------------------------------------------------
+
+    def memory(self) -> np.ndarray:
+        """Everything that a resumed run needs beside t and y, flat."""
+        kept = [self.model.tables[at].ravel() for at in PERSISTENT]
+        return np.concatenate([[float(self.segment)], self.loop.memory, self.loop.ledger, *kept])
+
+    def remember(self, memory: np.ndarray) -> None:
+        at = 1 + erk.MEMORY
+        self.segment, self.loop.memory[:] = int(memory[0]), memory[1:at]
+        for array in (self.loop.ledger, *(self.model.tables[k] for k in PERSISTENT)):
+            array.ravel()[:] = memory[at : at + array.size]
+            at += array.size
+
+    def state(self) -> State:
+        return State(self.loop.t, self.loop.now.copy(), self.memory())
+
+    # rows and frames ----------------------------------------------------------------------------------------
+
+    def row(self, t: float, limit: float) -> np.ndarray:
+        """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
+        out = self.model.evaluate(t, self.loop.now, limit)[1]
+        self.loop.record(t, self.loop.now, out, self.model.tables, self.loop.values)
+        self.sink.rows(np.array([t]), self.loop.values[None, :].copy())
+        return out
+
+    def flush(self) -> None:
+        rows = self.loop.take_rows()
+        if len(rows):
+            self.sink.rows(rows[:, 0], rows[:, 1:])
+
+    def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
+        self.sink.field(t, self.model.frame(y, out))
+
+    def pass_outputs(self, t: float, out: np.ndarray) -> None:
+        """Count the rows and frames that are due at a jump or at the end, which are written apart."""
+        memory, orders = self.loop.memory, self.loop.orders
+        near = 1e-12 * max(abs(t), abs(self.end))
+        if orders[erk.EVERY] > 0:
+            while orders[erk.START] + memory[erk.NEXT_OUTPUT] * orders[erk.EVERY] <= t + near:
+                memory[erk.NEXT_OUTPUT] += 1
+        if orders[erk.FIELD_EVERY] > 0 and memory[erk.NEXT_FIELD] <= orders[erk.FIELD_COUNT]:
+            if orders[erk.START] + memory[erk.NEXT_FIELD] * orders[erk.FIELD_EVERY] <= t + near:
+                memory[erk.NEXT_FIELD] += 1
+                self.frame(t, self.loop.now, out)
+
+    # the run ------------------------------------------------------------------------------------------------
+
+    def go(self) -> Summary:
+        reason = "interrupted: resume with --resume"
+        try:
+            if self.fresh:
+                self.open()
+            reason = self.segments()
+        except KeyboardInterrupt:
+            self.loop.take_rows()
+            return self.close(reason, saved=False)
+        return self.close(reason)
+
+    def open(self) -> None:
+        out = self.row(self.start, self.start)
+        if self.loop.orders[erk.FIELD_EVERY] > 0:
+            self.frame(self.start, self.loop.now, out)
+        self.loop.memory[erk.NEXT_OUTPUT] = self.loop.memory[erk.NEXT_FIELD] = 1.0
+        self.begin_segment(self.starts_with_jump)
+
+    def begin_segment(self, jumped: bool) -> None:
+        end, jump = self.bounds[self.segment]
+        if jumped:
+            self.row(self.loop.t, end)
+        self.loop.begin(end, end if jump else NO_LIMIT)
+
+    def segments(self) -> str:
+        """Step through the remaining segments; returns why the run ended."""
+        if not self.fresh:
+            end, jump = self.bounds[self.segment]
+            self.loop.resume(end, end if jump else NO_LIMIT)
+        while True:
+            reason = self.steps()
+            if reason:
+                return reason
+            end, jump = self.bounds[self.segment]
+            if jump:
+                out = self.row(end, end)
+                self.pass_outputs(end, out)
+            if self.segment == len(self.bounds) - 1:
+                return "finished"
+            self.segment += 1
+            self.begin_segment(jump)
+
+    def steps(self) -> str:
+        """Step to the end of the segment; returns a reason where the run cannot go on."""
+        while True:
+            before = time.perf_counter()
+            code = self.loop.run(self.budget)
+            spent = time.perf_counter() - before
+            self.seconds += spent
+            self.flush()
+            if code == erk.FIELD:
+                count = self.loop.memory[erk.NEXT_FIELD] - 1
+                due = self.start + count * self.loop.orders[erk.FIELD_EVERY]
+                self.frame(due, self.loop.y_out, self.loop.out_row)
+            elif code == erk.CHUNK:
+                self.pause(spent)
+            elif code == erk.DONE:
+                return ""
+            elif code != erk.ROWS_FULL:
+                return self.failure(code)
+
+    def pause(self, spent: float) -> None:
+        """Between chunks: report, save, and aim at a tenth of a second for the next."""
+        factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
+        self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, 1e9))
+        if self.progress is not None:
+            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[erk.STEPS]))
+        if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
+            self.save()
+
+    def save(self) -> None:
+        self.sink.checkpoint(self.state(), {})
+        self.saved = time.perf_counter()
+
+    def failure(self, code: int) -> str:
+        """Where, when and what to try."""
+        model, loop = self.model, self.loop
+        place = ""
+        if code == erk.BAD_VALUE:
+            bad = np.flatnonzero(~np.isfinite(loop.now))
+            place = f" at {model.state_names[bad[0]]}" if bad.size else ""
+        elif code == erk.BAD_STATUS and loop.out[rec.WHERE] >= 0:
+            place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
+        when = f"t = {loop.t:.6g} s"
+        if code == erk.STOPPED:
+            return f"stopped: pressure below vapour pressure at {when}, as below_vapor asks"
+        if code in (erk.BAD_VALUE, erk.BAD_STATUS):
+            loop.step_back()
+        if code == erk.TINY_STEP:
+            return f"stopped: the step shrank to nothing at {when}; try a larger rtol, or courant in place of it"
+        if code == erk.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
+            return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
+        if code == erk.BAD_STATUS:
+            return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
+        return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve courant or step"
+
+    def close(self, reason: str, saved: bool = True) -> Summary:
+        model, loop = self.model, self.loop
+        if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
+            self.save()
+        memory = loop.memory
+        summary = Summary(
+            reason, reason == "finished", loop.t, find_marks(model),
+            {"mass": mass_ledger(model, loop.now, loop.ledger)}, find_extremes(model), find_envelope(model),
+            int(memory[erk.STEPS]), int(memory[erk.REJECTIONS]), int(memory[erk.CALLS]), model.cells, self.seconds,
+            self.setup,
+        )  # fmt: skip
+        self.sink.end(summary)
+        return summary

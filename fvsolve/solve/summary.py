@@ -1,0 +1,104 @@
+"""What a run amounts to: reason, marks, ledgers, extremes, envelopes, counts. Knows no files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.model import Model
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What the model carried on through, where and when first [s]; results from there on are not to be trusted."""
+
+    what: str
+    place: str
+    time: float
+    text: str
+
+
+@dataclass
+class Summary:
+    """How a run ended and what it found; SI, pressures absolute."""
+
+    reason: str
+    ok: bool
+    t: float
+    marks: list[Mark] = field(default_factory=list)
+    ledgers: dict[str, dict[str, Any]] = field(default_factory=dict)
+    extremes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    envelope: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    steps: int = 0
+    rejections: int = 0
+    rhs: int = 0
+    cells: int = 0
+    seconds: float = 0.0
+    seconds_setup: float = 0.0
+
+    @property
+    def cost(self) -> float:
+        """Stepping time per cell (or state, without cells) and step [ns]."""
+        return 1e9 * self.seconds / max(1, self.steps * max(1, self.cells))
+
+
+def find_marks(model: Model) -> list[Mark]:
+    """First time and place of everything the model cannot really follow."""
+    marks, pipes, nodes = model.tables[rec.I_MARKS], model.pipes, model.node_names
+    kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
+    kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
+    texts = {
+        "below vapor pressure": "pressure falls below vapour pressure; the liquid column would part",
+        "dry": "the tank is dry but outflow is asked for; it goes on at level 0",
+        "spilling": "the tank is full to its height and spills",
+    }
+    return [
+        Mark(what, place, float(time), f"{place.split('.', 1)[1]}: {texts[what]}")
+        for (what, place), time in zip(kinds, marks, strict=True)
+        if np.isfinite(time)
+    ]
+
+
+def find_extremes(model: Model) -> dict[str, tuple[float, float, float, float]]:
+    """Probe -> (least, its time, greatest, its time), over all accepted steps."""
+    table = model.tables[rec.I_EXTREMES]
+    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(model.probes)}
+
+
+def find_envelope(model: Model) -> dict[str, dict[str, np.ndarray]]:
+    """Pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with their times [s]."""
+    envelope, found = model.tables[rec.I_ENVELOPE], {}
+    for k, pipe in enumerate(model.pipes):
+        cells = model.tables[rec.I_PIPES][k]["cell"] + np.arange(pipe.cells)
+        least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))
+        found[pipe.name] = {
+            "distance": pipe.x, "elevation": pipe.elevation, "least_pressure": least, "t_least": envelope[1, cells],
+            "greatest_pressure": greatest, "t_greatest": envelope[3, cells],
+            "least_head": model.head(least, pipe.elevation), "greatest_head": model.head(greatest, pipe.elevation),
+        }  # fmt: skip
+    return found
+
+
+def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
+    """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the contents."""
+    nodes = model.tables[rec.I_NODES]
+    initial, change = model.contents(y)
+    spilled = sum(-x for x, row in zip(ledger, nodes, strict=True) if row["kind"] == rec.TANK and x < 0)
+    made_up = sum(x for x, row in zip(ledger, nodes, strict=True) if row["kind"] == rec.TANK and x > 0)
+    outside = [(name, float(x)) for name, x, row in zip(model.node_names, ledger, nodes, strict=True)
+               if row["kind"] in (rec.FIXED, rec.JUNCTION)]  # fmt: skip
+    remainder = change - float(np.sum(ledger))
+    return {
+        "initial": initial,
+        "final": initial + change,
+        "inflow": sum(x for _, x in outside if x > 0),
+        "outflow": sum(-x for _, x in outside if x < 0),
+        "spilled": float(spilled),
+        "made_up": float(made_up),
+        "by_node": {name: x for name, x in outside if x != 0.0},
+        "remainder": remainder,
+        "relative": abs(remainder) / initial if initial > 0 else 0.0,
+    }

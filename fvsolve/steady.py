@@ -1,0 +1,206 @@
+"""The state that does not move: pressures and flows of a network of resistances. Knows numbers, no parts.
+
+Potentials are P = p + rho g z [Pa], flows mass flows [kg/s]. Nodes hold a potential or balance their flows;
+an edge drops drop(M). All edges and nodes together are solved by Newton (Todini and Pilati 1988); a loop
+without friction takes the least-norm split.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+SMALL = 1e-9  # relative residual below which a node counts as balanced
+
+
+@dataclass
+class Edge:
+    """One link: alpha(M, drop), beta, gamma of its Newton row alpha dM - beta d(drop) = gamma.
+
+    row : function of the flow [kg/s] and the present potential drop [Pa]; None holds `flow` as it is
+    shut : no flow, but its potentials may have to be guessed through it
+    """
+
+    i: int
+    j: int
+    row: Callable[[float, float], tuple[float, float, float]] | None
+    flow: float = 0.0
+    shut: bool = False
+    drop: Callable[[float], float] | None = None  # pressure drop at a held flow
+
+
+@dataclass
+class Steady:
+    """Potentials [Pa] of nodes, flows [kg/s] of edges, what stays unbalanced, and whether loops were split."""
+
+    potential: np.ndarray
+    flow: np.ndarray
+    converged: bool
+    split: bool = False
+    no_solution: list[int] = field(default_factory=list)  # nodes that ask for flow nobody can bring
+
+
+def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, float]) -> Steady:
+    """Balance demands [kg/s] of nodes whose `held` potential is nan with the flows of edges.
+
+    held : float64[n], potential or nan; demand : float64[n]; scale : a typical pressure and mass flow.
+    """
+    parts, free_sets = _components(held, edges)
+    potential = np.where(np.isnan(held), np.nanmean(held) if np.any(~np.isnan(held)) else 0.0, held)
+    flow = np.array([edge.flow for edge in edges])
+    dropped, kept = _references(held, demand, edges, parts, free_sets)
+    floating = {i for group in free_sets if group not in kept.values() for i in group}
+    result = Steady(potential, flow, True)
+    result.no_solution = [
+        i for i in floating if abs(sum(demand[k] for k in _group_of(free_sets, i))) > SMALL * scale[1]
+    ]
+    active = [e for e, edge in enumerate(edges) if edge.row is not None and not edge.shut]
+    rows = active + [e for e in kept]
+    nodes = [i for i in range(held.size) if np.isnan(held[i])]
+    balances = [i for i in nodes if i not in dropped and i not in floating]
+    anchors = sorted({min(_group_of(free_sets, i)) for i in floating})
+    balances += [i for i in floating if i not in anchors]
+    _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors)
+    _through_shut(result, held, edges, free_sets, floating)
+    return result
+
+
+def _group_of(groups, i):
+    return next(group for group in groups if i in group)
+
+
+def _components(held, edges):
+    """Sets of nodes joined by edges that find their own flow, and those sets without a held potential."""
+    label = list(range(held.size))
+
+    def root(i):
+        while label[i] != i:
+            i = label[i]
+        return i
+
+    for edge in edges:
+        if edge.row is not None and not edge.shut:
+            label[root(edge.i)] = root(edge.j)
+    groups: dict[int, set[int]] = {}
+    for i in range(held.size):
+        groups.setdefault(root(i), set()).add(i)
+    parts = [frozenset(group) for group in groups.values()]
+    return parts, [group for group in parts if all(np.isnan(held[i]) for i in group)]
+
+
+def _references(held, demand, edges, parts, free_sets):
+    """For sets that only held flows reach: nodes whose balance is given up, and the edge that sets the level."""
+    dropped: set[int] = set()
+    kept: dict[int, frozenset[int]] = {}
+    known = {i for group in parts if group not in free_sets for i in group}
+    waiting = list(free_sets)
+    while waiting:
+        for group in waiting:
+            entry = next((e for e, edge in enumerate(edges) if edge.row is None and edge.drop is not None and
+                          ((edge.i in group and edge.j in known) or (edge.j in group and edge.i in known))), None)  # fmt: skip
+            if entry is not None:
+                kept[entry] = group
+                dropped.add(_dead_end(group, demand, edges))
+                known |= group
+                waiting.remove(group)
+                break
+        else:
+            break
+    return dropped, kept
+
+
+def _dead_end(group, demand, edges):
+    """The node of a set that is most like a shut end: fewest links, no demand."""
+    count = {i: sum(i in (edge.i, edge.j) for edge in edges) for i in group}
+    return min(sorted(group), key=lambda i: (demand[i] != 0.0, count[i]))
+
+
+def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors):
+    at_node = {i: k for k, i in enumerate(nodes)}
+    at_edge = {e: k for k, e in enumerate(active)}
+    n, m = len(nodes), len(active)
+    if n + m == 0:
+        return
+    p_scale, f_scale = scale
+    for sweep in range(200):
+        matrix = np.zeros((len(rows) + len(balances) + len(anchors), m + n))
+        right = np.zeros(matrix.shape[0])
+        for k, e in enumerate(rows):
+            edge = edges[e]
+            drop = result.potential[edge.i] - result.potential[edge.j]
+            if e in at_edge:
+                alpha, beta, gamma = edge.row(result.flow[e], drop)
+                matrix[k, at_edge[e]] = alpha * f_scale / p_scale
+            else:
+                alpha, beta, gamma = 0.0, 1.0, drop - edge.drop(result.flow[e])
+            for node, sign in ((edge.i, -1.0), (edge.j, 1.0)):
+                if node in at_node:
+                    matrix[k, m + at_node[node]] += sign * beta
+            right[k] = gamma / p_scale
+        for k, i in enumerate(balances, start=len(rows)):
+            net = -demand[i]
+            for e, edge in enumerate(edges):
+                sign = (edge.j == i) - (edge.i == i)
+                if sign and not edge.shut:
+                    net += sign * result.flow[e]
+                    if e in at_edge:
+                        matrix[k, at_edge[e]] += sign
+            right[k] = -net / f_scale
+        for k, i in enumerate(anchors, start=len(rows) + len(balances)):
+            matrix[k, m + at_node[i]] = 1.0
+        change = _solve(matrix, right, result)
+        result.flow[active] += change[:m] * f_scale
+        result.potential[nodes] += change[m:] * p_scale
+        if np.max(np.abs(change), initial=0.0) <= 1e-15 * (
+            1.0 + max(np.max(np.abs(result.flow), initial=0.0) / f_scale, 0.0)
+        ):
+            return
+        if sweep > 20 and np.max(np.abs(change)) < 1e-12:
+            return
+    result.converged = bool(np.max(np.abs(change)) < 1e-9)
+
+
+def _solve(matrix, right, result):
+    """Least-norm solution of the Newton system; remembers whether it had to choose."""
+    if matrix.shape[0] == matrix.shape[1]:
+        try:
+            if matrix.shape[0] > 400:
+                from scipy.sparse import csc_matrix
+                from scipy.sparse.linalg import spsolve
+
+                found = spsolve(csc_matrix(matrix), right)
+            else:
+                found = np.linalg.solve(matrix, right)
+            if np.all(np.isfinite(found)) and np.max(np.abs(matrix @ found - right)) < 1e-6:
+                return found
+        except np.linalg.LinAlgError:
+            pass
+    found, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
+    result.split = result.split or rank < matrix.shape[1]
+    return found
+
+
+def _through_shut(result, held, edges, free_sets, floating):
+    """Potentials of sets that only shut links reach: the limit of equal small leaks, sum sqrt|dP| sign = 0."""
+    groups = [group for group in free_sets if group & floating]
+    for _ in range(60):
+        moved = 0.0
+        for group in groups:
+            around = [result.potential[edge.j if edge.i in group else edge.i] for edge in edges
+                      if edge.shut and ((edge.i in group) != (edge.j in group))]  # fmt: skip
+            if not around:
+                continue
+            low, high = min(around), max(around)
+            for _ in range(200):
+                middle = 0.5 * (low + high)
+                total = sum(np.sign(p - middle) * np.sqrt(abs(p - middle)) for p in around)
+                low, high = (middle, high) if total > 0 else (low, middle)
+            first = min(group)
+            shift = 0.5 * (low + high) - result.potential[first]
+            for i in group:
+                result.potential[i] += shift
+            moved = max(moved, abs(shift))
+        if moved <= 1e-9:
+            return

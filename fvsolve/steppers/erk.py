@@ -1,0 +1,354 @@
+"""Explicit Runge-Kutta steps with dense output, step control and event location. Knows no physics.
+
+One compiled loop serves every method (Butcher arrays are data) and every model (functions of declared type).
+"""
+
+import functools
+from math import isfinite, sqrt
+
+from fvsolve.jit import njit
+
+# What the loop remembers, in one flat array of floats that a restart stores.
+T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST = range(11)
+MEMORY = 11
+# What a call is told.
+START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT = range(10)
+ORDERS = 10
+COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
+# Why a call came back.
+DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED = range(8)
+# What passes between calls while rows are still to be written: phase, whether a step lies behind, buffers.
+PHASE, BEHIND, NOW, OLD, ROWS = range(5)
+FRESH, EMIT, READY = 0, 1, 2
+
+EVENT_TOLERANCE = 1e-13
+RATE, STATUS, WHERE = 0, 1, 2  # the entries of `out` that the loop reads
+STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
+
+
+@functools.cache
+def function_types():
+    """Numba types of (rhs, observe, record, events): declared, so that the loop is cached."""
+    from numba import types
+
+    from fvsolve.kernels.records import tables_type
+
+    f, v, tables = types.float64, types.float64[::1], tables_type()
+    rhs = types.FunctionType(types.void(f, v, v, v, tables))
+    observe = types.FunctionType(types.void(f, v, v, tables, v))
+    events = types.FunctionType(types.void(f, v, tables, v))
+    return rhs, observe, observe, events
+
+
+@njit
+def combine(y, h, weights, count, k, out):
+    """out = y + h sum of weights[j] k[j] over j < count; up to three terms a pass."""
+    terms, c, which = 0, (0.0, 0.0, 0.0), (0, 0, 0)
+    first = True
+    for j in range(count):
+        if weights[j] != 0.0:
+            if terms == 0:
+                c, which = (h * weights[j], 0.0, 0.0), (j, 0, 0)
+            elif terms == 1:
+                c, which = (c[0], h * weights[j], 0.0), (which[0], j, 0)
+            else:
+                c, which = (c[0], c[1], h * weights[j]), (which[0], which[1], j)
+            terms += 1
+            if terms == 3:
+                add(y if first else out, c, which, terms, k, out)
+                first, terms = False, 0
+    if terms > 0:
+        add(y if first else out, c, which, terms, k, out)
+    elif first:
+        out[:] = y
+
+
+@njit
+def add(y, c, which, terms, k, out):
+    """out = y + c0 k0 (+ c1 k1 (+ c2 k2))."""
+    k0, k1, k2 = k[which[0]], k[which[1]], k[which[2]]
+    c0, c1, c2 = c
+    if terms == 1:
+        for i in range(out.size):
+            out[i] = y[i] + c0 * k0[i]
+    elif terms == 2:
+        for i in range(out.size):
+            out[i] = y[i] + (c0 * k0[i] + c1 * k1[i])
+    else:
+        for i in range(out.size):
+            out[i] = y[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
+
+
+@njit
+def stages(rhs, tables, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new):
+    """Stages 2 .. s from k[0], then y_new; supply[i] keeps the ledger rates of stage i."""
+    s = b.size
+    for i in range(1, s):
+        target = y_new if last_is_new and i == s - 1 else y_stage
+        combine(y, h, a[i], i, k, target)
+        rhs(t + c[i] * h, target, k[i], out, tables)
+        for m in range(supply.shape[1]):
+            supply[i, m] = out[where + m]
+    if not last_is_new:
+        combine(y, h, b, s, k, y_new)
+
+
+@njit
+def error_norm(h, error, k, y, y_new, scale, tolerance):
+    """Root mean square of h sum e_j k_j over tolerance (scale + max(|y|, |y_new|))."""
+    total = 0.0
+    for i in range(y.size):
+        e = 0.0
+        for j in range(error.size):
+            e += error[j] * k[j, i]
+        w = h * e / (tolerance * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        total += w * w
+    return sqrt(total / max(y.size, 1))
+
+
+@njit
+def first_step(k, scale, order, tolerance, span):
+    """A cautious first step from the size of the rates [s]."""
+    total = 0.0
+    for i in range(scale.size):
+        total += (k[0, i] / scale[i]) ** 2
+    d = sqrt(total / max(scale.size, 1))
+    return min(span, 0.05 * tolerance ** (1.0 / (order + 1.0)) / d) if d > 0.0 else 1e-3 * span
+
+
+@njit
+def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
+    """Dense output at t + theta h: the method's own polynomial, else the cubic through both ends."""
+    if dense.shape[0] > 0:
+        out[:] = y
+        for j in range(dense.shape[0]):
+            w, power = 0.0, theta
+            for m in range(dense.shape[1]):
+                w += dense[j, m] * power
+                power *= theta
+            kj = f if j == 0 else k[j]
+            if w != 0.0:
+                for i in range(y.size):
+                    out[i] += h * w * kj[i]
+        return
+    s, r = theta, 1.0 - theta
+    h00, h01 = r * r * (1.0 + 2.0 * s), s * s * (1.0 + 2.0 * r)
+    h10, h11 = h * s * r * r, -h * s * s * r
+    for i in range(y.size):
+        out[i] = h00 * y[i] + h01 * y_new[i] + (h10 * f[i] + h11 * f_new[i])
+
+
+@njit
+def all_finite(y):
+    """False where any value is not finite: one sum tells."""
+    total = 0.0
+    for i in range(y.size):
+        total += y[i] * 0.0
+    return total == 0.0
+
+
+@njit
+def fallen(g, g_new):
+    """Whether an event function went from above to zero or below."""
+    for i in range(g.size):
+        if g[i] > 0.0 and g_new[i] <= 0.0:
+            return True
+    return False
+
+
+@njit
+def nearness(g, g_new):
+    """Least share of its value that an event function has kept over the step: 1 at its start, 0 at an event."""
+    share = 1.0
+    for i in range(g.size):
+        if g[i] > 0.0:
+            share = min(share, g_new[i] / g[i])
+    return share
+
+
+@njit
+def locate(rhs, events, tables, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new, g, g_new):
+    """The step that ends just past the first event, by the Illinois rule on its length; y_new belongs to it."""
+    low, high, at_low, at_high = 0.0, h, 1.0, nearness(g, g_new)
+    for _ in range(100):
+        if at_high >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high):
+            break
+        guess = high - at_high * (high - low) / (at_high - at_low)
+        guess += 1e-3 * EVENT_TOLERANCE * h
+        if not low < guess < high:
+            guess = 0.5 * (low + high)
+        stages(rhs, tables, a, b, c, last_is_new, t, guess, y, k, supply, where, out, y_stage, y_new)
+        events(t + guess, y_new, tables, g_new)
+        here = nearness(g, g_new)
+        if here <= 0.0:
+            high, at_high, at_low = guess, here, 0.5 * at_low
+        else:
+            low, at_low, at_high = guess, here, 0.5 * at_high
+    stages(rhs, tables, a, b, c, last_is_new, t, high, y, k, supply, where, out, y_stage, y_new)
+    events(t + high, y_new, tables, g_new)
+    return high
+
+
+@njit
+def next_step(orders, memory, out_rate, k, scale, order):
+    """Length of the step to try, before the end of the segment is looked at [s]."""
+    if orders[CONTROL] == TOLERANCE:
+        if memory[STEP] <= 0.0:
+            memory[STEP] = first_step(k, scale, order, orders[SIZE], orders[END] - memory[T])
+        return min(memory[STEP], orders[STEP_MAX])
+    h = orders[SIZE]
+    if orders[CONTROL] == COURANT:
+        h = min(orders[SIZE] / out_rate, orders[STEP_MAX]) if out_rate > 0.0 else orders[STEP_MAX]
+    if h != memory[STEP]:
+        memory[STEP], memory[T_MARK], memory[N_MARK] = h, memory[T], 0.0
+    return h
+
+
+@njit
+def output_due(orders, memory, count_at, every, limit):
+    """Time of the next row or field: START + count * every, or infinity."""
+    if every <= 0.0 or memory[count_at] > limit:
+        return 1e308
+    return orders[START] + memory[count_at] * every
+
+
+@njit
+def emit(rhs, observe, tables, orders, memory, flags, t_old, y_old, f_old, y, k, dense, rates, out, y_out, rows):
+    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
+    t, h = memory[T], memory[T] - t_old
+    while True:
+        row = output_due(orders, memory, NEXT_OUTPUT, orders[EVERY], 1e300)
+        field = output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT])
+        due = min(row, field)
+        if due > t or (due >= orders[STOP_AT]):
+            return DONE
+        if row <= due and flags[ROWS] == rows.shape[0]:
+            return ROWS_FULL
+        interpolate((due - t_old) / h, h, y_old, f_old, y, k[0], k, dense, y_out)
+        rhs(due, y_out, rates, out, tables)
+        if row <= due:
+            rows[flags[ROWS], 0] = due
+            observe(due, y_out, out, tables, rows[flags[ROWS], 1:])
+            flags[ROWS] += 1
+            memory[NEXT_OUTPUT] += 1.0
+        if field <= due:
+            memory[NEXT_FIELD] += 1.0
+            return FIELD
+
+
+@njit
+def run_erk(
+    rhs, observe, record, events, tables,
+    a, b, c, error, dense, order, last_is_new,
+    orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, y_out,
+    rates, rows,
+):  # fmt: skip
+    """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
+
+    y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
+    ledger : float64[m] advanced with the step's own weights from out[where:]; rows : float64[cap, 1 + probes].
+    """
+    s, reuse = b.size, False
+    for _ in range(1 << 62):
+        now, old = flags[NOW], flags[OLD]
+        new = 3 - now - old
+        if flags[PHASE] == FRESH:
+            if reuse:
+                k[0, :] = k[s - 1]
+            else:
+                rhs(memory[T], y[now], k[0], out, tables)
+                memory[CALLS] += 1.0
+            reuse = False
+            flags[PHASE] = EMIT
+            record(memory[T], y[now], out, tables, values)
+            events(memory[T], y[now], tables, g)
+            if not all_finite(y[now]) or not isfinite(out[RATE]):
+                return BAD_VALUE
+            if out[STATUS] != 0.0:
+                return BAD_STATUS
+            for m in range(ledger.size):
+                supply[0, m] = out[where + m]
+        if flags[PHASE] == EMIT:
+            if flags[BEHIND] == 1:
+                why = emit(
+                    rhs, observe, tables, orders, memory, flags, memory[T] - memory[LAST], y[old], f_old, y[now],
+                    k, dense, rates, out_row, y_out, rows,
+                )  # fmt: skip
+                if why != DONE:
+                    return why
+            flags[PHASE] = READY
+        if memory[T] >= orders[END]:
+            return DONE
+        if out[WHERE] == STOP_HERE:
+            return STOPPED
+        if orders[BUDGET] <= 0.0:
+            return CHUNK
+        h = next_step(orders, memory, out[RATE], k, scale, order)
+        while True:
+            rest = orders[END] - memory[T]
+            last = h >= rest * (1.0 - 1e-9)
+            if last:
+                h = rest
+            if not h > 4e-16 * max(abs(memory[T]), abs(orders[END])) and not last:
+                return TINY_STEP
+            stages(rhs, tables, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new])
+            memory[CALLS] += s - 1.0
+            if orders[CONTROL] != TOLERANCE:
+                break
+            e = error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])
+            if e <= 1.0:
+                grow = 0.9 * max(e, 1e-10) ** (-0.7 / order) * max(memory[ERROR_OLD], 1e-4) ** (0.4 / order)
+                if not last or grow < 1.0:
+                    memory[STEP] = h * min(5.0, max(0.2, grow))
+                memory[ERROR_OLD] = e
+                break
+            memory[REJECTIONS] += 1.0
+            h *= max(0.1, 0.9 * e ** (-1.0 / order)) if e == e else 0.1
+            memory[STEP] = h
+        events(memory[T] + h, y[new], tables, g_new)
+        if fallen(g, g_new):
+            h = locate(
+                rhs, events, tables, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new],
+                g, g_new,
+            )  # fmt: skip
+            last = last and memory[T] + h >= orders[END]
+            if orders[CONTROL] != TOLERANCE:
+                memory[STEP] = 0.0
+        for m in range(ledger.size):
+            total = 0.0
+            for i in range(s):
+                total += b[i] * supply[i, m]
+            ledger[m] += h * total
+        t_old = memory[T]
+        memory[N_MARK] += 1.0
+        if last:
+            memory[T] = orders[END]
+        elif orders[CONTROL] != TOLERANCE and h == memory[STEP]:
+            memory[T] = memory[T_MARK] + memory[N_MARK] * h
+        else:
+            memory[T] = t_old + h
+        memory[LAST] = memory[T] - t_old
+        memory[STEPS] += 1.0
+        orders[BUDGET] -= 1.0
+        f_old[:] = k[0]
+        reuse = last_is_new and orders[CONTROL] == TOLERANCE and not last
+        flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, FRESH
+    return DONE
+
+
+@functools.cache
+def compiled():
+    """The loop compiled against its declared types (cached on disk), or plain where JIT is off."""
+    if not hasattr(run_erk, "compile"):
+        return run_erk
+    from numba import types
+
+    from fvsolve.kernels.records import tables_type
+
+    f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
+    run_erk.compile(
+        (*function_types(), tables_type(), w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
+         i, v, v, v, v, v, v, v, v, v, w)
+    )  # fmt: skip
+    run_erk.disable_compile()
+    return run_erk

@@ -1,0 +1,157 @@
+"""Texts with units to SI numbers and back. Knows spellings and dimensions; knows no case and no physics.
+
+A bare number is SI. Text is a number and a unit, `"304.8 mm"`. Spellings outside `UNITS` are left to pint.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from typing import Any
+
+from fvsolve.units.outside import ask_pint
+from fvsolve.units.spellings import DIMENSIONS, MEANT, UNITS, Dimension, Unit
+
+__all__ = [
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "parse", "show", "vacuum",
+    "wanted",
+]  # fmt: skip
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+
+
+def parse(given: Any, dimension: str) -> Any:
+    """The SI value of a bare number or of text with a unit; for a pressure the pair (value, gauge).
+
+    A kinematic viscosity where a viscosity is wanted comes back as `Kinematic` [m2/s].
+    Raises ValueError with what was found, what was wanted and what was probably meant.
+    """
+    if isinstance(given, str):
+        value, unit = _parse_text(given, dimension)
+    else:
+        value, unit = _parse_number(given, dimension), None
+    if not math.isfinite(value):
+        raise ValueError(f"{show(given)} is not finite; {wanted(dimension)}")
+    if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
+        return value, unit is not None and unit.gauge
+    if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":
+        return Kinematic(value)
+    return value
+
+
+class Kinematic(float):
+    """A viscosity stated as kinematic [m2/s], still to be multiplied by a density."""
+
+
+def find(spelling: str, dimension: str, number: str = "") -> Unit:
+    """The unit of that spelling, if it measures `dimension`; ValueError says what was probably meant."""
+    base = DIMENSIONS[dimension].base or dimension
+    unit = UNITS.get(_plain(spelling))
+    if unit is None:
+        folded = _plain(spelling).casefold().replace(" ", "")
+        for other in _spellings(dimension):
+            if other.casefold().replace(" ", "") == folded:
+                raise ValueError(
+                    f"no unit {show(spelling)}; did you mean {show((number + ' ' + other).strip())}?"
+                )
+        unit = ask_pint(spelling) if _plain(spelling) not in MEANT else None
+    text = show(f"{number} {spelling}".strip())
+    meant = MEANT.get(_plain(spelling), "")
+    if unit is None:
+        if not meant or UNITS[meant].dimension != base:
+            close = difflib.get_close_matches(_plain(spelling), _spellings(dimension), n=1)
+            meant = close[0] if close else ""
+        hint = f"did you mean {show((number + ' ' + meant).strip())}?" if meant else wanted(dimension)
+        raise ValueError(f"{text}: no unit {show(spelling)}; {hint}")
+    if unit.dimension != base and not (dimension == "viscosity" and unit.dimension == "kinematic viscosity"):
+        hint = wanted(dimension)
+        if meant and UNITS[meant].dimension == base:
+            hint = (
+                f"wanted {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + meant).strip())}?"
+            )
+        words = DIMENSIONS[unit.dimension].words if unit.dimension in DIMENSIONS else f"a {unit.dimension}"
+        raise ValueError(f"{text} is {words}; {hint}")
+    if unit.gauge and not DIMENSIONS[dimension].gauge:
+        raise ValueError(f"{text} is a gauge pressure; {wanted(dimension)}")
+    return unit
+
+
+def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0) -> str:
+    """What to say of a given pressure that comes to `pressure` [Pa] absolute, too little for a liquid."""
+    below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
+    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+    number, spelling = match.groups() if match else (str(given), "Pa")
+    if spelling in UNITS and UNITS[spelling].gauge:
+        return f"{show(given)} is {pressure:.4g} Pa absolute, {below}"
+    hint = f"; did you mean {show(f'{number} {spelling}g')}?" if f"{spelling}g" in UNITS else ""
+    return f"{show(given)} is absolute, {below}{hint}"
+
+
+def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0) -> Any:
+    """An SI value or array in `unit`; an absolute pressure in a gauge unit counts from `ambient` [Pa]."""
+    found = find(unit, dimension)
+    if found.gauge and dimension == "pressure":
+        value_si = value_si - ambient
+    return found.number(value_si)
+
+
+def wanted(dimension: str) -> str:
+    """'wanted a length, for example "300 mm"'."""
+    words, example = DIMENSIONS[dimension].words, DIMENSIONS[dimension].example
+    return f"wanted {words}, for example {example if dimension == 'number' else show(example)}"
+
+
+def show(given: Any) -> str:
+    """A value of a case file as the file would write it, cut where it is long."""
+    if isinstance(given, bool):
+        return str(given).lower()
+    text = f'"{given}"' if isinstance(given, str) else repr(given)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _parse_number(given: Any, dimension: str) -> float:
+    if isinstance(given, bool) or not isinstance(given, (int, float)):
+        kind = {bool: "true or false", dict: "a table", list: "a list"}.get(
+            type(given), f"a {type(given).__name__}"
+        )
+        raise ValueError(f"{show(given)} is {kind}; {wanted(dimension)}")
+    try:
+        return float(given)
+    except OverflowError:
+        return math.inf
+
+
+def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
+    match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
+    if match is None:
+        raise ValueError(f"{show(text)} is no number with a unit; {wanted(dimension)}")
+    number, spelling = match.groups()
+    if not spelling:
+        if dimension != "number":
+            si = DIMENSIONS[dimension].si
+            raise ValueError(
+                f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?'
+            )
+        return float(number), None
+    if re.match(r",\d", spelling):
+        raise ValueError(f"{show(text)} has a decimal comma; did you mean {show(text.replace(',', '.', 1))}?")
+    unit = find(spelling, dimension, number)
+    return unit.read(number), unit
+
+
+def _spellings(dimension: str) -> list[str]:
+    base = DIMENSIONS[dimension].base or dimension
+    names = [name for name, unit in UNITS.items() if unit.dimension == base]
+    return [name for name in names if DIMENSIONS[dimension].gauge or not UNITS[name].gauge]
+
+
+def _plain(spelling: str) -> str:
+    """The spelling as the table has it: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
+    text = spelling.strip().replace("**", "").replace("^", "")
+    for old, new in (("²", "2"), ("³", "3"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")):
+        text = text.replace(old, new)
+    text = re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", " ", text)
+    gauge = re.fullmatch(r"([A-Za-z0-9]+) ?\(([ag])\)", text)
+    text = gauge[1] + gauge[2] if gauge else text
+    return re.sub(r"\s+", " ", re.sub(r"\s*/\s*", "/", text))

@@ -1,0 +1,34 @@
+"""Units outside the table. The only door to pint, which is imported when the first of them is met."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from fvsolve.units.spellings import DIMENSIONS, Unit
+
+_ASKABLE = re.compile(
+    r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}"
+)
+
+
+def ask_pint(spelling: str) -> Unit | None:
+    """A unit outside the table, by pint; None where pint does not know it either."""
+    if not _ASKABLE.fullmatch(spelling):  # pint would compute 9**9**9
+        return None
+    import pint
+
+    registry = pint.get_application_registry()
+    try:
+        one = registry.Quantity(1.0, registry.parse_units(spelling)).to_base_units()
+        zero = registry.Quantity(0.0, registry.parse_units(spelling)).to_base_units()
+    except Exception:  # pint raises errors of many families; whichever, it does not know the spelling
+        return None
+    factor = float(one.magnitude - zero.magnitude)
+    if not (math.isfinite(factor) and factor > 0):
+        return None
+    for name, dimension in DIMENSIONS.items():
+        si = dimension.si.replace("-", "").replace("m2", "m**2").replace("m3", "m**3").replace("s2", "s**2")
+        if not dimension.base and registry.Quantity(1.0, si.replace(" ", "*")).check(one.dimensionality):
+            return Unit(name, factor, offset=float(zero.magnitude) / factor)
+    return Unit(f"quantity of [{one.units:~P}]", factor)

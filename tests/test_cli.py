@@ -1,0 +1,246 @@
+"""The command line: tables for people, JSON for programs, messages and exit codes, never a traceback."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import fvsolve
+from fvsolve.cli import main
+
+CASE = """
+title = "A valve shuts"
+[fluid]
+name = "user"
+density = 1000.0
+bulk_modulus = 2.2e9
+viscosity = 1e-3
+vapor_pressure = 2300.0
+[nodes.lake]
+type = "reservoir"
+head = 50.0
+[nodes.gate]
+type = "junction"
+[nodes.air]
+type = "reservoir"
+pressure = "0 barg"
+[links.main]
+type = "pipe"
+from = "lake"
+to = "gate"
+length = "600 m"
+diameter = "300 mm"
+wave_speed = 1200.0
+cells = 20
+[links.valve]
+type = "valve"
+from = "gate"
+to = "air"
+area = 0.002
+opening = { time = [0.1, 0.2], value = [1.0, 0.0] }
+[numerics]
+end = 2.0
+scheme = "muscl"
+method = "ssp-rk2"
+courant = 0.8
+[output]
+every = 0.01
+fields = 4
+probes = ["gate.pressure", "valve.flow"]
+[expect]
+"min(valve.flow)" = { value = 0.0, atol = 1e-9 }
+"""
+
+
+@pytest.fixture
+def case(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "shut.toml").write_text(CASE)
+    return "shut.toml"
+
+
+@pytest.fixture
+def fvs(monkeypatch, capsys):
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["fvsolve", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err + said.out
+        return left.value.code or 0, said.out, said.err
+
+    return call
+
+
+def test_run_tells_the_extremes_the_claims_and_the_files(case, fvs):
+    code, out, err = fvs("run", case)
+    assert code == 0 and err == ""
+    assert "A valve shuts" in out and "gate.pressure" in out and "holds: min(valve.flow)" in out
+    assert "mass ledger" in out and "finished at t = 2 s" in out
+    assert "runs/shut" in out.replace("\\", "/") and "history.csv" in out
+    assert fvsolve.open_run("runs/shut").ok
+
+
+def test_json_is_one_object_with_unrounded_numbers(case, fvs):
+    code, out, err = fvs("run", case, "--json", "--out", "there")
+    said = json.loads(out)
+    assert code == 0 and err == ""
+    assert said["reason"] == "finished" and Path(said["directory"]) == Path("there")
+    assert (
+        said["extremes"]["gate.pressure"]["greatest"]
+        == fvsolve.open_run("there").extremes["gate.pressure"][2]
+    )
+
+
+def test_several_cases_go_to_directories_of_their_own(case, fvs):
+    Path("other.toml").write_text(CASE)
+    code, out, _ = fvs("run", case, "other.toml", "--out", "both", "--json")
+    assert code == 0 and len(json.loads(out)["runs"]) == 2
+    assert {path.name for path in Path("both").iterdir()} == {"shut", "other"}
+
+
+def test_set_overrides_any_key(case, fvs):
+    settings = ["links.main.cells=7", "links.main.length=500 m", 'links.main.friction={ model = "none" }']
+    code, out, _ = fvs("run", case, "--json", *(f"--set={one}" for one in settings))
+    assert code == 0 and json.loads(out)["cells"] == 7
+    written = fvsolve.load("runs/shut/case.toml")
+    assert written.links["main"].length == 500.0 and written.links["main"].friction.model == "none"
+
+
+def test_set_without_a_value_says_what_was_wanted(case, fvs):
+    code, out, err = fvs("run", case, "--set", "links.main.cells")
+    assert code == 2 and out == "" and "wanted KEY=VALUE" in err
+
+
+def test_a_bad_case_is_a_message_and_exit_code_2(case, fvs):
+    Path(case).write_text(CASE.replace("opening", "openning").replace('"300 mm"', '"300 kg"'))
+    code, out, err = fvs("run", case)
+    assert code == 2 and out == ""
+    assert "shut.toml: 2 faults" in err and 'did you mean "opening"' in err
+    assert not Path("runs").exists()
+
+
+def test_an_earlier_run_is_in_the_way(case, fvs):
+    assert fvs("run", case)[0] == 0
+    code, _, err = fvs("run", case)
+    assert code == 2 and "--force" in err
+    assert fvs("run", case, "--force")[0] == 0
+    assert fvs("run", case, "--resume")[0] == 0  # came to its end: nothing to do
+
+
+def test_a_claim_that_fails_is_exit_code_1(case, fvs):
+    code, out, _ = fvs("run", case, "--set", 'expect={ "max(valve.flow)" = { value = 1.0, rtol = 1e-3 } }')
+    assert code == 1 and "FAILS: max(valve.flow)" in out
+
+
+def test_a_run_that_stops_early_is_exit_code_1(case, fvs):
+    code, out, _ = fvs("run", case, "--set", "numerics.courant=5", "--set", "numerics.end=60")
+    assert code == 1 and "stopped" in out
+
+
+def test_a_missing_file_is_named_and_a_near_case_suggested(case, fvs):
+    code, _, err = fvs("run", "nowhere.toml")
+    assert code == 2 and "nowhere.toml" in err
+    name = json.loads(fvs("list", "--json")[1]).popitem()[0]
+    code, _, err = fvs("run", name[:-1])
+    assert code == 2 and f'did you mean "{name}"' in err
+
+
+def test_check_says_what_was_understood(case, fvs):
+    code, out, _ = fvs("check", case)
+    assert code == 0
+    assert all(word in out for word in ("main", "1200", "lake", "gate", "Reynolds", "step"))
+    said = json.loads(fvs("check", case, "--json")[1])
+    assert said["pipes"]["main"]["cells"] == 20
+    assert not Path("runs").exists()
+
+
+def test_list_names_every_shipped_case_with_its_title(fvs):
+    titles = json.loads(fvs("list", "--json")[1])
+    code, out, _ = fvs("list")
+    assert code == 0 and titles
+    assert all(name in out and title for name, title in titles.items())
+
+
+def test_new_copies_a_case_that_runs_and_never_overwrites(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in json.loads(fvs("list", "--json")[1]):
+        code, out, _ = fvs("new", name)
+        assert code == 0 and out.splitlines()[0] == f"{name}.toml"
+        assert fvsolve.load(tmp_path / f"{name}.toml").title
+    code, _, err = fvs("new", name)
+    assert code == 2 and "exists" in err
+
+
+def test_schema_is_json(fvs):
+    code, out, _ = fvs("schema")
+    assert code == 0 and json.loads(out)["properties"]["nodes"]
+
+
+def test_compare_gives_differences_per_shared_probe(case, fvs):
+    fvs("run", case, "--out", "a")
+    fvs("run", case, "--out", "b", "--set", "links.main.cells=40")
+    code, out, _ = fvs("compare", "a", "b", "--json")
+    one = json.loads(out)["probes"]["gate.pressure"]
+    a, b = (fvsolve.open_run(name)["gate.pressure"] for name in "ab")
+    assert code == 0 and abs(one["greatest"]) == max(abs(b - a)) > 0.0
+    code, out, _ = fvs("compare", "a", "a")
+    assert code == 0 and "gate.pressure" in out
+
+
+def test_view_draws_a_frame(case, fvs):
+    fvs("run", case)
+    code, out, err = fvs("view", "runs/shut", "--time", "1 s", "--field", "head")
+    if "OpenGL" in err:
+        pytest.skip(err)
+    assert code == 0 and Path(out.strip()).read_bytes().startswith(b"\x89PNG")
+    code, _, err = fvs("view", "runs/shut", "--field", "presure")
+    assert code == 2 and 'did you mean "pressure"' in err
+
+
+def test_a_warm_run_imports_neither_coolprop_pyvista_pint_nor_scipy(case):
+    code = (
+        "import sys; from fvsolve.cli import main\n"
+        "sys.argv = ['fvsolve', 'run', 'shut.toml', '--force']\n"
+        "try: main()\n"
+        "except SystemExit as left: assert not left.code\n"
+        "print(*[m for m in ('CoolProp', 'pyvista', 'vtk', 'pint', 'scipy', 'pandas', 'matplotlib.pyplot')"
+        " if m in sys.modules], file=sys.stderr)"
+    )
+    Path("warm.py").write_text(code)
+    done = subprocess.run([sys.executable, "warm.py"], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
+def test_ctrl_c_ends_a_run_cleanly_and_resume_goes_on(case):
+    command = [sys.executable, "-m", "fvsolve", "run", case, "--set", "output.fields=0", "--set"]
+    running = subprocess.Popen(
+        [*command, "numerics.end=5000"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    wait_for(Path("runs/shut/restart.npz"), running)
+    running.send_signal(signal.SIGINT)
+    out, err = (text.decode() for text in running.communicate(timeout=30))
+    assert running.returncode == 130, err
+    assert "interrupted" in out and "--resume" in out and "Traceback" not in err
+    stopped = fvsolve.open_run("runs/shut")
+    assert not stopped.ok and 0.0 < stopped.t[-1] < 5000.0
+    end = f"numerics.end={stopped.t[-1] + 1.0}"
+    assert subprocess.run([*command, end, "--resume"], capture_output=True).returncode == 0
+    assert fvsolve.open_run("runs/shut").ok
+
+
+def wait_for(path: Path, running: subprocess.Popen) -> None:
+    """Until a file is there; fails where the process has ended before."""
+    for _ in range(3000):
+        if path.exists():
+            return
+        assert running.poll() is None, running.communicate()
+        time.sleep(0.01)
+    raise AssertionError(f"{path} was never written")

@@ -1,0 +1,302 @@
+"""Pipes that meet: series, branches, dead ends, lengths that share no step; and no mode that grows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from truth import rays, scenes
+from truth.bumps import gaussian_averages, scattered
+from truth.orders import mean_error, observed_order
+from truth.scenes import (
+    AMBIENT,
+    RHO,
+    SHARP,
+    SMOOTH,
+    junction,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    smooth_ramp,
+    step,
+    valve,
+)
+
+import fvsolve
+
+SUPPLY = 1e6
+
+
+def network(pipes: dict[str, tuple], demand: dict, end: float, numerics: dict, probes, every=0.01) -> dict:
+    """`pipes`: name -> (from, to, length, diameter, wave speed, cells); `lake` is a reservoir."""
+    places = {p for row in pipes.values() for p in row[:2]}
+    nodes = {p: reservoir(SUPPLY) if p == "lake" else junction(demand.get(p)) for p in sorted(places)}
+    return scene(nodes, {n: pipe(*row) for n, row in pipes.items()}, end, numerics, probes, every)
+
+
+def traced(pipes: dict[str, tuple], flows: dict[str, float], demand: dict) -> rays.Rays:
+    """The exact solution of the same network, from stated starting flows."""
+    laid = {n: rays.Pipe(*row[:5], flows.get(n, 0.0), SUPPLY) for n, row in pipes.items()}
+    return rays.Rays(RHO, laid, {"lake": rays.held(SUPPLY)}, demand)
+
+
+def clear_of_jumps(t: np.ndarray, exact: np.ndarray, width: int) -> np.ndarray:
+    """Samples further than `width` of any sudden change of the exact values."""
+    sudden = np.flatnonzero(np.abs(np.diff(exact)) > 1e-3 * np.ptp(exact))
+    clear = np.ones(len(t), bool)
+    for i in sudden:
+        clear[max(0, i - width) : i + width + 2] = False
+    return clear
+
+
+SERIES = {"up": ("lake", "mid", 400.0, 0.4, 1000.0, 20), "down": ("mid", "gate", 240.0, 0.25, 1200.0, 10)}
+TEE = {
+    "main": ("lake", "tee", 300.0, 0.4, 1200.0, 20),
+    "left": ("tee", "gate", 250.0, 0.3, 1000.0, 20),
+    "dead": ("tee", "blind", 187.5, 0.2, 1250.0, 12),
+}
+
+
+@pytest.mark.parametrize("pipes", [SERIES, TEE], ids=["series", "three-way with a dead end"])
+def test_pipes_whose_cells_take_the_same_time_are_exact_at_courant_one(pipes):
+    q, shut, dt = 0.05, 0.1, next(iter(pipes.values()))
+    dt = dt[2] / dt[5] / dt[4]
+    places = sorted({p for row in pipes.values() for p in row[:2]} - {"lake"})
+    case = network(pipes, {"gate": step(shut, q, 0.0)}, 3.0, SHARP, [f"{p}.pressure" for p in places], dt / 2)
+    result = fvsolve.run(case)
+    exact = traced(pipes, dict.fromkeys(set(pipes) - {"dead"}, q), {"gate": rays.step(shut, q, 0.0)})
+    jump = RHO * 1000.0 * q / scenes.area(0.25)
+    t = np.asarray(result.t)
+    for place in places:
+        wanted = np.array([exact.pressure(place, s) for s in t])
+        clear = np.ones(len(t), bool)
+        for shift in (-2.02, -1.0, -0.5, 0.5, 1.0, 2.02):
+            clear &= np.abs([exact.pressure(place, s + shift * dt) for s in t] - wanted) < 1e-7 * jump
+        assert clear.mean() > 0.2
+        assert np.max(np.abs(result[f"{place}.pressure"] - wanted)[clear]) < 1e-10 * jump
+
+
+ODD = {
+    "main": ("lake", "tee", 500.0, 0.5, 1230.0, 150),
+    "left": ("tee", "gate", 347.1, 0.4, 1111.0, 113),
+    "dead": ("tee", "blind", 271.9, 0.3, 1017.0, 95),
+}
+
+
+@pytest.mark.parametrize("scheme", ["muscl", "weno5"])
+def test_plateaus_are_those_of_ray_tracing_whatever_the_lengths(scheme):
+    q, shut = 0.1, 0.05
+    probes = ["gate.pressure", "tee.pressure", "blind.pressure"]
+    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8}
+    result = fvsolve.run(network(ODD, {"gate": step(shut, q, 0.0)}, 1.6, numerics, probes, 0.004))
+    exact = traced(ODD, {"main": q, "left": q}, {"gate": rays.step(shut, q, 0.0)})
+    t, jump = np.asarray(result.t), RHO * 1111.0 * q / scenes.area(0.4)
+    for probe in probes:
+        wanted = np.array([exact.pressure(probe.split(".")[0], s) for s in t])
+        clear = clear_of_jumps(t, wanted, 12)
+        assert clear.mean() > 0.3
+        assert np.max(np.abs(result[probe] - wanted)[clear]) < 5e-3 * jump
+        assert np.mean(np.abs(result[probe] - wanted)) < 2e-2 * jump
+
+
+def smooth_error(cells_factor: float, q: float = 0.1) -> float:
+    """Greatest error at three nodes over the jump, for a demand that ends smoothly within 0.3 s."""
+    schedule = smooth_ramp(0.0, 0.3, q, 0.0)
+    pipes = {n: (*row[:5], round(row[5] * cells_factor)) for n, row in ODD.items()}
+    probes = ["gate.pressure", "tee.pressure", "blind.pressure"]
+    result = fvsolve.run(network(pipes, {"gate": schedule}, 2.5, SMOOTH, probes, 0.025))
+    exact = traced(
+        pipes, {"main": q, "left": q}, {"gate": lambda t: q * (1 - scenes.smooth_step(t, 0.0, 0.3))}
+    )
+    jump = RHO * 1111.0 * q / scenes.area(0.4)
+    errors = [
+        np.max(np.abs(result[p] - [exact.pressure(p.split(".")[0], float(s)) for s in result.t]))
+        for p in probes
+    ]
+    return max(errors) / jump
+
+
+def test_smooth_events_in_lengths_that_share_no_step_converge_fast():
+    errors = [smooth_error(f) for f in (0.25, 0.5)]
+    assert errors[1] < 1e-4
+    assert observed_order(errors, [2.0, 1.0]) > 4.0
+
+
+def scatter(cells: int, scheme: str, numerics: dict) -> float:
+    """L1 error of a bump that has met a junction of three pipes, over the bump."""
+    rows = [
+        ("blind0", "tee", 100.0, 0.3, 1000.0),
+        ("tee", "blind1", 120.0, 0.2, 1200.0),
+        ("tee", "blind2", 90.0, 0.25, 900.0),
+    ]
+    pipes = {f"p{i}": (*row, cells) for i, row in enumerate(rows)}
+    case = network(pipes, {}, 1.0, {"scheme": scheme, **numerics}, ["tee.pressure"])
+    case["nodes"]["blind1"] = reservoir(SUPPLY)  # something must fix the pressure
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.initial_state(model)
+    width, centre, end = 9.0, 55.0, 0.09
+    state.y[:cells] = gaussian_averages(
+        np.linspace(0, 100.0, cells + 1), centre, width
+    )  # r in the first pipe
+    state = fvsolve.advance(model, state, end)
+    back, passed = scattered([row[4] / scenes.area(row[3]) for row in rows])
+    exact = np.zeros(6 * cells)
+    # the wave reaches the tee at x = L; r = A p / (2 c) ... each wave is p over its impedance
+    z = [row[4] / scenes.area(row[3]) for row in rows]
+    at = centre + rows[0][4] * end - rows[0][2]  # how far past the tee, in the first pipe's lengths
+    edges = [np.linspace(0, row[2], cells + 1) for row in rows]
+    exact[cells : 2 * cells] = back * gaussian_averages(rows[0][2] - edges[0][::-1], at, width)[::-1]
+    for i in (1, 2):
+        stretch = rows[i][4] / rows[0][4]
+        part = passed[i - 1] * z[0] / z[i] * gaussian_averages(edges[i], at * stretch, width * stretch)
+        exact[2 * i * cells : (2 * i + 1) * cells] = part
+    return mean_error(state.y, exact)
+
+
+SCHEMES = {"upwind": 1, "linear-upwind": 2, "fromm": 2, "central": 2, "upwind3": 3, "upwind5": 5, "weno5": 5}
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_order_through_a_junction_is_the_scheme_s_own(scheme):
+    sizes = (1600, 3200) if scheme == "upwind" else (60, 120)
+    order = SCHEMES[scheme]
+    if scheme == "weno5":
+        sizes = (120, 240)
+    errors = [scatter(n, scheme, {"method": "dormand-prince", "courant": 0.5}) for n in sizes]
+    assert observed_order(errors, [2.0, 1.0]) == pytest.approx(order, abs=0.2)
+
+
+def test_muscl_keeps_its_order_through_a_junction_in_the_mean():
+    errors = [scatter(n, "muscl", {"method": "ssp-rk3", "courant": 0.5}) for n in (100, 200)]
+    assert observed_order(errors, [2.0, 1.0]) == pytest.approx(2.0, abs=0.35)
+
+
+def test_a_dead_end_doubles_a_wave():
+    pipes = {"main": ("lake", "gate", 100.0, 0.3, 1000.0, 50)}
+    case = network(pipes, {}, 0.2, SHARP, ["gate.pressure"], 0.002)
+    case["nodes"]["lake"] = reservoir(step(0.01, SUPPLY, 1.2 * SUPPLY))
+    result = fvsolve.run(case)
+    plateau = (result.t > 0.12) & (result.t < 0.2)
+    assert result["gate.pressure"][plateau] == pytest.approx(1.4 * SUPPLY, rel=1e-12)
+
+
+def test_a_valve_between_pipes_reflects_and_passes_what_its_equation_says():
+    """Exact at Courant 1: the drop over the valve solves `p1 - p2 - 2 Z m = (m / K)^2` at every step."""
+    d, a, flow_area, dt = 0.3, 1000.0, 0.01, 0.005
+    nodes = {"lake": reservoir(SUPPLY), "a": junction(), "b": junction(), "sea": reservoir(0.5 * SUPPLY)}
+    links = {
+        "one": pipe("lake", "a", 100.0, d, a, 20),
+        "gap": valve("a", "b", flow_area, step(0.05, 0.0, 1.0)),
+        "two": pipe("b", "sea", 100.0, d, a, 20),
+    }
+    result = fvsolve.run(scene(nodes, links, 0.3, SHARP, ["a.pressure", "b.pressure", "gap.flow"], dt))
+    z, k = a / scenes.area(d), flow_area * math.sqrt(2 * RHO)
+    drop, b = 0.5 * SUPPLY, 2 * z * k
+    root = (-b + math.sqrt(b * b + 4 * drop)) / 2
+    first = (result.t > 0.06) & (result.t < 0.24)  # before the reservoirs answer
+    assert result["gap.flow"][first] == pytest.approx(k * root / RHO, rel=1e-12)
+    assert result["a.pressure"][first] == pytest.approx(SUPPLY - z * k * root, rel=1e-12)
+    assert result["b.pressure"][first] == pytest.approx(0.5 * SUPPLY + z * k * root, rel=1e-12)
+
+
+def test_valves_in_a_bunch_act_as_one_of_their_areas():
+    def run(areas):
+        nodes = {"lake": reservoir(SUPPLY), "gate": junction(), "air": reservoir(AMBIENT)}
+        links = {"main": pipe("lake", "gate", 200.0, 0.3, 1000.0, 20)}
+        links |= {f"v{i}": valve("gate", "air", s, ramp(0.1, 0.3, 1.0, 0.0)) for i, s in enumerate(areas)}
+        return fvsolve.run(scene(nodes, links, 2.0, SMOOTH, ["gate.pressure"], 0.01))["gate.pressure"]
+
+    assert run([0.001, 0.0005, 0.0025]) == pytest.approx(run([0.004]), abs=1e-9 * SUPPLY)
+
+
+def test_valves_in_series_act_as_one_of_their_summed_drops():
+    def run(areas):
+        names = ["gate", *(f"n{i}" for i in range(len(areas) - 1)), "air"]
+        nodes = {"lake": reservoir(SUPPLY), **{n: junction() for n in names[:-1]}, "air": reservoir(AMBIENT)}
+        links = {"main": pipe("lake", "gate", 200.0, 0.3, 1000.0, 20)}
+        for i, s in enumerate(areas):
+            links[f"v{i}"] = valve(names[i], names[i + 1], s, ramp(0.1, 0.3, 1.0, 0.1))
+        return fvsolve.run(scene(nodes, links, 2.0, SMOOTH, ["gate.pressure"], 0.01))["gate.pressure"]
+
+    areas = [0.004, 0.006, 0.005]
+    one = sum(s**-2 for s in areas) ** -0.5
+    assert run(areas) == pytest.approx(run([one]), abs=1e-9 * SUPPLY)
+
+
+def growth(case: dict) -> float:
+    """Greatest real part of the spectrum times the travel time of the shortest cell."""
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.initial_state(model)
+    spectrum = np.linalg.eigvals(jacobian(model, state))
+    cell = min(p.length / p.cells / p.wave_speed for p in model.pipes)
+    return float(np.max(spectrum.real)) * cell
+
+
+def jacobian(model, state) -> np.ndarray:
+    """Of the rhs, by differences that are exact for a linear rhs and close for a valve."""
+    base, size = model.rhs(state.t, state.y), 1e-3
+    columns = []
+    for i in range(len(state.y)):
+        y = state.y.copy()
+        y[i] += size
+        columns.append((model.rhs(state.t, y) - base) / size)
+    return np.array(columns).T
+
+
+LINEAR = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5"]
+
+
+def ended(cells: int, reflection: float, scheme: str) -> dict:
+    """A pipe from a reservoir to an end that reflects pressure by `reflection`, from -1 (fixed) to 1 (blind).
+
+    Between them a valve that passes flow: its slope `2 dp / M` against the pipe's impedance.
+    """
+    d, a = 0.3, 1000.0
+    z = a / scenes.area(d)
+    nodes = {"lake": reservoir(SUPPLY), "gate": junction()}
+    links = {"main": pipe("lake", "gate", 100.0, d, a, cells)}
+    if abs(reflection) == 1:
+        nodes["gate"] = junction() if reflection > 0 else reservoir(SUPPLY)
+    else:
+        resistance = z * (1 + reflection) / (1 - reflection)
+        drop = SUPPLY / 2
+        mass = 2 * drop / resistance
+        nodes["sea"] = reservoir(SUPPLY - drop)
+        links["valve"] = valve("gate", "sea", mass / math.sqrt(2 * RHO * drop))
+    return scene(nodes, links, 1.0, {"scheme": scheme, "method": "rk4", "courant": 0.5}, ["gate.pressure"])
+
+
+@pytest.mark.parametrize("scheme", LINEAR)
+def test_no_mode_grows_in_one_pipe_of_1_to_64_cells_whatever_its_end_reflects(scheme):
+    worst = {
+        (cells, reflection): growth(ended(cells, reflection, scheme))
+        for cells in (*range(1, 13), 16, 23, 32, 64)
+        for reflection in (-1.0, -0.6, 0.0, 0.5, 1.0)
+    }
+    assert max(worst.values()) < 1e-8, max(worst, key=worst.get)
+
+
+@pytest.mark.parametrize("scheme", ["upwind5", "upwind3", "fromm"])
+def test_no_mode_grows_in_random_networks(scheme):
+    rng = np.random.default_rng(7)
+    for _ in range(25):
+        count = int(rng.integers(2, 4))
+        ends = [
+            reservoir(SUPPLY),
+            *(junction() if rng.random() < 0.5 else reservoir(SUPPLY) for _ in range(count - 1)),
+        ]
+        nodes = {"mid": junction(), **{f"end{i}": e for i, e in enumerate(ends)}}
+        links = {}
+        for i in range(count):
+            way = ("mid", f"end{i}") if rng.random() < 0.5 else (f"end{i}", "mid")
+            sizes = (
+                rng.uniform(20, 500),
+                rng.uniform(0.1, 0.8),
+                rng.uniform(400, 1400),
+                int(rng.integers(1, 30)),
+            )
+            links[f"p{i}"] = pipe(*way, *map(float, sizes[:3]), sizes[3])
+        numerics = {"scheme": scheme, "method": "rk4", "courant": 0.5}
+        assert growth(scene(nodes, links, 1.0, numerics, ["mid.pressure"])) < 1e-8, links

@@ -1,0 +1,149 @@
+"""Every scheme and every explicit method shows its own order on smooth waves, with friction too."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from truth.bumps import gaussian_averages
+from truth.orders import mean_error, observed_order
+from truth.scenes import NO_FRICTION, junction, pipe, ramp, reservoir, scene
+
+import fvsolve
+
+LENGTH, DIAMETER, SPEED = 100.0, 0.3, 1000.0
+FINE = {"method": "dormand-prince", "courant": 0.5}
+
+
+def single(cells: int, numerics: dict, demand=None, friction=NO_FRICTION) -> fvsolve.Model:
+    nodes = {"lake": reservoir(1e6), "gate": junction(demand)}
+    links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells, friction=friction)}
+    return fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, numerics, ["gate.pressure"])))
+
+
+def bump(cells: int, centre: float = 30.0, width: float = 5.0) -> np.ndarray:
+    return gaussian_averages(np.linspace(0, LENGTH, cells + 1), centre, width)
+
+
+def advected_bump(cells: int, scheme: str, backward: bool = False, **numerics) -> float:
+    """L1 error of a bump that has gone 40 m, to the right or back."""
+    model = single(cells, {"scheme": scheme, **FINE, **numerics})
+    state = fvsolve.initial_state(model)
+    start, end = (70.0, 30.0) if backward else (30.0, 70.0)
+    half = slice(cells, 2 * cells) if backward else slice(0, cells)
+    state.y[half] = bump(cells, start)
+    state = fvsolve.advance(model, state, 40.0 / SPEED)
+    exact = np.zeros(2 * cells)
+    exact[half] = bump(cells, end)
+    return mean_error(state.y, exact)
+
+
+SCHEMES = {
+    "upwind": (1, 1600),
+    "linear-upwind": (2, 200),
+    "fromm": (2, 200),
+    "central": (2, 200),
+    "upwind3": (3, 100),
+    "upwind5": (5, 100),
+    "weno5": (5, 200),
+}
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_every_linear_scheme_and_weno_shows_its_order(scheme):
+    order, cells = SCHEMES[scheme]
+    errors = [advected_bump(n, scheme) for n in (cells, 2 * cells)]
+    assert observed_order(errors, [2.0, 1.0]) == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize("limiter", ["minmod", "van-leer", "monotonized-central"])
+def test_muscl_is_second_order_in_the_mean_with_every_limiter(limiter):
+    errors = [advected_bump(n, "muscl", limiter=limiter, method="ssp-rk3") for n in (400, 800)]
+    assert observed_order(errors, [2.0, 1.0]) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
+def test_waves_to_the_left_and_to_the_right_are_treated_alike(scheme):
+    right, left = (advected_bump(50, scheme, backward=b) for b in (False, True))
+    assert left == pytest.approx(right, rel=1e-9)
+
+
+METHODS = {
+    "euler": 1,
+    "improved-euler": 2,
+    "modified-euler": 2,
+    "ssp-rk2": 2,
+    "heun": 3,
+    "ssp-rk3": 3,
+    "bogacki-shampine": 3,
+    "rk4": 4,
+    "dormand-prince": 5,
+}
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "upwind5"])
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_shows_its_order_on_a_pipe_with_a_demand_that_moves(method, scheme):
+    """Against SciPy's DOP853 on the same cells, so that only time is discretised."""
+    if scheme == "upwind5" and method == "euler":
+        scheme = "upwind"  # Euler is unstable on the higher schemes
+    cells, end = 40, 0.08
+    demand = ramp(0.0, 0.2, 0.0, 0.01, 4.0)
+    errors, steps = [], (1e-3, 5e-4) if METHODS[method] > 2 else (5e-4, 2.5e-4)
+    for size in steps:
+        model = single(cells, {"scheme": scheme, "method": method, "step": size}, demand)
+        state = fvsolve.initial_state(model)
+        state.y[:cells] = bump(cells, 40.0, 12.0)
+        run = solve_ivp(model.rhs, (0.0, end), state.y.copy(), "DOP853", rtol=1e-13, atol=1e-14)
+        state = fvsolve.advance(model, state, end)
+        errors.append(np.max(np.abs(state.y - run.y[:, -1])))
+    assert observed_order(errors, steps) == pytest.approx(METHODS[method], abs=0.25)
+
+
+def with_friction(cells: int, scheme: str, through: float, reversing: bool) -> np.ndarray:
+    """Waves after 30 ms in a pipe with strong Darcy friction and a steady flow of `through` [m3/s]."""
+    friction = {"model": "quasi-steady", "factor": 0.5}
+    model = single(cells, {"scheme": scheme, **FINE}, through, friction)
+    state = fvsolve.initial_state(model)
+    size = 100.0  # kg/s
+    state.y[:cells] += size * bump(cells, 45.0, 6.0)
+    if reversing:
+        state.y[:cells] -= size * bump(cells, 52.0, 6.0)
+    return fvsolve.advance(model, state, 0.02).y[: 2 * cells]
+
+
+def friction_order(scheme: str, cells: int, through: float, reversing: bool) -> float:
+    """Order from the distances of three nested grids, each averaged onto the coarser."""
+    grids = [with_friction(cells * 2**k, scheme, through, reversing) for k in range(3)]
+    gaps = [
+        np.mean(np.abs(c - f.reshape(-1, 2).mean(axis=1))) for c, f in zip(grids, grids[1:], strict=False)
+    ]
+    return math.log2(gaps[0] / gaps[1])
+
+
+@pytest.mark.parametrize("scheme, order", [("fromm", 2), ("upwind3", 3)])
+def test_friction_keeps_the_order_where_the_flow_keeps_its_sign(scheme, order):
+    assert friction_order(scheme, 100, 0.2, reversing=False) == pytest.approx(order, abs=0.3)
+
+
+def test_friction_keeps_order_four_at_least_under_the_fifth_order_scheme():
+    assert friction_order("upwind5", 50, 0.2, reversing=False) > 3.8
+
+
+def test_the_kink_of_the_friction_law_costs_the_fifth_order_scheme_no_more_than_to_order_two_and_a_half():
+    assert friction_order("upwind5", 100, 0.0, reversing=True) > 2.5
+
+
+def test_an_error_controlled_run_meets_its_tolerance_in_proportion():
+    """Ten times the tolerance, about ten times the error, on the cells of the bump."""
+    cells, errors = 60, []
+    for rtol in (1e-5, 1e-7):
+        model = single(cells, {"scheme": "upwind5", "method": "dormand-prince", "rtol": rtol})
+        state = fvsolve.initial_state(model)
+        state.y[:cells] = bump(cells, 40.0, 10.0)
+        run = solve_ivp(model.rhs, (0.0, 0.03), state.y.copy(), "DOP853", rtol=1e-13, atol=1e-14)
+        errors.append(np.max(np.abs(fvsolve.advance(model, state, 0.03).y - run.y[:, -1])))
+    assert errors[0] < 1e-3 and errors[1] < 1e-5
+    assert errors[1] < errors[0] / 20

@@ -1,0 +1,291 @@
+"""What a run leaves on disk reads back to the last bit, opens elsewhere, and is never lost by accident."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import tracemalloc
+from types import SimpleNamespace
+
+import meshio
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, scene
+
+import fvsolve
+from fvsolve.output import layout
+from fvsolve.output.column import Column
+from fvsolve.output.fields import FieldSeries, read_series
+from fvsolve.output.history import HistoryFile, read_headers, read_table
+
+NUMERICS = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.8}
+PROBES = ["gate.pressure", "gate.head", "valve.flow", "main.velocity@0.5"]
+PIPE = {
+    "type": "pipe",
+    "diameter": 0.3,
+    "wave_speed": 1200.0,
+    "friction": {"model": "steady", "factor": 0.02},
+}
+UNITS = {"pressure": "barg", "flow": "l/s", "time": "ms"}
+
+
+def branched(fields: int = 5, **top) -> dict:
+    """A main that forks into a dead end and a valve that shuts between 0.1 and 0.2 s."""
+    nodes = {
+        "lake": {"type": "reservoir", "head": 60.0, "elevation": 40.0},
+        "fork": {"type": "junction", "elevation": 10.0},
+        "end": {"type": "junction", "elevation": 20.0},
+        "gate": {"type": "junction", "elevation": 0.0},
+        "air": {"type": "reservoir", "pressure": AMBIENT, "elevation": 0.0},
+    }
+    links = {
+        "main": {**PIPE, "from": "lake", "to": "fork", "length": 600.0, "cells": 30},
+        "branch": {**PIPE, "from": "fork", "to": "end", "length": 200.0, "cells": 10},
+        "last": {**PIPE, "from": "fork", "to": "gate", "length": 300.0, "cells": 15},
+        "valve": {
+            "type": "valve",
+            "from": "gate",
+            "to": "air",
+            "area": 0.005,
+            "opening": {"time": [0.1, 0.2], "value": [1.0, 0.0]},
+        },
+    }
+    case = scene(nodes, links, 1.0, NUMERICS, PROBES, 0.01, title="A fork", **top)
+    case["output"]["fields"] = fields
+    return case
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("run") / "fork"
+    fvsolve.run(branched(), out=place)
+    return place
+
+
+def test_the_directory_holds_what_is_promised(folder):
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        *("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
+        *("fields.pvd", "fields", "case.toml", "restart.npz"),
+    }
+    assert set(json.loads((folder / "summary.json").read_text())["files"]) == names - {"fields"}
+
+
+def test_history_reads_back_to_the_last_bit(folder):
+    result, again = fvsolve.run(branched()), fvsolve.open_run(folder)
+    assert again.probes == PROBES
+    assert np.array_equal(again.t, result.t)
+    assert all(np.array_equal(again[name], result[name]) for name in PROBES)
+    assert again.extremes == result.extremes and again.reason == result.reason == "finished"
+
+
+def test_headers_carry_units(folder):
+    first = (folder / "history.csv").read_text().splitlines()[0]
+    assert first == "t [s],gate.pressure [Pa],gate.head [m],valve.flow [m3/s],main.velocity@0.5 [m/s]"
+
+
+def test_output_units_are_those_of_the_table_the_extremes_and_the_envelope(folder, tmp_path):
+    si, case = fvsolve.open_run(folder), branched()
+    case["output"]["units"] = UNITS
+    fvsolve.run(case, out=tmp_path / "units")
+    result = fvsolve.open_run(tmp_path / "units")
+    assert read_headers(tmp_path / "units" / "history.csv")[:2] == [("t", "ms"), ("gate.pressure", "barg")]
+    assert result.t == pytest.approx(1e3 * si.t) and result.seconds == pytest.approx(si.seconds)
+    assert result["gate.pressure"] == pytest.approx((si["gate.pressure"] - AMBIENT) / 1e5)
+    assert result["valve.flow"] == pytest.approx(1e3 * si["valve.flow"])
+    assert result.si("gate.pressure") == pytest.approx(si["gate.pressure"], rel=1e-14)
+    greatest = si.extremes["gate.pressure"].greatest
+    assert result.extremes["gate.pressure"].greatest == pytest.approx((greatest - AMBIENT) / 1e5)
+    assert result.envelope["main"]["greatest_pressure"] == pytest.approx(
+        (si.envelope["main"]["greatest_pressure"] - AMBIENT) / 1e5
+    )
+
+
+def test_the_resolved_case_runs_again_to_the_same_numbers(folder):
+    again, result = fvsolve.run(folder / "case.toml"), fvsolve.open_run(folder)
+    assert all(np.array_equal(again[name], result[name]) for name in PROBES)
+
+
+def test_frames_read_back_through_meshio(folder):
+    frames = read_series(folder / "fields.pvd")
+    assert [t for t, _ in frames] == pytest.approx(np.linspace(0.0, 1.0, len(frames)))
+    assert len(frames) >= 5
+    mesh = meshio.read(frames[-1][1])
+    assert mesh.cells_dict["line"].shape == (55, 2) and len(mesh.points) == 56  # a tree of pipes that meet
+    data = mesh.cell_data_dict
+    assert {"pressure", "head", "velocity", "flow", "least_pressure", "greatest_pressure"} <= data.keys()
+    pressure = data["pressure"]["line"]
+    assert np.all(data["least_pressure"]["line"] <= pressure)
+    assert np.all(data["greatest_pressure"]["line"] >= pressure)
+    assert mesh.points[:, 2].min() == 0.0 and mesh.points[:, 2].max() == 40.0
+
+
+def test_the_last_frame_has_the_extremes_of_the_envelope(folder):
+    data = meshio.read(read_series(folder / "fields.pvd")[-1][1]).cell_data_dict
+    envelope = fvsolve.open_run(folder).envelope
+    for name in ("least_pressure", "greatest_pressure"):
+        along = np.concatenate([envelope[pipe][name] for pipe in ("main", "branch", "last")])
+        assert np.array_equal(data[name]["line"], along)
+
+
+def test_the_series_is_whole_after_every_frame(tmp_path):
+    model = fvsolve.build(fvsolve.load(branched()))
+    series = FieldSeries(tmp_path, model)
+    series.start()
+    zero = dict.fromkeys(
+        ("pressure", "head", "velocity", "flow", "least_pressure", "greatest_pressure"), np.zeros(30)
+    )
+    frame = {pipe.name: {name: one[: pipe.cells] for name, one in zero.items()} for pipe in model.pipes}
+    assert read_series(tmp_path / "fields.pvd") == []
+    for count in range(1, 4):
+        series.write(0.1 * count, frame)
+        assert len(read_series(tmp_path / "fields.pvd")) == count
+
+
+def test_no_frames_where_none_are_asked_for(tmp_path):
+    fvsolve.run(branched(fields=0), out=tmp_path / "run")
+    assert not (tmp_path / "run" / "fields.pvd").exists()
+
+
+def test_rows_are_not_kept_in_memory(tmp_path):
+    columns = [Column(f"n{i}.pressure", "pressure", "Pa") for i in range(4)]
+    history = HistoryFile(tmp_path / "history.csv", Column("t", "time", "s"), columns)
+    history.start()
+    block = np.random.default_rng(1).random((1000, 4))
+    history.write(block[:, 0], block)
+    tracemalloc.start()
+    for _ in range(50):
+        history.write(block[:, 0], block)
+    kept = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    history.close()
+    assert kept < 1e5
+    assert np.array_equal(read_table(tmp_path / "history.csv")[-1000:, 1:], block)
+
+
+def test_a_run_is_not_overwritten_without_force(folder, tmp_path):
+    before = (folder / "history.csv").read_bytes()
+    with pytest.raises(fvsolve.RunError, match="--force"):
+        fvsolve.run(branched(), out=folder)
+    assert (folder / "history.csv").read_bytes() == before
+
+
+def test_force_replaces_a_run_and_nothing_else(tmp_path):
+    place = tmp_path / "run"
+    fvsolve.run(branched(), out=place)
+    (place / "notes.txt").write_text("mine")
+    fvsolve.run(branched(fields=0), out=place, force=True)
+    assert (place / "notes.txt").read_text() == "mine"
+    assert not (place / "fields.pvd").exists() and not list((place / "fields").iterdir())
+
+
+def test_a_bad_case_leaves_the_run_before_it_alone(folder):
+    case = branched()
+    case["links"]["main"]["diameter"] = -1.0
+    with pytest.raises(fvsolve.CaseError):
+        fvsolve.run(case, out=folder, force=True)
+    assert fvsolve.open_run(folder).ok
+
+
+def test_an_unended_directory_is_no_result(tmp_path):
+    with pytest.raises(fvsolve.RunError, match="no ended run"):
+        fvsolve.open_run(tmp_path)
+
+
+def test_expectations_are_those_of_the_table(folder):
+    result = fvsolve.open_run(folder)
+    pressure = result["gate.pressure"]
+    mean = np.sum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(result.t)) / (result.t[-1] - result.t[0])
+    claims = {
+        "max(gate.pressure)": result.extremes["gate.pressure"].greatest,
+        "min(gate.pressure)": result.extremes["gate.pressure"].least,
+        "final(gate.pressure)": pressure[-1],
+        "mean(gate.pressure)": mean,
+        "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure),
+    }
+    expect = {text: {"value": float(value), "rtol": 1e-12} for text, value in claims.items()}
+    found = fvsolve.run(branched(expect=expect))
+    assert [one.text for one in found.expectations if one.ok] == list(claims)
+    wrong = {text: {"value": float(value) * 1.01, "rtol": 1e-3} for text, value in claims.items()}
+    assert not any(one.ok for one in fvsolve.run(branched(expect=wrong)).expectations)
+
+
+def test_a_comparison_finds_a_shifted_copy_of_the_run(folder, tmp_path):
+    result = fvsolve.open_run(folder)
+    rows = [
+        f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
+        for t, p in zip(result.t, result["gate.pressure"], strict=True)
+    ]
+    (tmp_path / "rig.csv").write_text("clock [ms],p [barg]\n" + "\n".join(rows))
+    measured = {"file": str(tmp_path / "rig.csv"), "time": "clock [ms]", "value": "p [barg]", "shift": 0.05}
+    found = fvsolve.run(branched(compare={"gate.pressure": measured}), out=tmp_path / "run")
+    (one,) = found.comparisons
+    assert one.rms == pytest.approx(0.5e5, rel=1e-3) and one.greatest_difference == pytest.approx(
+        -0.5e5, rel=1e-3
+    )
+    assert one.computed_peak == pytest.approx(one.measured_peak - 0.5e5)
+    assert one.t_computed_peak == pytest.approx(one.t_measured_peak)
+    assert (tmp_path / "run" / "rig.csv").is_file()
+    again = fvsolve.open_run(tmp_path / "run")
+    assert again.comparisons == found.comparisons
+    again.plot(tmp_path / "again.png")
+    assert (tmp_path / "again.png").read_bytes() == (tmp_path / "run" / "history.png").read_bytes()
+
+
+def test_a_run_that_blows_up_leaves_everything_so_far(tmp_path):
+    case = branched()
+    case["numerics"] = {"end": 20.0, "scheme": "upwind5", "method": "rk4", "courant": 3.0}
+    result = fvsolve.run(case, out=tmp_path / "run")
+    assert not result.ok and result.reason.startswith("stopped")
+    assert 0.0 < result.summary["t"] < 20.0
+    assert len(result.t) > 1 and np.all(np.isfinite(result["gate.pressure"]))
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["ok"] is False
+    assert tomllib.loads((tmp_path / "run" / "case.toml").read_text())["numerics"]["courant"] == 3.0
+
+
+def test_frame_is_a_pandas_table(folder):
+    pandas = pytest.importorskip("pandas")
+    frame = fvsolve.open_run(folder).frame()
+    assert isinstance(frame, pandas.DataFrame) and frame.index.name == "t [s]"
+    assert list(frame.columns)[0] == "gate.pressure [Pa]"
+
+
+def test_a_probe_that_is_not_there_is_named(folder):
+    with pytest.raises(fvsolve.FvsolveError, match='did you mean "gate.head"'):
+        fvsolve.open_run(folder)["gate.haed"]
+
+
+def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
+    names = dict.fromkeys(name for ends in links.values() for name in ends)
+    return SimpleNamespace(
+        nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
+        links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
+    )
+
+
+def test_stated_positions_are_used():
+    places = layout.positions(network({"x": ("a", "b")}, a=(1.0, 2.0), b=(3.0, 4.0)), {"x": 9.0})
+    assert places["a"].tolist() == [1.0, 2.0] and places["b"].tolist() == [3.0, 4.0]
+
+
+def test_a_chain_is_laid_out_straight_and_to_scale():
+    chain = network({"x": ("a", "b"), "y": ("b", "c"), "z": ("c", "d")})
+    places = layout.positions(chain, {"x": 100.0, "y": 50.0, "z": 200.0})
+    plan = np.array([places[name] for name in "abcd"])
+    assert plan == pytest.approx(np.array([[0, 0], [100, 0], [150, 0], [350, 0]]), abs=1e-3)
+
+
+@pytest.mark.parametrize("count", [30, layout.DENSE + 50])
+def test_a_network_is_laid_out_alike_every_time_with_no_two_nodes_in_one_place(count):
+    links = {f"p{i}": (f"n{i}", f"n{(i * 7) // 10}") for i in range(1, count)}
+    lengths = {name: 50.0 + 10.0 * (i % 7) for i, name in enumerate(links)}
+    one, two = (layout.positions(network(links), lengths) for _ in range(2))
+    plan = np.array(list(one.values()))
+    assert np.array_equal(plan, np.array(list(two.values())))
+    apart = np.linalg.norm(plan[:, None] - plan[None], axis=2) + 1e9 * np.eye(count)
+    assert apart.min() > 0.1
+
+
+def test_parallel_links_bend_apart():
+    bends = layout.bends(network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links)
+    assert bends["z"] == 0.0 and bends["x"] == bends["y"] != 0.0  # seen from their own starts

@@ -1,0 +1,59 @@
+"""The public names: few, documented, there, and cheap to import."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib import import_module
+from inspect import isfunction
+from pathlib import Path
+
+import pytest
+
+import fvsolve
+
+DOCS = (Path(__file__).parent.parent / "docs" / "python.md").read_text(encoding="utf-8")
+
+
+def test_at_most_twenty():
+    assert len(fvsolve.__all__) <= 20
+
+
+@pytest.mark.parametrize("name", fvsolve.__all__)
+def test_each_is_there_and_documented(name):
+    assert getattr(fvsolve, name) is not None
+    assert re.search(rf"^\| `{name}\b", DOCS, re.MULTILINE)
+
+
+def test_the_page_names_no_other():
+    assert set(re.findall(r"^\| `(\w+)", DOCS, re.MULTILINE)) == set(fvsolve.__all__)
+
+
+def test_functions_are_not_hidden_by_the_modules_they_live_in():
+    for module in ("run", "solve"):
+        import_module(f"fvsolve.{module}")
+        assert isfunction(getattr(fvsolve, module))
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'simulate'"):
+        fvsolve.simulate  # noqa: B018
+
+
+def test_importing_imports_nothing_heavy():
+    heavy = [
+        "numpy",
+        "numba",
+        "CoolProp",
+        "pint",
+        "matplotlib",
+        "pyvista",
+        "meshio",
+        "scipy",
+        "rich",
+        "pydantic",
+    ]
+    code = f"import fvsolve, sys; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,218 @@
+"""Where nothing happens nothing moves; what comes in, goes out or stays; the rhs is pure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth import scenes
+from truth.scenes import AMBIENT, NO_FRICTION, junction, lake, pipe, reservoir, scene, step, tank, valve
+
+import fvsolve
+
+ROUGH = {"model": "steady", "roughness": 2.6e-4}
+SCHEMES = ["upwind", "muscl", "upwind5", "weno5", "central", "fromm", "linear-upwind", "upwind3"]
+
+
+def town(friction: dict, numerics: dict, end: float = 60.0, demand=0.02, law: str = "linear") -> dict:
+    """A loop with slopes, a demand, valves, a rigid column, a tank fed as it feeds, and still tanks."""
+    nodes = {
+        "hill": lake(60.0),
+        "low": lake(40.0),
+        "a": junction(elevation=12.3),
+        "b": junction(demand, elevation=31.7),
+        "c": junction(elevation=-4.1),
+        "middle": tank(100.0, 10.0, elevation=40.0),  # the lakes stand 10 m above and below its surface
+        "out": reservoir(AMBIENT, elevation=5.0),
+        "still": tank(20.0, 3.0, elevation=20.0),
+        "one": tank(3.0, 5.0, elevation=30.1),
+        "two": tank(7.0, 2.0, elevation=33.1),
+    }
+    rough = {"friction": friction}
+    links = {
+        "in": pipe("hill", "middle", 400.0, 0.3, 1000.0, 20, **rough),
+        "on": pipe("middle", "low", 400.0, 0.3, 1000.0, 20, **rough),
+        "ha": pipe("hill", "a", 330.0, 0.35, 1100.0, 17, **rough),
+        "ab": pipe("a", "b", 271.3, 0.25, 1000.0, 11, **rough),
+        "bc": pipe("c", "b", 315.7, 0.2, 1200.0, 13, **rough),
+        "ac": pipe("a", "c", 402.0, 0.25, 900.0, 19, **rough),
+        "cl": pipe("c", "low", 150.0, 0.3, 1150.0, 7, **rough),
+        "column": {
+            "type": "rigid-column",
+            "from": "hill",
+            "to": "low",
+            "length": 500.0,
+            "diameter": 0.2,
+            **rough,
+        },
+        "tap": valve("c", "out", 0.002),
+        "shut": valve("still", "a", 0.01, 0.0),
+        "gap": valve("one", "two", 0.01),
+        "bar": valve("two", "b", 0.01, 0.0),
+    }
+    settings = {"courant": 0.9, "method": "ssp-rk3", **numerics}
+    probes = [f"{n}.pressure" for n in "abc"] + ["middle.level", "still.level", "one.level", "two.level"]
+    probes += ["tap.flow", "shut.flow", "gap.flow", "column.flow"]
+    for name in ("in", "on", "ha", "ab", "bc", "ac", "cl"):
+        probes += [f"{name}.{what}@{x}" for what in ("pressure", "flow") for x in (0.0, 0.31, 1.0)]
+    fluid = {**scenes.WATER, "law": law}
+    return scene(nodes, links, end, settings, probes, 1.0, fluid=fluid)
+
+
+def moved(result, name: str) -> float:
+    return float(np.ptp(result[name]))
+
+
+def still_probes(result) -> tuple[list[str], list[str]]:
+    """Probes of pipes and junctions, and the others."""
+    names = [str(p) for p in result.probes]
+    pipes = [n for n in names if "@" in n or n.split(".")[0] in "abc"]
+    return pipes, [n for n in names if n not in pipes]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(
+    "friction", [ROUGH, {"model": "quasi-steady", "roughness": 2.6e-4}], ids=["steady", "quasi-steady"]
+)
+def test_a_looped_network_without_an_event_does_not_move_by_one_bit(scheme, friction):
+    result = fvsolve.run(town(friction, {"scheme": scheme}))
+    assert result.ok
+    pipes, others = still_probes(result)
+    assert len(pipes) == 45
+    assert {n: moved(result, n) for n in pipes if moved(result, n) != 0.0} == {}
+    assert max(moved(result, n) for n in others) <= 1e-12
+    assert abs(result["ab.flow@0.31"][0]) > 1e-3  # it does flow
+    assert np.all(result["shut.flow"] == 0.0)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("scheme", ["muscl", "upwind5"])
+@pytest.mark.parametrize(
+    "friction", [{"model": "hazen-williams", "coefficient": 110.0}, {"model": "steady", "factor": 0.02}]
+)
+def test_other_friction_laws_do_not_move_it_either(scheme, friction):
+    result = fvsolve.run(town(friction, {"scheme": scheme}))
+    assert {n: moved(result, n) for n in still_probes(result)[0] if moved(result, n) != 0.0} == {}
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_nor_does_the_log_law_move_the_pipes(scheme):
+    result = fvsolve.run(town(ROUGH, {"scheme": scheme}, law="log"))
+    assert {n: moved(result, n) for n in still_probes(result)[0] if moved(result, n) != 0.0} == {}
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "bogacki-shampine", "dormand-prince"])
+def test_no_method_moves_it(method):
+    settings = {"scheme": "upwind", "method": method}
+    result = fvsolve.run(town(ROUGH, settings))
+    assert {n: moved(result, n) for n in still_probes(result)[0] if moved(result, n) != 0.0} == {}
+
+
+def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
+    """Equal heads everywhere, any elevations, wave speeds and loops."""
+    nodes = {
+        "lake": lake(47.3),
+        "pool": tank(50.0, 6.2, elevation=41.1),
+        "a": junction(elevation=12.7),
+        "b": junction(elevation=-31.9),
+        "c": junction(elevation=30.3),
+    }
+    rows = {
+        "la": ("lake", "a", 311.0, 0.31, 1234.5, 9),
+        "ab": ("a", "b", 173.2, 0.22, 987.6, 6),
+        "bc": ("b", "c", 220.1, 0.17, 1111.1, 7),
+        "ca": ("c", "a", 90.9, 0.41, 777.7, 5),
+        "bp": ("b", "pool", 287.6, 0.26, 1312.3, 8),
+    }
+    links = {n: pipe(*row, friction=friction) for n, row in rows.items()}
+    links["tap"] = valve("c", "pool", 0.01)
+    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.9}
+    probes = [f"{n}.flow@{x}" for n in rows for x in (0.0, 0.4, 1.0)] + [
+        "tap.flow",
+        "a.head",
+        "b.head",
+        "c.head",
+    ]
+    return scene(
+        nodes, links, 20.0, numerics, [*probes, "pool.level"], 1.0, fluid={**scenes.WATER, "law": law}
+    )
+
+
+FRICTIONS = [
+    NO_FRICTION,
+    ROUGH,
+    {"model": "quasi-steady", "factor": 0.02},
+    {"model": "hazen-williams", "coefficient": 120.0},
+]
+
+
+@pytest.mark.parametrize("friction", FRICTIONS, ids=["none", "steady", "quasi-steady", "hazen-williams"])
+def test_equal_heads_and_no_flow(friction):
+    result = fvsolve.run(pond("linear", friction))
+    flows = {str(p): float(np.max(np.abs(result[str(p)]))) for p in result.probes if ".flow" in str(p)}
+    assert max(flows.values()) <= 1e-12, flows
+    for place in "abc":
+        assert result[f"{place}.head"] == pytest.approx(47.3, abs=1e-11)
+    assert moved(result, "pool.level") <= 1e-12
+
+
+@pytest.mark.parametrize("initial", ["steady", "equilibrium", "rest"])
+def test_every_way_of_starting_finds_the_pond_at_rest(initial):
+    case = pond("linear", ROUGH)
+    case["numerics"]["initial"] = initial
+    result = fvsolve.run(case)
+    assert max(np.max(np.abs(result[str(p)])) for p in result.probes if ".flow" in str(p)) <= 1e-12
+
+
+def busy(law: str, scheme: str) -> dict:
+    """The town with a burst at `b`."""
+    case = town(ROUGH, {"scheme": scheme}, 20.0, step(1.0, 0.02, 0.06), law)
+    case["output"]["every"] = 0.5
+    return case
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
+def test_the_mass_ledger_of_a_busy_network_closes(law, scheme):
+    result = fvsolve.run(busy(law, scheme))
+    mass = result.ledger["mass"]
+    assert moved(result, "b.pressure") > 1e4
+    assert abs(mass["relative"]) < 1e-12
+    balance = mass["initial"] + mass["inflow"] - mass["outflow"] - mass.get("spilled", 0.0) - mass["final"]
+    assert abs(balance) < 1e-12 * mass["initial"]
+
+
+def test_what_the_ledger_says_flowed_out_is_the_demand():
+    nodes = {"lake": reservoir(1e6), "gate": junction(step(1.0, 0.05, 0.01))}
+    links = {"main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 20)}
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
+    result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["gate.pressure"]))
+    assert result.ledger["mass"]["outflow"] == pytest.approx(1000.0 * (0.05 + 4 * 0.01), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_the_rhs_is_pure(law):
+    model = fvsolve.build(fvsolve.load(busy(law, "muscl")))
+    state = fvsolve.initial_state(model)
+    rng = np.random.default_rng(3)
+    states = [state.y + rng.normal(size=len(state.y)) * 1e-3 for _ in range(4)]
+    first = [np.array(model.rhs(0.5, y)) for y in states]
+    again = [np.array(model.rhs(0.5, y)) for y in reversed(states)][::-1]
+    kept = [y.copy() for y in states]
+    for one, two in zip(first, again, strict=True):
+        assert np.array_equal(one, two)
+    assert all(np.array_equal(a, b) for a, b in zip(states, kept, strict=True))
+
+
+def test_a_symmetric_network_stays_symmetric():
+    """Two equal branches, one laid against its direction, see the same pressures."""
+    nodes = {"lake": reservoir(1e6), "fork": junction()}
+    nodes |= {n: junction(step(0.2, 0.03, 0.0)) for n in ("left", "right")}
+    links = {
+        "main": pipe("lake", "fork", 200.0, 0.3, 1000.0, 20, friction=ROUGH),
+        "to": pipe("fork", "left", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
+        "fro": pipe("right", "fork", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
+    }
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
+    result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["left.pressure", "right.pressure"]))
+    assert result["left.pressure"] == pytest.approx(result["right.pressure"], rel=1e-10)
+    assert moved(result, "left.pressure") > 1e5

@@ -1,0 +1,156 @@
+"""A run killed at a random moment and resumed equals the unbroken one, bit for bit."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_output import branched
+
+import fvsolve
+
+KILLS = 4
+TIMINGS = ("seconds", "seconds_setup", "seconds_total", "cost")
+
+
+def long_run(**numerics) -> dict:
+    """A case whose stepping takes about a second."""
+    case = branched(fields=20)
+    case["nodes"]["tower"] = {"type": "tank", "area": 2.0, "level": 5.0, "height": 30.0, "elevation": 10.0}
+    case["links"]["riser"] = {
+        "type": "valve",
+        "from": "fork",
+        "to": "tower",
+        "area": 0.01,
+        "discharge_coefficient": 0.6,
+    }
+    case["numerics"] = {"end": 400.0, "scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **numerics}
+    case["output"] |= {"every": 0.1, "probes": [*case["output"]["probes"], "tower.level"]}
+    return case
+
+
+def started(case: Path, out: Path, *more: str) -> subprocess.Popen:
+    command = [sys.executable, "-m", "fvsolve", "run", str(case), "--out", str(out), *more]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def same_files(one: Path, other: Path) -> None:
+    files = sorted(path.relative_to(one) for path in one.rglob("*") if path.is_file())
+    assert files == sorted(path.relative_to(other) for path in other.rglob("*") if path.is_file())
+    for name in files:
+        if name.name == "summary.json":
+            said, again = (json.loads((run / name).read_text()) for run in (one, other))
+            assert {**said, **dict.fromkeys(TIMINGS)} == {**again, **dict.fromkeys(TIMINGS)}
+        elif name.name == "restart.npz":
+            with np.load(one / name) as here, np.load(other / name) as there:
+                timed = {key for key in here.files if "seconds" in key}
+                assert here.files == there.files
+                assert all(
+                    np.array_equal(here[k], there[k], equal_nan=k == "y") for k in set(here.files) - timed
+                )
+        else:
+            assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("numerics", [{}, {"courant": None, "rtol": 1e-4}], ids=["courant", "error control"])
+def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, numerics):
+    seed = random.randrange(10**6)
+    print("seed", seed)
+    moments = random.Random(seed)
+    case = long_run()
+    case["numerics"] = {k: v for k, v in {**case["numerics"], **numerics}.items() if v is not None}
+    if "rtol" in case["numerics"]:
+        case["numerics"]["method"] = "bogacki-shampine"
+    begun = time.perf_counter()
+    whole = fvsolve.run(case, out=tmp_path / "whole")
+    assert whole.ok, whole.reason
+    took = time.perf_counter() - begun
+    file = tmp_path / "whole" / "case.toml"
+    kills = 0
+    for _ in range(KILLS):
+        running = started(file, tmp_path / "broken", "--resume")
+        wait_for_a_run(tmp_path / "broken", running)
+        time.sleep(moments.uniform(0.0, 0.5 * took))
+        kills += running.poll() is None
+        running.kill()
+        running.communicate()
+    last = started(file, tmp_path / "broken", "--resume")
+    assert last.wait() == 0, last.communicate()
+    assert kills
+    same_files(tmp_path / "whole", tmp_path / "broken")
+
+
+def wait_for_a_run(folder: Path, running: subprocess.Popen) -> None:
+    while running.poll() is None and not (folder / "history.csv").exists():
+        time.sleep(0.005)
+
+
+def test_a_later_end_goes_on_from_the_last_checkpoint(tmp_path):
+    fvsolve.run(branched(), set={"output.every": 0.01}, out=tmp_path / "run")
+    longer = {"output.every": 0.01, "numerics.end": 1.5}
+    result = fvsolve.run(branched(), set=longer, out=tmp_path / "run", resume=True)
+    unbroken = fvsolve.run(branched(), set=longer)
+    assert result.t[-1] == 1.5 and np.array_equal(result.t, unbroken.t)
+    assert result["gate.pressure"] == pytest.approx(unbroken["gate.pressure"], rel=1e-3)
+
+
+def test_a_run_that_came_to_its_end_is_left_as_it_is(tmp_path):
+    fvsolve.run(branched(), out=tmp_path / "run")
+    before = (tmp_path / "run" / "summary.json").stat().st_mtime_ns
+    assert fvsolve.run(branched(), out=tmp_path / "run", resume=True).ok
+    assert (tmp_path / "run" / "summary.json").stat().st_mtime_ns == before
+
+
+def test_nothing_to_resume_is_a_start(tmp_path):
+    assert fvsolve.run(branched(), out=tmp_path / "run", resume=True).ok
+
+
+def test_resume_needs_a_directory():
+    with pytest.raises(fvsolve.RunError, match="out="):
+        fvsolve.run(branched(), resume=True)
+
+
+def test_a_checkpoint_of_another_case_is_refused_with_a_remedy(tmp_path):
+    fvsolve.run(branched(), out=tmp_path / "run")
+    with pytest.raises(fvsolve.RunError, match="another case.*--force"):
+        fvsolve.run(branched(), set={"links.main.cells": 31}, out=tmp_path / "run", resume=True)
+
+
+def test_other_claims_and_titles_are_no_other_case(tmp_path):
+    fvsolve.run(branched(), out=tmp_path / "run")
+    said = {"title": "Another", "expect": {"min(valve.flow)": {"value": 0.0, "atol": 1.0}}}
+    assert fvsolve.run(branched(), set=said, out=tmp_path / "run", resume=True).ok
+
+
+def test_a_checkpoint_of_other_versions_is_refused_with_a_remedy(tmp_path):
+    place = tmp_path / "run" / "restart.npz"
+    fvsolve.run(branched(), out=tmp_path / "run")
+    with np.load(place) as file:
+        arrays = dict(file)
+    arrays["identity"] = np.array(str(arrays["identity"]).replace(np.__version__, "0.0.1"))
+    np.savez(place, **arrays)
+    with pytest.raises(fvsolve.RunError, match="other versions.*numpy 0.0.1.*--force"):
+        fvsolve.run(branched(), out=tmp_path / "run", resume=True)
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 not a checkpoint"])
+def test_a_damaged_checkpoint_is_refused_with_a_remedy(tmp_path, damage):
+    fvsolve.run(branched(), out=tmp_path / "run")
+    (tmp_path / "run" / "restart.npz").write_bytes(damage)
+    with pytest.raises(fvsolve.RunError, match="cannot be read.*--force"):
+        fvsolve.run(branched(), out=tmp_path / "run", resume=True)
+
+
+def test_a_history_that_lost_rows_is_refused_with_a_remedy(tmp_path):
+    fvsolve.run(branched(), out=tmp_path / "run")
+    (tmp_path / "run" / "summary.json").unlink()
+    history = tmp_path / "run" / "history.csv"
+    history.write_bytes(history.read_bytes()[:-100])
+    with pytest.raises(fvsolve.RunError, match="shorter.*--force"):
+        fvsolve.run(branched(), out=tmp_path / "run", resume=True)

@@ -1,0 +1,162 @@
+"""Tanks that drain, level and turn round, against closed forms, through their end in finite time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from truth import scenes, vessels
+from truth.scenes import AMBIENT, GRAVITY, lake, reservoir, scene, tank, valve
+
+import fvsolve
+
+CLOSE = {"method": "dormand-prince", "rtol": 1e-9}
+OUTLET = 0.01
+
+
+def drained(section, level: float, end: float, numerics: dict = CLOSE, **outlet):
+    nodes = {"basin": tank(section, level), "air": reservoir(AMBIENT)}
+    links = {"hole": valve("basin", "air", OUTLET, **outlet)}
+    return fvsolve.run(scene(nodes, links, end, numerics, ["basin.level", "hole.flow"], 1.0))
+
+
+@pytest.mark.parametrize(
+    "numerics", [CLOSE, {}, {"method": "rk4", "step": 0.02}], ids=["tight", "default", "fixed step"]
+)
+def test_a_prism_drains_in_finite_time_and_stays_empty(numerics):
+    section, level = 2.0, 1.5
+    emptied = 2 * section * math.sqrt(level) / (OUTLET * math.sqrt(2 * GRAVITY))
+    result = drained(section, level, emptied + 60.0, numerics)
+    assert result.ok
+    assert result["basin.level"] == pytest.approx(vessels.prism(section, OUTLET, level, result.t), abs=1e-6)
+    assert np.max(np.abs(result["hole.flow"][result.t > emptied + 1.0])) < 1e-6 * result["hole.flow"][0]
+
+
+@pytest.mark.parametrize(
+    "foot, growth", [(0.5, 1.5), (3.0, -1.0), (0.01, 2.0)], ids=["funnel", "dome", "near a point"]
+)
+def test_a_shaped_tank_drains_as_its_closed_form(foot, growth):
+    level = 2.0
+    section = {"level": [0.0, 2.5], "area": [foot, foot + 2.5 * growth]}
+    emptied = (2 * foot * math.sqrt(level) + 2 / 3 * growth * level**1.5) / (OUTLET * math.sqrt(2 * GRAVITY))
+    result = drained(section, level, emptied + 60.0)
+    exact = vessels.tapered(foot, growth, OUTLET, level, np.asarray(result.t))
+    assert result["basin.level"] == pytest.approx(exact, abs=1e-6)
+
+
+def test_the_flow_out_is_torricelli_s():
+    result = drained(2.0, 1.5, 50.0)
+    speed = np.sqrt(2 * GRAVITY * result["basin.level"])
+    assert result["hole.flow"] == pytest.approx(OUTLET * speed, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "numerics", [CLOSE, {}, {"method": "rk4", "step": 0.02}], ids=["tight", "default", "fixed step"]
+)
+@pytest.mark.parametrize("levels", [(3.0, 1.0), (0.5, 2.0)], ids=["down", "up"])
+def test_two_tanks_level_in_finite_time_and_rest(levels, numerics):
+    areas, flow_area = (2.0, 3.0), 0.02
+    nodes = {"one": tank(areas[0], levels[0]), "two": tank(areas[1], levels[1])}
+    links = {"gap": valve("one", "two", flow_area)}
+    slope = flow_area * math.sqrt(2 * GRAVITY) * (1 / areas[0] + 1 / areas[1])
+    drop = abs(levels[0] - levels[1])
+    end = 2 * math.sqrt(drop) / slope + 60.0
+    result = fvsolve.run(scene(nodes, links, end, numerics, ["one.level", "two.level", "gap.flow"], 1.0))
+    left = vessels.levelling(areas, flow_area, drop, result.t) * math.copysign(1, levels[0] - levels[1])
+    mean = (areas[0] * levels[0] + areas[1] * levels[1]) / sum(areas)
+    assert result.ok
+    assert result["one.level"] == pytest.approx(mean + left * areas[1] / sum(areas), abs=1e-6)
+    assert result["two.level"] == pytest.approx(mean - left * areas[0] / sum(areas), abs=1e-6)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_a_tank_whose_outfall_rises_and_falls_turns_the_flow_round():
+    """Made so that the root of the drop is `S cos(w t)`, hence the level `h0 - K S sin(w t) / w`."""
+    section, level, root, period = 4.0, 3.0, 0.8, 240.0
+    speed, w = OUTLET * math.sqrt(2 * GRAVITY) / section, 2 * math.pi / period
+
+    def level_at(t):
+        return level - speed * root * np.sin(w * t) / w
+
+    def outfall(t):
+        return level_at(t) - root**2 * np.cos(w * t) * np.abs(np.cos(w * t))
+
+    t = np.linspace(0.0, 600.0, 12001)
+    head = {"time": t.tolist(), "value": outfall(t).tolist(), "kind": "smooth"}
+    nodes = {"basin": tank(section, level), "sea": lake(head)}
+    case = scene(
+        nodes, {"hole": valve("basin", "sea", OUTLET)}, 600.0, CLOSE, ["basin.level", "hole.flow"], 1.0
+    )
+    result = fvsolve.run(case)
+    now = np.asarray(result.t)
+    assert result["hole.flow"].min() < 0 < result["hole.flow"].max()
+    assert result["basin.level"] == pytest.approx(level_at(now), abs=1e-6)
+    turned = np.abs(np.cos(w * now)) > 0.05  # the root magnifies the table's error where the drop is nil
+    exact = speed * section * root * np.cos(w * now)
+    assert result["hole.flow"][turned] == pytest.approx(exact[turned], abs=1e-6)
+
+
+def test_an_outfall_that_goes_up_and_down_in_straight_lines_agrees_with_scipy():
+    section, level = 4.0, 3.0
+    times, heads = [0.0, 100.0, 200.0, 320.0], [2.5, 4.0, 2.0, 3.5]
+    head = {"time": times, "value": heads, "kind": "linear"}
+    nodes = {"basin": tank(section, level), "sea": lake(head)}
+    case = scene(nodes, {"hole": valve("basin", "sea", OUTLET)}, 400.0, CLOSE, ["basin.level"], 4.0)
+    result = fvsolve.run(case)
+    k = OUTLET * math.sqrt(2 * GRAVITY) / section
+
+    def rate(t, h):
+        drop = h - np.interp(t, times, heads)
+        return -k * np.sign(drop) * np.sqrt(np.abs(drop))
+
+    y, found = np.array([level]), [level]
+    for a, b in zip(range(0, 400, 4), range(4, 404, 4), strict=True):
+        y = solve_ivp(rate, (a, b), y, "Radau", rtol=1e-11, atol=1e-12, max_step=0.5).y[:, -1]
+        found.append(y[0])
+    at = np.interp(np.arange(0, 401, 4), result.t, result["basin.level"])
+    assert at == pytest.approx(np.array(found), abs=1e-6)
+
+
+def test_running_dry_is_marked_when_and_where_it_happens():
+    """The outfall lies below the bottom, so water is still asked for at level 0."""
+    section, level, below = 2.0, 1.5, 2.0
+    nodes = {"basin": tank(section, level, elevation=10.0), "air": reservoir(AMBIENT, elevation=10.0 - below)}
+    links = {"hole": valve("basin", "air", OUTLET)}
+    slope = OUTLET * math.sqrt(2 * GRAVITY) / section
+    dry = 2 * (math.sqrt(level + below) - math.sqrt(below)) / slope
+    result = fvsolve.run(scene(nodes, links, dry + 20.0, CLOSE, ["basin.level"], 1.0))
+    (mark,) = [m for m in result.marks if m.place.endswith("basin")]
+    assert mark.time == pytest.approx(dry, abs=1e-6)
+    wet = result.t <= dry
+    exact = vessels.falling_root(level + below, slope, np.asarray(result.t)[wet]) - below
+    assert result["basin.level"][wet] == pytest.approx(exact, abs=1e-6)
+    assert np.min(result["basin.level"]) > -1e-6
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_a_tank_filled_above_its_height_spills_and_the_ledger_has_it():
+    nodes = {"basin": tank(2.0, 1.0, height=1.5), "spring": {"type": "inflow", "flow": 0.02}}
+    links = {"pipe": valve("spring", "basin", 0.05)}
+    result = fvsolve.run(scene(nodes, links, 100.0, CLOSE, ["basin.level"], 1.0))
+    wanted = np.minimum(1.0 + 0.01 * np.asarray(result.t), 1.5)
+    assert result["basin.level"] == pytest.approx(wanted, abs=1e-6)
+    assert result.ledger["mass"]["spilled"] == pytest.approx(1000.0 * (0.02 * 100.0 - 1.0), rel=1e-6)
+    assert any(m.place.endswith("basin") and m.time == pytest.approx(50.0, abs=1e-6) for m in result.marks)
+
+
+def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():
+    """Rigid column, no friction: `w^2 = g A / (L A_tank)` about the reservoir's level."""
+    length, diameter, section = 200.0, 0.4, 0.5
+    nodes = {"lake": lake(10.0), "surge": tank(section, 10.5)}
+    column = {"type": "rigid-column", "from": "lake", "to": "surge", "length": length, "diameter": diameter}
+    links = {"main": {**column, "friction": scenes.NO_FRICTION, "initial_flow": 0.0}}
+    w = math.sqrt(GRAVITY * scenes.area(diameter) / (length * section))
+    case = scene(
+        nodes, links, 2.5 * 2 * math.pi / w, {**CLOSE, "rtol": 1e-10}, ["surge.level", "main.flow"], 0.5
+    )
+    result = fvsolve.run(case)
+    t = np.asarray(result.t)
+    assert result["surge.level"] == pytest.approx(10 + 0.5 * np.cos(w * t), abs=1e-6)
+    assert result["main.flow"] == pytest.approx(-section * 0.5 * w * np.sin(w * t), abs=1e-6)

@@ -1,0 +1,197 @@
+"""Units: every spelling of the table says what pint says, and near misses are refused."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from pytest import approx
+
+from fvsolve import units
+from fvsolve.units import DIMENSIONS, UNITS, Kinematic, convert, parse
+
+# Spelling -> what it is in pint's words. One row for each spelling of the table; a test below sees that none lacks.
+ROWS = """
+m: meter              | mm: millimeter        | cm: centimeter      | dm: decimeter         | km: kilometer
+um: micrometer        | in: inch              | inch: inch          | ft: foot              | yd: yard
+mi: mile              | m2: meter**2          | cm2: centimeter**2  | mm2: millimeter**2    | dm2: decimeter**2
+km2: kilometer**2     | ha: hectare           | in2: inch**2        | ft2: foot**2          | sqft: foot**2
+acre: 43560 foot**2   | m3: meter**3          | cm3: centimeter**3  | mm3: millimeter**3    | dm3: decimeter**3
+l: liter              | L: liter              | ml: milliliter      | mL: milliliter        | cl: centiliter
+hl: hectoliter        | Ml: megaliter         | ML: megaliter       | in3: inch**3          | ft3: foot**3
+gal: gallon           | impgal: imperial_gallon | acre ft: 43560 foot**3 | s: second        | ms: millisecond
+us: microsecond       | ns: nanosecond        | min: minute         | h: hour               | hr: hour
+d: day                | day: day              | Pa: pascal          | hPa: hectopascal      | kPa: kilopascal
+MPa: megapascal       | GPa: gigapascal       | mbar: millibar      | bar: bar              | kbar: kilobar
+atm: standard_atmosphere | at: technical_atmosphere | kgf/cm2: kilogram_force/centimeter**2
+N/m2: newton/meter**2 | N/mm2: newton/millimeter**2 | kN/m2: kilonewton/meter**2 | psi: psi      | ksi: kpsi
+psf: pound_force/foot**2 | lbf/in2: pound_force/inch**2
+mH2O: 1000 kilogram/meter**3*standard_gravity*meter    | cmH2O: 1000 kilogram/meter**3*standard_gravity*centimeter
+mmH2O: 1000 kilogram/meter**3*standard_gravity*millimeter | mwc: 1000 kilogram/meter**3*standard_gravity*meter
+inH2O: 1000 kilogram/meter**3*standard_gravity*inch    | ftH2O: 1000 kilogram/meter**3*standard_gravity*foot
+mmHg: millimeter_Hg   | inHg: 25.4 millimeter_Hg | Torr: torr       | torr: torr            | Paa: pascal
+kPaa: kilopascal      | MPaa: megapascal      | mbara: millibar     | bara: bar             | psia: psi
+Pag: pascal           | kPag: kilopascal      | MPag: megapascal    | mbarg: millibar       | barg: bar
+psig: psi             | mH2Og: 1000 kilogram/meter**3*standard_gravity*meter
+m3/s: meter**3/second | m3/min: meter**3/minute | m3/h: meter**3/hour | m3/hr: meter**3/hour | m3/d: meter**3/day
+m3/day: meter**3/day  | cmh: meter**3/hour    | CMH: meter**3/hour  | cmd: meter**3/day     | CMD: meter**3/day
+cms: meter**3/second  | CMS: meter**3/second  | l/s: liter/second   | L/s: liter/second     | lps: liter/second
+LPS: liter/second     | l/min: liter/minute   | L/min: liter/minute | lpm: liter/minute     | LPM: liter/minute
+l/h: liter/hour       | L/h: liter/hour       | l/d: liter/day      | L/d: liter/day        | ml/s: milliliter/second
+mL/s: milliliter/second | ml/min: milliliter/minute | mL/min: milliliter/minute | cm3/s: centimeter**3/second
+cm3/min: centimeter**3/minute | mm3/s: millimeter**3/second | dm3/s: decimeter**3/second | Ml/d: megaliter/day
+ML/d: megaliter/day   | mld: megaliter/day    | MLD: megaliter/day  | cfs: foot**3/second   | CFS: foot**3/second
+ft3/s: foot**3/second | cfm: foot**3/minute   | CFM: foot**3/minute | ft3/min: foot**3/minute | gpm: gallon/minute
+GPM: gallon/minute    | gal/min: gallon/minute | gal/s: gallon/second | gpd: gallon/day     | gph: gallon/hour
+mgd: 1e6 gallon/day   | MGD: 1e6 gallon/day   | igpm: imperial_gallon/minute | imgd: 1e6 imperial_gallon/day
+IMGD: 1e6 imperial_gallon/day | afd: 43560 foot**3/day | AFD: 43560 foot**3/day | m/s: meter/second
+mm/s: millimeter/second | cm/s: centimeter/second | km/s: kilometer/second | m/min: meter/minute | m/h: meter/hour
+km/h: kilometer/hour  | ft/s: foot/second     | fps: foot/second    | ft/min: foot/minute   | in/s: inch/second
+mph: mile/hour        | m/s2: meter/second**2 | cm/s2: centimeter/second**2 | ft/s2: foot/second**2
+kg/m3: kilogram/meter**3 | g/cm3: gram/centimeter**3 | g/ml: gram/milliliter | g/mL: gram/milliliter
+kg/l: kilogram/liter  | kg/L: kilogram/liter  | kg/dm3: kilogram/decimeter**3 | g/l: gram/liter | g/L: gram/liter
+t/m3: metric_ton/meter**3 | lb/ft3: pound/foot**3 | Pa s: pascal*second | mPa s: millipascal*second
+uPa s: micropascal*second | P: poise          | cP: centipoise      | N s/m2: newton*second/meter**2
+kg/m/s: kilogram/meter/second | m2/s: meter**2/second | mm2/s: millimeter**2/second | cSt: centistokes
+St: stokes            | cm2/s: centimeter**2/second | ft2/s: foot**2/second | -: dimensionless | 1: dimensionless
+%: percent            | kg: kilogram          | g: gram             | mg: milligram         | t: metric_ton
+tonne: metric_ton     | lb: pound             | lbm: pound          | kg/s: kilogram/second | g/s: gram/second
+kg/min: kilogram/minute | kg/h: kilogram/hour | t/h: metric_ton/hour | lb/s: pound/second   | N: newton
+kN: kilonewton        | kgf: kilogram_force   | lbf: pound_force    | J: joule              | kJ: kilojoule
+MJ: megajoule         | kWh: kilowatt_hour    | W: watt             | kW: kilowatt          | MW: megawatt
+hp: horsepower        | Hz: 1/second          | kHz: 1000/second    | 1/s: 1/second         | rad: radian
+deg: degree           | C: coulomb            | F: farad            | K: kelvin             | degC: degC
+celsius: degC         | degF: degF            | degR: degR
+"""
+PINT = dict(row.strip().split(": ") for line in ROWS.splitlines() for row in line.split("|") if row.strip())
+PINT_SI = {
+    "m": "meter", "m2": "meter**2", "m3": "meter**3", "s": "second", "Pa": "pascal", "m3/s": "meter**3/second",
+    "m/s": "meter/second", "m/s2": "meter/second**2", "kg/m3": "kilogram/meter**3", "Pa s": "pascal*second",
+    "K": "kelvin", "-": "dimensionless", "m2/s": "meter**2/second", "kg": "kilogram", "kg/s": "kilogram/second",
+    "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "rad": "radian", "C": "coulomb", "F": "farad",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def registry():
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def test_every_spelling_has_a_row():
+    assert set(PINT) == set(UNITS)
+
+
+@pytest.mark.parametrize("spelling", UNITS)
+def test_spelling_agrees_with_pint(spelling, registry):
+    unit = UNITS[spelling]
+    words = PINT[spelling].split(" ", 1)
+    factor, name = (float(words[0]), words[1]) if len(words) == 2 else (1.0, words[0])
+    wanted = PINT_SI[DIMENSIONS[unit.dimension].si]
+    for number in (1.0, 36.6):
+        si = registry.Quantity(number * factor, registry.parse_expression(name).units) if "/" not in name else None
+        if si is None:
+            si = number * factor * registry.parse_expression(name)
+        assert unit.si(number) == approx(si.to(wanted).magnitude, rel=1e-12)
+
+
+@pytest.mark.parametrize("dimension", DIMENSIONS)
+def test_examples_and_si_units_parse(dimension):
+    example = DIMENSIONS[dimension]
+    assert parse(example.example, dimension) is not None
+    assert units.find(example.si, dimension).si(1.0) == 1.0
+
+
+def test_text_is_rounded_once():
+    assert parse("304.8 mm", "length") == 0.3048
+    assert parse("0.26 mm", "length") == 0.00026
+    assert parse("20 degC", "temperature") == 293.15
+    assert parse("68 degF", "temperature") == 293.15
+    assert parse("32.9 l/s", "flow") == 0.0329
+
+
+@pytest.mark.parametrize(
+    "text, dimension, value",
+    [
+        ("300mm", "length", 0.3), (" 1e3 m ", "length", 1000.0), ("-3 m", "length", -3.0), ("1_000 m", "length", 1e3),
+        ("\N{MINUS SIGN}5 degC", "temperature", 268.15), ("5 m³/h", "flow", 5 / 3600), ("5 m^3/h", "flow", 5 / 3600),
+        ("5 m**3 / h", "flow", 5 / 3600), ("1 Pa.s", "viscosity", 1.0), ("1 Pa*s", "viscosity", 1.0),
+        ("1 Pa·s", "viscosity", 1.0), ("20 °C", "temperature", 293.15), ("3 µm", "length", 3e-6), ("50 %", "number", 0.5),
+        ("0.5", "number", 0.5), (7, "length", 7.0), (2.5, "flow", 2.5),
+    ],
+)  # fmt: skip
+def test_ways_of_writing(text, dimension, value):
+    assert parse(text, dimension) == value
+
+
+def test_pressure_says_whether_it_is_gauge():
+    assert parse("5 barg", "pressure") == (5e5, True)
+    assert parse("5 bar(g)", "pressure") == (5e5, True)
+    assert parse("5 bara", "pressure") == (5e5, False)
+    assert parse("5 bar", "pressure") == (5e5, False)
+    assert parse(101325, "pressure") == (101325.0, False)
+    assert parse("1 psig", "pressure") == (approx(6894.757), True)
+
+
+def test_viscosity_may_be_kinematic():
+    assert isinstance(parse("32 cSt", "viscosity"), Kinematic)
+    assert not isinstance(parse("32 cP", "viscosity"), Kinematic)
+
+
+def test_pint_knows_the_rest():
+    assert parse("1 furlong", "length") == approx(201.168, rel=1e-5)
+    assert parse("1 m^3/fortnight", "flow") == approx(1 / (14 * 86400))
+
+
+@pytest.mark.parametrize(
+    "text, dimension, message",
+    [
+        ("20 C", "temperature", '"20 C" is a charge; wanted a temperature; did you mean "20 degC"?'),
+        ("68 F", "temperature", '"68 F" is a capacitance; wanted a temperature; did you mean "68 degF"?'),
+        ("304.8 kg", "length", '"304.8 kg" is a mass; wanted a length, for example "300 mm"'),
+        ("10 mPa", "pressure", 'no unit "mPa"; did you mean "10 MPa"?'),
+        ("10 BAR", "pressure", 'no unit "BAR"; did you mean "10 bar"?'),
+        ("5 bar g", "pressure", 'no unit "bar g"; did you mean "5 barg"?'),
+        ("5 kg/cm2", "pressure", '"5 kg/cm2": no unit "kg/cm2"; did you mean "5 kgf/cm2"?'),
+        ("45 m", "pressure", '"45 m" is a length; wanted a pressure; did you mean "45 mH2O"?'),
+        ("10 sec", "time", '"10 sec": no unit "sec"; did you mean "10 s"?'),
+        ("10 Min", "time", 'no unit "Min"; did you mean "10 min"?'),
+        ("3 kg/s", "flow", '"3 kg/s" is a mass flow; wanted a flow, for example "20 l/s"'),
+        ("3 lp", "flow", '"3 lp": no unit "lp"; did you mean "3 lps"?'),
+        ("300", "length", '"300" has no unit; did you mean "300 m", or the bare number 300?'),
+        ("304,8 mm", "length", '"304,8 mm" has a decimal comma; did you mean "304.8 mm"?'),
+        ("a lot", "length", '"a lot" is no number with a unit; wanted a length, for example "300 mm"'),
+        ("", "length", '"" is no number with a unit; wanted a length, for example "300 mm"'),
+        (True, "length", 'true is true or false; wanted a length, for example "300 mm"'),
+        ([1], "length", '[1] is a list; wanted a length, for example "300 mm"'),
+        (float("nan"), "length", 'nan is not finite; wanted a length, for example "300 mm"'),
+        (float("inf"), "flow", 'inf is not finite; wanted a flow, for example "20 l/s"'),
+        (10**400, "length", "is not finite; wanted a length"),
+        ("1e999 m", "length", '"1e999 m" is not finite; wanted a length, for example "300 mm"'),
+        ("2 GPag", "modulus", '"2 GPag": no unit "GPag"'),
+        ("2 barg", "modulus", '"2 barg" is a gauge pressure; wanted a modulus, for example "210 GPa"'),
+        ("3 m/s", "number", '"3 m/s" is a velocity; wanted a number, for example 0.5'),
+        ("3 V", "length", '"3 V" is a quantity of [kg·m²/A/s³]; wanted a length, for example "300 mm"'),
+        ("3 9**9**9", "length", '"3 9**9**9": no unit "9**9**9"; wanted a length, for example "300 mm"'),
+    ],
+)  # fmt: skip
+def test_near_misses_are_refused(text, dimension, message):
+    with pytest.raises(ValueError) as caught:
+        parse(text, dimension)
+    assert message in str(caught.value)
+
+
+def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
+    values = np.array([0.0, 1.5e5])
+    assert convert(values, "pressure", "barg", ambient=1e5) == approx([-1.0, 0.5])
+    assert convert(values, "pressure", "bar") == approx([0.0, 1.5])
+    assert convert(values, "gauge_pressure", "barg", ambient=1e5) == approx([0.0, 1.5])
+    assert convert(0.02, "flow", "l/s") == approx(20.0)
+    assert convert(293.15, "temperature", "degC") == approx(20.0)
+    assert convert(3.048, "head", "ft") == approx(10.0)
+
+
+def test_the_table_needs_no_pint():
+    code = "import sys; from fvsolve.units import parse; parse('20 degC', 'temperature'); assert 'pint' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

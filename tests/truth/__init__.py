@@ -1,0 +1,1 @@
+"""Independent truth for the tests: closed forms and exact constructions. Imports nothing of fvsolve."""

@@ -1,0 +1,22 @@
+"""Smooth bumps with exact cell averages, and what a junction makes of them. Knows no grid but its edges."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.special import erf
+
+Array = np.ndarray
+
+
+def gaussian_averages(edges: Array, centre: float, width: float) -> Array:
+    """Cell averages of `exp(-((x - centre) / width)^2)`."""
+    return width * math.sqrt(math.pi) / 2 * np.diff(erf((edges - centre) / width)) / np.diff(edges)
+
+
+def scattered(impedances: list[float]) -> tuple[float, list[float]]:
+    """Pressure reflected into the first pipe, and passed on to the others, of a unit wave from the first."""
+    admittance = [1 / z for z in impedances]
+    passed = 2 * admittance[0] / sum(admittance)
+    return passed - 1, [passed] * (len(impedances) - 1)

@@ -1,0 +1,120 @@
+"""Cases as dicts shaped like the file, for the tests. Knows the keys; knows no answer. All SI."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+AMBIENT = 101325.0
+GRAVITY = 9.80665
+RHO = 1000.0
+WATER = {
+    "name": "user",
+    "density": RHO,
+    "bulk_modulus": 2.2e9,
+    "viscosity": 1e-3,
+    "vapor_pressure": 2300.0,
+    "law": "linear",
+}
+SHARP = {"scheme": "upwind", "method": "euler", "courant": 1.0}  # exact where every cell takes one step
+SMOOTH = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
+NO_FRICTION = {"model": "none"}
+
+
+def area(diameter: float) -> float:
+    return math.pi / 4 * diameter**2
+
+
+def scene(
+    nodes: dict, links: dict, end: float, numerics: dict, probes: Any = (), every: float = 0.01, **top: Any
+) -> dict:
+    """A whole case; `top` adds or replaces top-level tables."""
+    case = {
+        "schema": 1,
+        "ambient_pressure": AMBIENT,
+        "gravity": GRAVITY,
+        "fluid": WATER,
+        "nodes": nodes,
+        "links": links,
+        "numerics": {"end": end, **numerics},
+        "output": {"every": every, "probes": list(probes)} if probes else {"every": every},
+    }
+    return {**case, **top}
+
+
+def reservoir(pressure: Any, **more: Any) -> dict:
+    return {"type": "reservoir", "pressure": pressure, **more}
+
+
+def lake(head: Any, **more: Any) -> dict:
+    return {"type": "reservoir", "head": head, **more}
+
+
+def junction(demand: Any = None, **more: Any) -> dict:
+    return {"type": "junction", **({} if demand is None else {"demand": demand}), **more}
+
+
+def tank(section: Any, level: float, **more: Any) -> dict:
+    return {"type": "tank", "area": section, "level": level, **more}
+
+
+def chamber(volume: float, pressure: float | None = None, **more: Any) -> dict:
+    given = {} if pressure is None else {"initial_pressure": pressure}
+    return {"type": "chamber", "volume": volume, **given, **more}
+
+
+def pipe(
+    start: str, end: str, length: float, diameter: float, wave_speed: float, cells: int, **more: Any
+) -> dict:
+    return {
+        "type": "pipe",
+        "from": start,
+        "to": end,
+        "length": length,
+        "diameter": diameter,
+        "wave_speed": wave_speed,
+        "cells": cells,
+        "friction": NO_FRICTION,
+        **more,
+    }
+
+
+def stiff_pipe(start: str, end: str, length: float, diameter: float, cells: int, **more: Any) -> dict:
+    """A pipe whose wave speed is the fluid's sound speed."""
+    found = pipe(start, end, length, diameter, 0.0, cells, wall="stiff", **more)
+    del found["wave_speed"]
+    return found
+
+
+def valve(start: str, end: str, flow_area: float, opening: Any = 1.0, **more: Any) -> dict:
+    """A valve by its effective area Cd A [m2]."""
+    return {
+        "type": "valve",
+        "from": start,
+        "to": end,
+        "area": flow_area / 0.61,
+        "discharge_coefficient": 0.61,
+        "opening": opening,
+        **more,
+    }
+
+
+def step(time: float, before: float, after: float) -> dict:
+    return {"time": [time - 1.0, time], "value": [before, after], "kind": "step"}
+
+
+def ramp(start: float, duration: float, before: float, after: float, exponent: float = 1.0) -> dict:
+    return {"start": start, "duration": duration, "value": [before, after], "exponent": exponent}
+
+
+def smooth_step(t: float, start: float, duration: float) -> float:
+    """From 0 to 1 by the polynomial whose first four derivatives vanish at both ends."""
+    s = min(max((t - start) / duration, 0.0), 1.0)
+    return s**5 * (126 + s * (-420 + s * (540 + s * (-315 + 70 * s))))
+
+
+def smooth_ramp(start: float, duration: float, before: float, after: float, points: int = 1201) -> dict:
+    """`smooth_step` as a table fine enough that its interpolation is exact to about 1e-8."""
+    times = [start + duration * i / (points - 1) for i in range(points)]
+    values = [before + (after - before) * smooth_step(t, start, duration) for t in times]
+    return {"time": times, "value": values, "kind": "smooth"}
