@@ -106,7 +106,12 @@ def test_what_the_design_says_is_what_the_case_holds(scene):
     half = case.output.probes[3]
     assert (half.part, half.name, half.quantity, half.fraction) == ("links", "main", "pressure", 0.5)
     claim = case.expect["max(gate.pressure)"]
-    assert (claim.function, claim.probe.text, claim.time, claim.value) == ("max", "gate.pressure", None, 1.0751e6)
+    assert (claim.function, claim.probe.text, claim.time, claim.value) == (
+        "max",
+        "gate.pressure",
+        None,
+        1.0751e6,
+    )
     assert (claim.rtol, claim.atol) == (1e-2, 0.0)
     assert case.properties.density == 1000 and case.fluid.viscosity == approx(1e-3)
     assert not case.elevations_stated and case.elevation("gate") == 0.0
@@ -138,11 +143,14 @@ def dressed(tmp_path, **changes):
         "nodes": {
             "lake": {"type": "reservoir", "head": {"signal": "tide"}},
             "tower": {
-                "type": "tank", "elevation": 3, "area": {"level": [0, 1, 2], "area": [1, 2, "4 m2"]}, "level": "1.5 m",
-                "height": 2,
+                "type": "tank", "elevation": 3, "area": {"level": [0, 1, 2], "area": [1, 2, "4 m2"]},
+                "level": "1.5 m", "height": 2,
             },
             "gate": {"type": "junction", "elevation": 1, "demand": {"file": "stroke.csv", "kind": "smooth"}},
-            "well": {"type": "inflow", "elevation": 1, "flow": {"time": [0, 1], "value": ["1 l/s", 0], "kind": "step"}},
+            "well": {
+                "type": "inflow", "elevation": 1,
+                "flow": {"time": [0, 1], "value": ["1 l/s", 0], "kind": "step"},
+            },
             "bell": {"type": "chamber", "elevation": 0, "volume": "50 l", "initial_pressure": "2 barg"},
         },
         "links": {
@@ -151,15 +159,18 @@ def dressed(tmp_path, **changes):
                 "wall": {"youngs_modulus": "120 GPa", "thickness": "2 mm"}, "initial_flow": "1 l/s",
                 "friction": {"model": "hazen-williams", "coefficient": 120},
             },
-            "stiff": {"type": "pipe", "from": "well", "to": "gate", "length": 10, "diameter": 0.1, "wall": "stiff"},
+            "stiff": {
+                "type": "pipe", "from": "well", "to": "gate", "length": 10, "diameter": 0.1, "wall": "stiff",
+            },
             "riser": {"type": "rigid-column", "from": "gate", "to": "tower", "length": 10, "diameter": 0.1},
             "gate": {
                 "type": "valve", "from": "gate", "to": "bell", "Kv": 3, "opening": {"file": "in/stroke.csv"},
                 "characteristic": {"opening": [0, 0.5, 1], "flow_area": [0, 0.2, 1]},
             },
             "hole": {
-                "type": "orifice", "from": "bell", "to": "tower", "loss_coefficient": 2.4, "diameter": "10 mm",
-                "laminar_reynolds": 10, "opening": {"start": 1, "duration": 2, "value": [1, 0], "exponent": 1.5},
+                "type": "orifice", "from": "bell", "to": "tower", "loss_coefficient": 2.4,
+                "diameter": "10 mm", "laminar_reynolds": 10,
+                "opening": {"start": 1, "duration": 2, "value": [1, 0], "exponent": 1.5},
                 "characteristic": "equal-percentage",
             },
         },
@@ -167,7 +178,9 @@ def dressed(tmp_path, **changes):
         "numerics": {"start": -1, "end": "1 min", "rtol": 1e-7, "cell_time": "2 ms", "below_vapor": "stop"},
         "output": {
             "units": {"pressure": "barg", "flow": "l/s"},
-            "probes": ["tower.level", "nodes.gate.head", "links.gate.flow", "main.velocity@0.25", "main.flow"],
+            "probes": [
+                "tower.level", "nodes.gate.head", "links.gate.flow", "main.velocity@0.25", "main.flow",
+            ],
         },
         "expect": {
             "at(tower.level, 500 ms)": {"value": "1.5 m", "atol": "1 mm"},
@@ -199,7 +212,9 @@ def test_every_form_is_understood(tmp_path):
     assert case.nodes["tower"].area.area.tolist() == [1, 2, 4]
     assert case.fluid.viscosity == approx(32e-6 * 870)
     hole = case.links["hole"]
-    assert hole.kind == "orifice" and hole.opening.exponent == 1.5 and hole.characteristic == "equal-percentage"
+    assert (
+        hole.kind == "orifice" and hole.opening.exponent == 1.5 and hole.characteristic == "equal-percentage"
+    )
     assert hole.flow_area() == approx(np.pi / 4 * 0.01**2 / np.sqrt(2.4))
     assert case.elevations_stated and case.elevation("tower") == 3
     assert case.elevation("lake") == 1  # given by head: level with the far end of its first link
@@ -265,8 +280,16 @@ def test_a_case_goes_through_pickle_and_back(scene):
         ("links.main.cells", 400, lambda case: case.links["main"].cells == 400),
         ("links.main.length", "1 km", lambda case: case.links["main"].length == 1000),
         ("links.main.initial_flow", "20 l/s", lambda case: case.links["main"].initial_flow == 0.02),
-        ("links.main.friction", '{ model = "none" }', lambda case: case.links["main"].friction.model == "none"),
-        ("links.main.friction.model", "quasi-steady", lambda case: case.links["main"].friction.roughness == 0.00026),
+        (
+            "links.main.friction",
+            '{ model = "none" }',
+            lambda case: case.links["main"].friction.model == "none",
+        ),
+        (
+            "links.main.friction.model",
+            "quasi-steady",
+            lambda case: case.links["main"].friction.roughness == 0.00026,
+        ),
         ("links.valve.opening", "0.5", lambda case: case.links["valve"].opening.first == 0.5),
         ("links.valve.opening.duration", "2", lambda case: case.links["valve"].opening.time[1] == 3.0),
         ("numerics.scheme", "upwind", lambda case: case.numerics.scheme == "upwind"),
@@ -274,7 +297,11 @@ def test_a_case_goes_through_pickle_and_back(scene):
         ("gravity", "0", lambda case: case.gravity == 0),
         ("output.probes", '["gate.pressure"]', lambda case: len(case.output.probes) == 1),
         ("output.units.flow", "l/s", lambda case: case.output.units["flow"] == "l/s"),
-        ('expect."max(gate.pressure)".rtol', "0.5", lambda case: case.expect["max(gate.pressure)"].rtol == 0.5),
+        (
+            'expect."max(gate.pressure)".rtol',
+            "0.5",
+            lambda case: case.expect["max(gate.pressure)"].rtol == 0.5,
+        ),
         # a key takes the place of the one it stands for
         ("numerics.step", "1 ms", lambda case: case.numerics.step == 1e-3 and case.numerics.courant is None),
         ("links.main.wall", "stiff", lambda case: case.links["main"].wave_speed is None),
@@ -336,7 +363,10 @@ def test_one_point_is_a_constant():
         ({"area": "10 cm2"}, 0.61 * 1e-3 * np.sqrt(2e5 / 1000)),
         ({"diameter": 0.1, "loss_coefficient": 4}, np.pi / 400 / 2 * np.sqrt(2e5 / 1000)),
         ({"Kv": 36}, 0.01),  # m3/h at 1 bar
-        ({"Cv": 100}, 100 * 3.785411784e-3 / 60 * np.sqrt(1e5 / 6894.757293168361 * 0.999016)),  # gpm at 1 psi
+        (
+            {"Cv": 100},
+            100 * 3.785411784e-3 / 60 * np.sqrt(1e5 / 6894.757293168361 * 0.999016),
+        ),  # gpm at 1 psi
     ],
 )
 def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
@@ -347,7 +377,9 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
 
 def test_a_parts_key_is_documented_with_its_unit():
     made = schema()
-    pipe = next(one for one in made["properties"]["links"]["additionalProperties"]["anyOf"] if one["title"] == "Pipe")
+    pipe = next(
+        one for one in made["properties"]["links"]["additionalProperties"]["anyOf"] if one["title"] == "Pipe"
+    )
     assert pipe["required"] == ["type", "from", "to", "length", "diameter"]
     assert pipe["properties"]["length"]["description"] == "along its axis [m]"
     assert made["required"] == ["fluid", "nodes", "links", "numerics"]

@@ -65,10 +65,15 @@ def faults(text, folder, set=None):
 
 
 def test_the_example_of_the_design(tmp_path):
-    text = SCENE.replace("opening =", "openning =").replace('"304.8 mm"', '"304.8 kg"').replace('"gate"\nlen', '"gat"\nlen')
+    text = (
+        SCENE.replace("opening =", "openning =")
+        .replace('"304.8 mm"', '"304.8 kg"')
+        .replace('"gate"\nlen', '"gat"\nlen')
+    )
     assert faults(text, tmp_path).splitlines() == [
         "scene.toml: 3 faults",
-        '  line 25: links.main.to: no place named "gat"; places are gate, lake, outfall; did you mean "gate"?',
+        '  line 25: links.main.to: no place named "gat"; places are gate, lake, outfall; '
+        'did you mean "gate"?',
         '  line 27: links.main.diameter: "304.8 kg" is a mass; wanted a length, for example "300 mm"',
         '  line 38: links.valve.openning: unknown key; did you mean "opening"?',
     ]
@@ -113,8 +118,20 @@ to = "gate"
 length = 1
 diameter = 1
 """
-TANK = '[nodes.t]\ntype = "tank"\narea = 1\nlevel = 1\n[links.hole]\ntype = "orifice"\nfrom = "t"\nto = "gate"\nKv = 1\n'
-CHAMBER = TANK.replace("tank", "chamber").replace("area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"')
+TANK = """
+[nodes.t]
+type = "tank"
+area = 1
+level = 1
+[links.hole]
+type = "orifice"
+from = "t"
+to = "gate"
+Kv = 1
+"""
+CHAMBER = TANK.replace("tank", "chamber").replace(
+    "area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"'
+)
 
 
 def tank(old, new):
@@ -128,80 +145,184 @@ def opening(text):
 
 BAD = {
     # names and keys
-    "unknown table": (swap("[numerics]", "[numeric]"), 'line 40: numeric: unknown key; did you mean "numerics"?'),
+    "unknown table": (
+        swap("[numerics]", "[numeric]"),
+        'line 40: numeric: unknown key; did you mean "numerics"?',
+    ),
     "missing table": (swap('[numerics]\nend = "10 s"\ncourant = 0.9\n', ""), "[numerics] is missing"),
     "missing fluid": (SCENE[SCENE.index("[nodes.lake]") :], "[fluid] is missing"),
-    "unknown key": (add("links.main", "lenth = 3"), 'line 23: links.main.lenth: unknown key; did you mean "length"?'),
-    "unknown key, nothing near": (add("numerics", "zzz = 3"), "numerics.zzz: unknown key; keys are below_vapor, "),
+    "unknown key": (
+        add("links.main", "lenth = 3"),
+        'line 23: links.main.lenth: unknown key; did you mean "length"?',
+    ),
+    "unknown key, nothing near": (
+        add("numerics", "zzz = 3"),
+        "numerics.zzz: unknown key; keys are below_vapor, ",
+    ),
     "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: length is missing"),
-    "unknown type": (swap('"valve"', '"vavle"'), 'line 33: links.valve.type: no type "vavle"; types are orifice, pipe, '),
+    "unknown type": (
+        swap('"valve"', '"vavle"'),
+        'line 33: links.valve.type: no type "vavle"; types are orifice, pipe, ',
+    ),
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
-    "missing type": (swap('type = "junction"\n', ""), "line 15: nodes.gate: type is missing; wanted one of chamber, "),
-    "a link among nodes": (swap('"junction"', '"pipe"'), 'nodes.gate.type: no type "pipe"; types are chamber, inflow,'),
+    "missing type": (
+        swap('type = "junction"\n', ""),
+        "line 15: nodes.gate: type is missing; wanted one of chamber, ",
+    ),
+    "a link among nodes": (
+        swap('"junction"', '"pipe"'),
+        'nodes.gate.type: no type "pipe"; types are chamber, inflow,',
+    ),
     "a link among nodes, where": (swap('"junction"', '"pipe"'), "it belongs under [links]"),
     "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: no type 3"),
     "bad name": (swap("[nodes.gate]", '[nodes."ga te"]'), 'nodes."ga te": "ga te" is no name'),
-    "a part that is no table": (swap("[nodes.lake]", "[nodes]\nx = 3\n[nodes.lake]"), "nodes.x: 3 is no table"),
-    "nodes that are no table": ("nodes = 3\n" + SCENE[SCENE.index("[fluid]") : SCENE.index("[nodes.lake]")], "nodes: 3"),
-    "unknown schema": (swap("schema = 1", "schema = 2"), "line 1: schema: 2 is out of range; wanted a value between 1"),
+    "a part that is no table": (
+        swap("[nodes.lake]", "[nodes]\nx = 3\n[nodes.lake]"),
+        "nodes.x: 3 is no table",
+    ),
+    "nodes that are no table": (
+        "nodes = 3\n" + SCENE[SCENE.index("[fluid]") : SCENE.index("[nodes.lake]")],
+        "nodes: 3",
+    ),
+    "unknown schema": (
+        swap("schema = 1", "schema = 2"),
+        "line 1: schema: 2 is out of range; wanted a value between 1",
+    ),
     "title that is no text": (swap('"A valve shuts"', "3"), "line 2: title: 3 is no text"),
     # the network
-    "unknown place": (swap('from = "lake"', 'from = "lak"'), 'line 24: links.main.from: no place named "lak"; places are'),
+    "unknown place": (
+        swap('from = "lake"', 'from = "lak"'),
+        'line 24: links.main.from: no place named "lak"; places are',
+    ),
     "a link as a place": (swap('to = "outfall"', 'to = "main"'), 'links.valve.to: "main" is a link'),
     "place that is no text": (swap('from = "lake"', "from = 3"), "line 24: links.main.from: 3 is no text"),
-    "joined to itself": (swap('to = "gate"', 'to = "lake"'), 'line 25: links.main.to: joins "lake" to itself'),
-    "loose node": (SCENE + '[nodes.x]\ntype = "tank"\narea = 1\nlevel = 1', "line 46: nodes.x: no link touches it"),
+    "joined to itself": (
+        swap('to = "gate"', 'to = "lake"'),
+        'line 25: links.main.to: joins "lake" to itself',
+    ),
+    "loose node": (
+        SCENE + '[nodes.x]\ntype = "tank"\narea = 1\nlevel = 1',
+        "line 46: nodes.x: no link touches it",
+    ),
     "disconnected": (SCENE + ISLAND, "links: disconnected network of 2 pieces: gate, lake, outfall | c, d"),
     "nothing fixes the pressure": (
-        swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace('"reservoir"\npressure = "0 barg"', '"junction"'),
+        swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace(
+            '"reservoir"\npressure = "0 barg"', '"junction"'
+        ),
         "nodes: nothing fixes the pressure; wanted a reservoir, tank or chamber",
     ),
-    "only rigid columns": (SCENE + RIGID, "nodes.c: only rigid columns meet here, so nothing sets its pressure"),
+    "only rigid columns": (
+        SCENE + RIGID,
+        "nodes.c: only rigid columns meet here, so nothing sets its pressure",
+    ),
     # two of a kind
-    "two step settings": (add("numerics", "step = 1e-3"), "numerics.step: courant and step are given; keep one"),
-    "pressure and head": (add("nodes.lake", "pressure = 2e5"), "nodes.lake.head: pressure and head are given; keep one"),
-    "neither pressure nor head": (swap('head = "45.72 m"\n', ""), "line 11: nodes.lake: wanted one of pressure, head"),
-    "two sizes of a valve": (add("links.valve", "diameter = 1"), "links.valve.diameter: area and diameter are given"),
-    "two laws of a valve": (add("links.valve", "Kv = 1"), "links.valve.Kv: discharge_coefficient and Kv are given"),
-    "Kv with an area": (swap("discharge_coefficient = 0.6", "Kv = 1"), "links.valve.area: Kv says it all; leave area out"),
-    "no size": (swap('area = "0.001768 m2"\n', ""), "links.valve: discharge_coefficient wants area or diameter"),
+    "two step settings": (
+        add("numerics", "step = 1e-3"),
+        "numerics.step: courant and step are given; keep one",
+    ),
+    "pressure and head": (
+        add("nodes.lake", "pressure = 2e5"),
+        "nodes.lake.head: pressure and head are given; keep one",
+    ),
+    "neither pressure nor head": (
+        swap('head = "45.72 m"\n', ""),
+        "line 11: nodes.lake: wanted one of pressure, head",
+    ),
+    "two sizes of a valve": (
+        add("links.valve", "diameter = 1"),
+        "links.valve.diameter: area and diameter are given",
+    ),
+    "two laws of a valve": (
+        add("links.valve", "Kv = 1"),
+        "links.valve.Kv: discharge_coefficient and Kv are given",
+    ),
+    "Kv with an area": (
+        swap("discharge_coefficient = 0.6", "Kv = 1"),
+        "links.valve.area: Kv says it all; leave area out",
+    ),
+    "no size": (
+        swap('area = "0.001768 m2"\n', ""),
+        "links.valve: discharge_coefficient wants area or diameter",
+    ),
     "no size at all": (
         swap('area = "0.001768 m2"\ndischarge_coefficient = 0.6\n', ""),
         "line 32: links.valve: no size; wanted area, diameter, Kv or Cv",
     ),
-    "wall and wave speed": (add("links.main", 'wall = "stiff"'), "links.main.wall: wave_speed and wall are given"),
-    "roughness and factor": (swap('"0.26 mm" }', "1e-4, factor = 0.02 }"), "friction.factor: roughness and factor are"),
-    "friction without number": (swap(', roughness = "0.26 mm"', ""), "links.main.friction: wanted one of roughness, factor"),
+    "wall and wave speed": (
+        add("links.main", 'wall = "stiff"'),
+        "links.main.wall: wave_speed and wall are given",
+    ),
+    "roughness and factor": (
+        swap('"0.26 mm" }', "1e-4, factor = 0.02 }"),
+        "friction.factor: roughness and factor are",
+    ),
+    "friction without number": (
+        swap(', roughness = "0.26 mm"', ""),
+        "links.main.friction: wanted one of roughness, factor",
+    ),
     "friction with a stray number": (
         swap('"steady", r', '"none", r'),
         'links.main.friction.roughness: friction model "none" has no roughness',
     ),
-    "friction model": (swap('"steady"', '"stedy"'), 'line 29: links.main.friction.model: no friction model named "stedy"'),
+    "friction model": (
+        swap('"steady"', '"stedy"'),
+        'line 29: links.main.friction.model: no friction model named "stedy"',
+    ),
     # sizes
-    "negative size": (swap('"914.4 m"', '"-914.4 m"'), 'links.main.length: "-914.4 m" is out of range; wanted a value above 0'),
-    "zero size": (swap('"304.8 mm"', "0"), "line 27: links.main.diameter: 0 is out of range; wanted a value above 0"),
+    "negative size": (
+        swap('"914.4 m"', '"-914.4 m"'),
+        'links.main.length: "-914.4 m" is out of range; wanted a value above 0',
+    ),
+    "zero size": (
+        swap('"304.8 mm"', "0"),
+        "line 27: links.main.diameter: 0 is out of range; wanted a value above 0",
+    ),
     "infinite size": (swap('"914.4 m"', "inf"), "links.main.length: inf is not finite; wanted a length"),
     "size not a number": (swap('"914.4 m"', "nan"), "links.main.length: nan is not finite; wanted a length"),
-    "size that is true": (swap('"914.4 m"', "true"), "links.main.length: true is true or false; wanted a length"),
-    "no unit": (swap('"914.4 m"', '"914.4"'), '"914.4" has no unit; did you mean "914.4 m", or the bare number 914.4?'),
-    "wrong unit": (swap('"304.8 mm"', '"304.8 kg"'), '"304.8 kg" is a mass; wanted a length, for example "300 mm"'),
-    "zero cells": (swap("cells = 200", "cells = 0"), "links.main.cells: 0 is out of range; wanted a value between 1 and"),
+    "size that is true": (
+        swap('"914.4 m"', "true"),
+        "links.main.length: true is true or false; wanted a length",
+    ),
+    "no unit": (
+        swap('"914.4 m"', '"914.4"'),
+        '"914.4" has no unit; did you mean "914.4 m", or the bare number 914.4?',
+    ),
+    "wrong unit": (
+        swap('"304.8 mm"', '"304.8 kg"'),
+        '"304.8 kg" is a mass; wanted a length, for example "300 mm"',
+    ),
+    "zero cells": (
+        swap("cells = 200", "cells = 0"),
+        "links.main.cells: 0 is out of range; wanted a value between 1 and",
+    ),
     "half a cell": (swap("cells = 200", "cells = 2.5"), "links.main.cells: 2.5 is no whole number"),
     "too many cells": (
         swap("cells = 200\n", "").replace("courant = 0.9", "cell_time = 1e-12"),
         "numerics.cell_time: would cut main into 7.5e+11 cells",
     ),
-    "coefficient above 1": (swap("= 0.6", "= 1.6"), "discharge_coefficient: 1.6 is out of range; wanted a value above 0, 1"),
+    "coefficient above 1": (
+        swap("= 0.6", "= 1.6"),
+        "discharge_coefficient: 1.6 is out of range; wanted a value above 0, 1",
+    ),
     "wall without thickness": (
         swap('wave_speed = "1219.2 m/s"', "wall = { youngs_modulus = 1e11 }"),
         "line 28: links.main.wall: thickness is missing",
     ),
-    "wall of a word": (swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'), 'links.main.wall: "soft" is no wall; wanted "stiff"'),
+    "wall of a word": (
+        swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'),
+        'links.main.wall: "soft" is no wall; wanted "stiff"',
+    ),
     "gauge modulus": (swap('"2.2 GPa"', '"2.2 barg"'), 'fluid.bulk_modulus: "2.2 barg" is a gauge pressure'),
     "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; wanted 2"),
     # pressures
-    "vacuum": (swap('"0 barg"', '"0 bar"'), 'nodes.outfall.pressure: "0 bar" is absolute, a vacuum; did you mean "0 barg"?'),
-    "vacuum in psi": (swap('"0 barg"', '"-3 psi"'), '"-3 psi" is absolute, a vacuum; did you mean "-3 psig"?'),
+    "vacuum": (
+        swap('"0 barg"', '"0 bar"'),
+        'nodes.outfall.pressure: "0 bar" is absolute, a vacuum; did you mean "0 barg"?',
+    ),
+    "vacuum in psi": (
+        swap('"0 barg"', '"-3 psi"'),
+        '"-3 psi" is absolute, a vacuum; did you mean "-3 psig"?',
+    ),
     "vacuum, bare": (swap('"0 barg"', "0"), "nodes.outfall.pressure: 0 is absolute, a vacuum"),
     "vacuum in gauge": (swap('"0 barg"', '"-2 barg"'), '"-2 barg" is -9.868e+04 Pa absolute, a vacuum'),
     "below vapour pressure": (
@@ -212,54 +333,110 @@ BAD = {
         swap('"0 barg"', '{ time = [0, 1], value = ["1 bar", "0.02 bar"] }'),
         'nodes.outfall.pressure.value[1]: "0.02 bar" is absolute, not above the vapour pressure',
     ),
-    "vacuum of a chamber": (SCENE + CHAMBER, 'nodes.t.initial_pressure: "0 bar" is absolute, a vacuum; did you mean "0 barg"?'),
-    "vacuum by head": (swap('"45.72 m"', '"-45.72 m"'), "nodes.lake.head: a head of -45.72 m at elevation 0 m: "),
-    "gauge ambient": ('ambient_pressure = "1 barg"\n' + SCENE, 'line 1: ambient_pressure: "1 barg" is a gauge pressure'),
+    "vacuum of a chamber": (
+        SCENE + CHAMBER,
+        'nodes.t.initial_pressure: "0 bar" is absolute, a vacuum; did you mean "0 barg"?',
+    ),
+    "vacuum by head": (
+        swap('"45.72 m"', '"-45.72 m"'),
+        "nodes.lake.head: a head of -45.72 m at elevation 0 m: ",
+    ),
+    "gauge ambient": (
+        'ambient_pressure = "1 barg"\n' + SCENE,
+        'line 1: ambient_pressure: "1 barg" is a gauge pressure',
+    ),
     "no ambient": ('ambient_pressure = "0 bar"\n' + SCENE, 'ambient_pressure: "0 bar" is absolute, a vacuum'),
-    "vacuum of the fluid": (add("fluid", 'pressure = "0 bar"'), 'fluid.pressure: "0 bar" is absolute, a vacuum'),
+    "vacuum of the fluid": (
+        add("fluid", 'pressure = "0 bar"'),
+        'fluid.pressure: "0 bar" is absolute, a vacuum',
+    ),
     # the fluid: what fluid.py refuses comes with its key
     "fluid without density": (swap("density = 998\n", ""), "fluid.density:"),
     "density law": (add("fluid", 'law = "cubic"'), 'fluid.law: no density law named "cubic"'),
     "temperature in coulombs": (add("fluid", 'temperature = "20 C"'), 'did you mean "20 degC"?'),
     # elevations
-    "some elevations": (add("nodes.gate", "elevation = 3"), "nodes.outfall: elevation is missing: gate state one, so all"),
+    "some elevations": (
+        add("nodes.gate", "elevation = 3"),
+        "nodes.outfall: elevation is missing: gate state one, so all",
+    ),
     "too steep": (
-        add("nodes.gate", "elevation = 1000").replace('"0 barg"', '"0 barg"\nelevation = 0').replace(
-            'head = "45.72 m"', 'head = "1100 m"\nelevation = 0'
-        ),
+        add("nodes.gate", "elevation = 1000")
+        .replace('"0 barg"', '"0 barg"\nelevation = 0')
+        .replace('head = "45.72 m"', 'head = "1100 m"\nelevation = 0'),
         "links.main.length: 914.4 m is too short: its ends lie 1000 m apart in height",
     ),
     # tanks
     "tank without level": (tank("level = 1\n", ""), "nodes.t: level is missing"),
-    "level above height": (tank("level = 1\n", "level = 3\nheight = 2\n"), "nodes.t.level: 3 m is above its height of 2 m"),
-    "negative level": (tank("level = 1", "level = -1"), "nodes.t.level: -1 is out of range; wanted a value of at least 0"),
+    "level above height": (
+        tank("level = 1\n", "level = 3\nheight = 2\n"),
+        "nodes.t.level: 3 m is above its height of 2 m",
+    ),
+    "negative level": (
+        tank("level = 1", "level = -1"),
+        "nodes.t.level: -1 is out of range; wanted a value of at least 0",
+    ),
     "area table of unlike lengths": (
-        tank("area = 1", "area = { level = [0, 1], area = [1] }"), "nodes.t.area.area: 1 areas for 2 levels"
+        tank("area = 1", "area = { level = [0, 1], area = [1] }"),
+        "nodes.t.area.area: 1 areas for 2 levels",
     ),
     "area table out of order": (
         tank("area = 1", "area = { level = [0, 2, 1], area = [1, 1, 1] }"),
         "nodes.t.area.level: levels out of order: 1 comes after 2",
     ),
     "area table not from the bottom": (
-        tank("area = 1", "area = { level = [1, 2], area = [1, 1] }"), "nodes.t.area.level: levels count from the bottom"
+        tank("area = 1", "area = { level = [1, 2], area = [1, 1] }"),
+        "nodes.t.area.level: levels count from the bottom",
     ),
-    "area zero": (tank("area = 1", "area = { level = [0, 1], area = [1, 0] }"), "nodes.t.area.area[1]: 0 is out of range"),
+    "area zero": (
+        tank("area = 1", "area = { level = [0, 1], area = [1, 0] }"),
+        "nodes.t.area.area[1]: 0 is out of range",
+    ),
     # schedules
     "times out of order": (
         opening('{ time = [0, "2 s", 1], value = [1, 0.5, 0] }'),
         'links.valve.opening.time: times out of order: 1 comes after "2 s"',
     ),
-    "times that repeat": (opening("{ time = [0, 0], value = [1, 0] }"), "opening.time: times out of order: 0 comes after 0"),
-    "unlike lengths": (opening("{ time = [0, 1], value = [1] }"), "opening.value: 1 values for 2 times; wanted as many of both"),
-    "opening above 1": (opening("{ time = [0, 1], value = [1, 2] }"), "opening.value[1]: 2 is out of range; wanted a value between 0"),
-    "constant opening below 0": (opening("-0.1"), "links.valve.opening: -0.1 is out of range; wanted a value between 0 and 1"),
-    "empty schedule": (opening("{ time = [], value = [] }"), "opening.time: [] is no list; wanted a list of values"),
-    "schedule kind": (opening('{ time = [0, 1], value = [1, 0], kind = "cubic" }'), 'no kind of schedule named "cubic"'),
-    "schedule key": (opening("{ tme = [0, 1], value = [1, 0] }"), 'opening.tme: unknown key; did you mean "time"?'),
+    "times that repeat": (
+        opening("{ time = [0, 0], value = [1, 0] }"),
+        "opening.time: times out of order: 0 comes after 0",
+    ),
+    "unlike lengths": (
+        opening("{ time = [0, 1], value = [1] }"),
+        "opening.value: 1 values for 2 times; wanted as many of both",
+    ),
+    "opening above 1": (
+        opening("{ time = [0, 1], value = [1, 2] }"),
+        "opening.value[1]: 2 is out of range; wanted a value between 0",
+    ),
+    "constant opening below 0": (
+        opening("-0.1"),
+        "links.valve.opening: -0.1 is out of range; wanted a value between 0 and 1",
+    ),
+    "empty schedule": (
+        opening("{ time = [], value = [] }"),
+        "opening.time: [] is no list; wanted a list of values",
+    ),
+    "schedule kind": (
+        opening('{ time = [0, 1], value = [1, 0], kind = "cubic" }'),
+        'no kind of schedule named "cubic"',
+    ),
+    "schedule key": (
+        opening("{ tme = [0, 1], value = [1, 0] }"),
+        'opening.tme: unknown key; did you mean "time"?',
+    ),
     "schedule without times": (opening("{ value = [1, 0] }"), "links.valve.opening: time is missing"),
-    "ramp of three values": (opening("{ start = 0, duration = 1, value = [1, 0, 1] }"), "opening.value: [1, 0, 1] has 3 values"),
-    "ramp backwards": (opening("{ start = 0, duration = -1, value = [1, 0] }"), "opening.duration: -1 is out of range"),
-    "ramp of exponent 0": (opening("{ start = 0, duration = 1, value = [1, 0], exponent = 0 }"), "opening.exponent: 0 is out"),
+    "ramp of three values": (
+        opening("{ start = 0, duration = 1, value = [1, 0, 1] }"),
+        "opening.value: [1, 0, 1] has 3 values",
+    ),
+    "ramp backwards": (
+        opening("{ start = 0, duration = -1, value = [1, 0] }"),
+        "opening.duration: -1 is out of range",
+    ),
+    "ramp of exponent 0": (
+        opening("{ start = 0, duration = 1, value = [1, 0], exponent = 0 }"),
+        "opening.exponent: 0 is out",
+    ),
     "unknown signal": (opening('{ signal = "x" }'), 'opening.signal: no signal named "x"; signals are none'),
     "signal with more keys": (opening('{ signal = "x", time = [1] }'), "opening.time: unknown key"),
     "a signal at fault": (
@@ -267,26 +444,54 @@ BAD = {
         "line 48: signals.x.value[0]: 2 is out of range; wanted a value between 0 and 1",
     ),
     "a signal of a signal": (
-        opening('{ signal = "x" }') + '[signals.x]\nsignal = "x"\n', 'signal "x" names another signal'
+        opening('{ signal = "x" }') + '[signals.x]\nsignal = "x"\n',
+        'signal "x" names another signal',
     ),
     "an unused signal at fault": (SCENE + "[signals.x]\ntime = [1]\n", "signals.x: value is missing"),
-    "schedule file missing": (opening('{ file = "strok.csv" }'), 'opening.file: "strok.csv": there is no such file'),
-    "schedule file, nearest": (opening('{ file = "god.csv" }'), '"god.csv": there is no such file; did you mean "good.csv"?'),
+    "schedule file missing": (
+        opening('{ file = "strok.csv" }'),
+        'opening.file: "strok.csv": there is no such file',
+    ),
+    "schedule file, nearest": (
+        opening('{ file = "god.csv" }'),
+        '"god.csv": there is no such file; did you mean "good.csv"?',
+    ),
     "schedule file is a folder": (opening('{ file = "." }'), 'opening.file: ".": is a directory'),
-    "schedule file without header": (opening('{ file = "bare.csv" }'), "bare.csv has no header; wanted one such as"),
-    "schedule file empty": (opening('{ file = "empty.csv" }'), "empty.csv is empty; wanted a header and rows of numbers"),
-    "schedule file, one column": (opening('{ file = "one.csv" }'), "one.csv has one column; wanted a time and a value"),
+    "schedule file without header": (
+        opening('{ file = "bare.csv" }'),
+        "bare.csv has no header; wanted one such as",
+    ),
+    "schedule file empty": (
+        opening('{ file = "empty.csv" }'),
+        "empty.csv is empty; wanted a header and rows of numbers",
+    ),
+    "schedule file, one column": (
+        opening('{ file = "one.csv" }'),
+        "one.csv has one column; wanted a time and a value",
+    ),
     "schedule file, no such column": (
         opening('{ file = "good.csv", value = "opening" }'),
         'good.csv has no column "opening"; columns are "t [s]", "stem [-]"',
     ),
-    "schedule file, bad unit": (opening('{ file = "kilo.csv" }'), 'kilo.csv, column "stem [kg]": "kg" is a mass; wanted a number'),
-    "schedule file, no number": (opening('{ file = "text.csv" }'), 'text.csv, line 3: "shut" is no number in column "s"'),
-    "schedule file, out of order": (opening('{ file = "back.csv" }'), "back.csv: times out of order: 0.0 comes after 1.0"),
+    "schedule file, bad unit": (
+        opening('{ file = "kilo.csv" }'),
+        'kilo.csv, column "stem [kg]": "kg" is a mass; wanted a number',
+    ),
+    "schedule file, no number": (
+        opening('{ file = "text.csv" }'),
+        'text.csv, line 3: "shut" is no number in column "s"',
+    ),
+    "schedule file, out of order": (
+        opening('{ file = "back.csv" }'),
+        "back.csv: times out of order: 0.0 comes after 1.0",
+    ),
     "schedule file, out of range": (opening('{ file = "wide.csv" }'), "opening.file: 2.0 is out of range"),
     "schedule file, not text": (opening('{ file = "noise.csv" }'), "noise.csv is not UTF-8 text"),
     # characteristic
-    "characteristic": (add("links.valve", 'characteristic = "linar"'), 'no characteristic named "linar"; did you mean "linear"?'),
+    "characteristic": (
+        add("links.valve", 'characteristic = "linar"'),
+        'no characteristic named "linar"; did you mean "linear"?',
+    ),
     "characteristic that leaks": (
         add("links.valve", "characteristic = { opening = [0, 1], flow_area = [0.1, 1] }"),
         "characteristic.flow_area: opening 0 is shut: the first flow area must be 0",
@@ -298,64 +503,141 @@ BAD = {
     # numerics
     "no end": (swap('end = "10 s"\n', ""), "line 40: numerics: end is missing"),
     "end before start": (add("numerics", "start = 20"), "numerics.end: 10 s is not after the start at 20 s"),
-    "scheme": (add("numerics", 'scheme = "muscle"'), 'numerics.scheme: no scheme named "muscle"; did you mean "muscl"?'),
-    "limiter": (add("numerics", 'limiter = "vanleer"'), 'no limiter named "vanleer"; did you mean "van-leer"?'),
+    "scheme": (
+        add("numerics", 'scheme = "muscle"'),
+        'numerics.scheme: no scheme named "muscle"; did you mean "muscl"?',
+    ),
+    "limiter": (
+        add("numerics", 'limiter = "vanleer"'),
+        'no limiter named "vanleer"; did you mean "van-leer"?',
+    ),
     "method": (add("numerics", 'method = "rk5"'), 'no method named "rk5"; did you mean "rk4"?'),
     "start": (add("numerics", 'initial = "stead"'), 'no start named "stead"; did you mean "steady"?'),
     "no error estimate": (
         swap("courant = 0.9", 'rtol = 1e-6\nmethod = "rk4"'),
-        'numerics.rtol: method "rk4" estimates no error; use "bogacki-shampine" or "dormand-prince", or courant or step',
+        'numerics.rtol: method "rk4" estimates no error; use "bogacki-shampine" or "dormand-prince"',
     ),
-    "negative step": (swap("courant = 0.9", "step = -1"), "numerics.step: -1 is out of range; wanted a value above 0"),
+    "negative step": (
+        swap("courant = 0.9", "step = -1"),
+        "numerics.step: -1 is out of range; wanted a value above 0",
+    ),
     "Courant number without cells": (
-        swap('type = "pipe"', 'type = "rigid-column"').replace('wave_speed = "1219.2 m/s"\n', "").replace("cells = 200", "")
+        swap('type = "pipe"', 'type = "rigid-column"')
+        .replace('wave_speed = "1219.2 m/s"\n', "")
+        .replace("cells = 200", "")
         .replace('"junction"', '"chamber"\nvolume = 1'),
         "numerics.courant: no pipe, so no cell to cross; give step or rtol",
     ),
     # output
-    "probe of nothing": (swap("gate.pressure", "gat.pressure"), 'output.probes[0]: no part named "gat"; parts are gate, lake,'),
-    "probe of no node": (swap("gate.pressure", "nodes.main.flow"), 'no node named "main"; nodes are gate, lake, outfall'),
+    "probe of nothing": (
+        swap("gate.pressure", "gat.pressure"),
+        'output.probes[0]: no part named "gat"; parts are gate, lake,',
+    ),
+    "probe of no node": (
+        swap("gate.pressure", "nodes.main.flow"),
+        'no node named "main"; nodes are gate, lake, outfall',
+    ),
     "probe of no quantity": (
         swap("gate.pressure", "gate.presure"),
-        'gate is a junction, without "presure"; it has pressure, gauge_pressure, head; did you mean "pressure"?',
+        'gate is a junction, without "presure"; it has pressure, gauge_pressure, head; '
+        'did you mean "pressure"?',
     ),
-    "probe of a level that is not there": (swap("gate.pressure", "lake.level"), 'lake is a reservoir, without "level"'),
-    "probe without a place": (swap("gate.pressure", "main.head"), 'main is a pipe: say where, for example "main.head@0.5"'),
-    "probe beyond the pipe": (swap("gate.pressure", "main.head@1.5"), '"@1.5" is no fraction of the length; wanted 0 to 1'),
-    "probe at no number": (swap("gate.pressure", "main.head@half"), '"@half" is no fraction of the length; wanted 0 to 1'),
-    "probe along a node": (swap("gate.pressure", "gate.head@0.5"), "gate is a junction: head has no place along it; leave @0.5 out"),
-    "probe that is none": (swap("gate.pressure", "gate"), 'output.probes[0]: "gate" is no probe; wanted NAME.QUANTITY'),
+    "probe of a level that is not there": (
+        swap("gate.pressure", "lake.level"),
+        'lake is a reservoir, without "level"',
+    ),
+    "probe without a place": (
+        swap("gate.pressure", "main.head"),
+        'main is a pipe: say where, for example "main.head@0.5"',
+    ),
+    "probe beyond the pipe": (
+        swap("gate.pressure", "main.head@1.5"),
+        '"@1.5" is no fraction of the length; wanted 0 to 1',
+    ),
+    "probe at no number": (
+        swap("gate.pressure", "main.head@half"),
+        '"@half" is no fraction of the length; wanted 0 to 1',
+    ),
+    "probe along a node": (
+        swap("gate.pressure", "gate.head@0.5"),
+        "gate is a junction: head has no place along it; leave @0.5 out",
+    ),
+    "probe that is none": (
+        swap("gate.pressure", "gate"),
+        'output.probes[0]: "gate" is no probe; wanted NAME.QUANTITY',
+    ),
     "probe that is a number": (swap('"gate.pressure"', "3"), "output.probes[0]: 3 is no probe"),
-    "probes that are no list": (swap('["gate.pressure"]', '"gate.pressure"'), 'output.probes: "gate.pressure" is no list'),
-    "output unit": (add("output", 'units = { pressure = "l/s" }'), 'output.units.pressure: "l/s" is a flow; wanted a pressure'),
-    "output quantity": (add("output", 'units = { presure = "bar" }'), 'units.presure: unknown quantity; did you mean "pressure"?'),
+    "probes that are no list": (
+        swap('["gate.pressure"]', '"gate.pressure"'),
+        'output.probes: "gate.pressure" is no list',
+    ),
+    "output unit": (
+        add("output", 'units = { pressure = "l/s" }'),
+        'output.units.pressure: "l/s" is a flow; wanted a pressure',
+    ),
+    "output quantity": (
+        add("output", 'units = { presure = "bar" }'),
+        'units.presure: unknown quantity; did you mean "pressure"?',
+    ),
     "frames": (add("output", "fields = -1"), "output.fields: -1 is out of range"),
     # expect
-    "claim": (SCENE + '[expect]\n"mx(gate.pressure)" = { value = 1 }', 'expect."mx(gate.pressure)": no such claim; wanted max'),
-    "claim of nothing": (SCENE + '[expect]\n"max(gat.pressure)" = { value = 1, rtol = 1 }', 'no part named "gat"'),
+    "claim": (
+        SCENE + '[expect]\n"mx(gate.pressure)" = { value = 1 }',
+        'expect."mx(gate.pressure)": no such claim; wanted max',
+    ),
+    "claim of nothing": (
+        SCENE + '[expect]\n"max(gat.pressure)" = { value = 1, rtol = 1 }',
+        'no part named "gat"',
+    ),
     "claim without value": (SCENE + '[expect]\n"max(gate.head)" = { rtol = 1 }', "value is missing"),
-    "claim without tolerance": (SCENE + '[expect]\n"max(gate.head)" = { value = 1 }', "no tolerance; wanted rtol, atol"),
-    "claim in a wrong unit": (SCENE + '[expect]\n"max(gate.head)" = { value = "1 bar", rtol = 1 }', "is a pressure; wanted a head"),
-    "claim without time": (SCENE + '[expect]\n"at(gate.head)" = { value = 1, rtol = 1 }', "wanted at(PROBE, TIME)"),
-    "claim with a time": (SCENE + '[expect]\n"max(gate.head, 3)" = { value = 1, rtol = 1 }', "wanted max(PROBE)"),
-    "claim at no time": (SCENE + '[expect]\n"at(gate.head, 3 m)" = { value = 1, rtol = 1 }', '"3 m" is a length; wanted a time'),
+    "claim without tolerance": (
+        SCENE + '[expect]\n"max(gate.head)" = { value = 1 }',
+        "no tolerance; wanted rtol, atol",
+    ),
+    "claim in a wrong unit": (
+        SCENE + '[expect]\n"max(gate.head)" = { value = "1 bar", rtol = 1 }',
+        "is a pressure; wanted a head",
+    ),
+    "claim without time": (
+        SCENE + '[expect]\n"at(gate.head)" = { value = 1, rtol = 1 }',
+        "wanted at(PROBE, TIME)",
+    ),
+    "claim with a time": (
+        SCENE + '[expect]\n"max(gate.head, 3)" = { value = 1, rtol = 1 }',
+        "wanted max(PROBE)",
+    ),
+    "claim at no time": (
+        SCENE + '[expect]\n"at(gate.head, 3 m)" = { value = 1, rtol = 1 }',
+        '"3 m" is a length; wanted a time',
+    ),
     "claim at a time outside": (
-        SCENE + '[expect]\n"at(gate.head, 11 s)" = { value = 1, rtol = 1 }', "11 s is not within the run, 0 s to 10 s"
+        SCENE + '[expect]\n"at(gate.head, 11 s)" = { value = 1, rtol = 1 }',
+        "11 s is not within the run, 0 s to 10 s",
     ),
     # compare
-    "compare with nothing": (SCENE + '[compare]\n"gat.head" = { file = "good.csv" }', 'compare."gat.head": no part named "gat"'),
-    "compare with no file": (SCENE + '[compare]\n"gate.head" = { file = "x.csv" }', 'compare."gate.head".file: "x.csv": there is no'),
-    "compare with no column": (
-        SCENE + '[compare]\n"gate.head" = { file = "good.csv", value = "x" }', 'good.csv has no column "x"; columns are'
+    "compare with nothing": (
+        SCENE + '[compare]\n"gat.head" = { file = "good.csv" }',
+        'compare."gat.head": no part named "gat"',
     ),
-    "compare key": (SCENE + '[compare]\n"gate.head" = { fil = "good.csv" }', 'compare."gate.head".fil: unknown key; did you mean "file"?'),
+    "compare with no file": (
+        SCENE + '[compare]\n"gate.head" = { file = "x.csv" }',
+        'compare."gate.head".file: "x.csv": there is no',
+    ),
+    "compare with no column": (
+        SCENE + '[compare]\n"gate.head" = { file = "good.csv", value = "x" }',
+        'good.csv has no column "x"; columns are',
+    ),
+    "compare key": (
+        SCENE + '[compare]\n"gate.head" = { fil = "good.csv" }',
+        'compare."gate.head".fil: unknown key; did you mean "file"?',
+    ),
     # TOML
     "syntax": (swap("end = ", "end "), "line 41: TOML: expected '=' after a key in a key/value pair: "),
     "a key twice": (add("links.main", "cells = 3"), 'TOML: this key is given twice: "cells = 200"'),
     "a table twice": (SCENE + "[numerics]\n", 'line 46: TOML: this table is given twice: "[numerics]"'),
     "nested too deep": ("x = " + "[" * 5000 + "]" * 5000, "nested too deep"),
     "a number of 5000 digits": ("x = " + "1" * 5000, "TOML: "),
-}  # fmt: skip
+}
 
 
 @pytest.fixture
@@ -389,25 +671,44 @@ def test_the_scene_itself_has_no_fault(tmp_path):
 
 
 def test_all_faults_come_at_once(tmp_path):
-    text = swap('"914.4 m"', "-1").replace('"304.8 mm"', '"3 kg"').replace("0.6", "7").replace('"10 s"', '"10 m"')
+    text = (
+        swap('"914.4 m"', "-1")
+        .replace('"304.8 mm"', '"3 kg"')
+        .replace("0.6", "7")
+        .replace('"10 s"', '"10 m"')
+    )
     text = text.replace("gate.pressure", "gat.pressure").replace('to = "outfall"', 'to = "outfal"')
     found = faults(text, tmp_path)
     for key in (
-        "links.main.length", "links.main.diameter", "discharge_coefficient", "numerics.end", "probes[0]", "links.valve.to"
-    ):  # fmt: skip
+        "links.main.length",
+        "links.main.diameter",
+        "discharge_coefficient",
+        "numerics.end",
+        "probes[0]",
+        "links.valve.to",
+    ):
         assert key in found
 
 
 SET = {
-    "no such link": ({"links.mian.cells": 4}, '--set links.mian.cells: no link named "mian"; did you mean "main"?'),
+    "no such link": (
+        {"links.mian.cells": 4},
+        '--set links.mian.cells: no link named "mian"; did you mean "main"?',
+    ),
     "no such node": ({"nodes.x.head": 4}, '--set nodes.x.head: no node named "x"'),
     "no such key": ({"links.main.cell": 4}, '--set links.main.cell: unknown key; did you mean "cells"?'),
     "no such table": ({"numeric.end": 4}, '--set numeric: unknown key; did you mean "numerics"?'),
     "below a value": ({"title.x": 4}, '--set title.x: "title" is no table but "A valve shuts"'),
     "no fit": ({"links.main.cells": "many"}, '--set links.main.cells: "many" is no whole number'),
-    "two steps": ({"numerics.step": 1, "numerics.rtol": 1}, "--set numerics.rtol: step and rtol are given; keep one"),
-    "no such method": ({"numerics.rtol": 1e-5, "numerics.method": "rk4"}, '--set numerics.rtol: method "rk4" estimates no'),
-}  # fmt: skip
+    "two steps": (
+        {"numerics.step": 1, "numerics.rtol": 1},
+        "--set numerics.rtol: step and rtol are given; keep one",
+    ),
+    "no such method": (
+        {"numerics.rtol": 1e-5, "numerics.method": "rk4"},
+        '--set numerics.rtol: method "rk4" estimates no',
+    ),
+}
 
 
 @pytest.mark.parametrize("name", SET)

@@ -55,13 +55,13 @@ def square_wave(t: np.ndarray, fraction: float, shut: float) -> tuple[np.ndarray
 
 
 def worst(result, jump: float, shut: float, turned: bool = False) -> float:
-    """Greatest distance from the square wave over the jump, further than two steps from any front."""
+    """Greatest distance from the square wave over the jump, three steps clear of fronts (probes blend cells)."""
     t, errors = np.asarray(result.t), []
     for name in result.probes:
         fraction = 1.0 if "@" not in str(name) else float(str(name).split("@")[1])
         fraction = 1 - fraction if turned and "@" in str(name) else fraction
         exact, distance = square_wave(t, fraction, shut)
-        clear = distance > 2.01 * STEP
+        clear = distance > 3.01 * STEP
         assert clear.mean() > 0.6
         supply = 2 * AMBIENT + 2 * jump
         errors.append(np.max(np.abs(result[str(name)] - supply - jump * exact)[clear]) / jump)

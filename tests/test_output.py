@@ -214,7 +214,7 @@ def test_a_comparison_finds_a_shifted_copy_of_the_run(folder, tmp_path):
     result = fvsolve.open_run(folder)
     rows = [
         f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
-        for t, p in zip(result.t, result["gate.pressure"], strict=True)
+        for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)
     ]
     (tmp_path / "rig.csv").write_text("clock [ms],p [barg]\n" + "\n".join(rows))
     measured = {"file": str(tmp_path / "rig.csv"), "time": "clock [ms]", "value": "p [barg]", "shift": 0.05}

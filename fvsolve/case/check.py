@@ -29,8 +29,9 @@ def network(table: dict[str, Any]) -> Found:
         if isinstance(found["from"], str) and found["from"] == found["to"]:
             yield ("links", name, "to"), f"joins {show(found['to'])} to itself"
         ends[name] = [place for place in found.values() if isinstance(place, str) and place in nodes]
-    if not nodes or not links:
-        return
+    for group, members in (("nodes", nodes), ("links", links)):
+        if table.get(group) == {}:
+            yield (group,), f"[{group}] is empty; a case has {group} at least two and a link between"
     touched = {place for places in ends.values() for place in places}
     for name in nodes:
         if name not in touched:
@@ -89,7 +90,7 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
     """Faults of claims at a time outside the run."""
     for text, claim in expect.items():
-        if claim.time is not None and not numerics.start <= claim.time <= numerics.end:
+        if claim is not None and claim.time is not None and not numerics.start <= claim.time <= numerics.end:
             run = f"{numerics.start:g} s to {numerics.end:g} s"
             yield ("expect", text), f"{claim.time:g} s is not within the run, {run}"
 
@@ -126,16 +127,12 @@ def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
 
 def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Found:
     for name, node in nodes.items():
-        touching = [links[link].get("type") for link, places in ends.items() if name in places]
-        if (
-            _dict(node).get("type") in ("junction", "inflow")
-            and touching
-            and set(touching) == {"rigid-column"}
-        ):
-            yield (
-                ("nodes", name),
-                "only rigid columns meet here, so nothing sets its pressure; give it a chamber volume",
-            )
+        touching = [
+            links[link].get("type") == "rigid-column" for link, places in ends.items() if name in places
+        ]
+        if _dict(node).get("type") in ("junction", "inflow") and touching and all(touching):
+            message = "only rigid columns meet here, so nothing sets its pressure; give it a chamber volume"
+            yield ("nodes", name), message
 
 
 def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:

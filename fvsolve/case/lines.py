@@ -47,6 +47,8 @@ class _Scan:
         several = self.text.startswith("[[", self.at)
         self.at += 2 if several else 1
         path = self.key()
+        for count in range(1, len(path)):
+            self.mark(path[:count])
         if several:
             number = self.counts.get(path, 0)
             self.counts[path] = number + 1

@@ -64,14 +64,15 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
 
 def default_probes(kinds: Kinds) -> list[Probe]:
     """All nodes (pressure, head, level) and all links (flow)."""
-    texts = []
+    found = []
     for part, quantities in (("nodes", ("pressure", "head", "level")), ("links", ("flow",))):
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
-            known = kind.quantities if kind is not None else ()
-            shared = f"{part}." if name in other else ""
-            texts += [f"{shared}{name}.{quantity}" for quantity in quantities if quantity in known]
-    return [probe for probe in (read_probe(text, kinds) for text in texts) if probe is not None]
+            for quantity in quantities if kind is not None else ():
+                if quantity in kind.quantities:
+                    text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
+                    found.append(Probe(text, part, name, quantity, *_quantity(kind, name, quantity, None)))
+    return found
 
 
 def _quantity(

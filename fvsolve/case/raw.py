@@ -160,7 +160,7 @@ def _dotted(key: str) -> tuple[str, ...]:
         found: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
     except ValueError:
         found = None
-    if found is None:
+    if not found:
         return tuple(key.split("."))
     keys = []
     while isinstance(found, dict):

@@ -40,7 +40,7 @@ def exit_code(one) -> int:
     """0, or 1 where the run stopped early or a claim fails, or 130 where it was interrupted."""
     if one.reason.startswith("interrupted"):
         return 130
-    return 0 if one.ok and all(claim["ok"] for claim in one.expectations) else 1
+    return 0 if one.ok and all(claim.ok for claim in one.expectations) else 1
 
 
 def titles(found: dict[str, str]) -> None:

@@ -31,6 +31,8 @@ def dress(axes) -> None:
     axes.set_axisbelow(True)
     axes.tick_params(colors=MUTED, labelcolor=INK, labelsize=8, width=0.6, length=3)
     axes.margins(x=0)
+    axes.ticklabel_format(axis="y", scilimits=(-4, 5))
+    axes.yaxis.get_offset_text().set(fontsize=8, color=MUTED)
 
 
 def legend(axes) -> None:

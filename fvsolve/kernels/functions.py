@@ -4,7 +4,6 @@ import functools
 
 from fvsolve.kernels.observer import events, observe_linear, record_linear
 from fvsolve.kernels.network import rhs_linear
-from fvsolve.kernels.records import tables_type
 
 
 @functools.cache
@@ -20,8 +19,8 @@ def functions(law: str) -> tuple:
         return found
     from numba import types
 
-    f, v, tables = types.float64, types.float64[::1], tables_type()
-    rows = ((f, v, v, v, tables), (f, v, v, tables, v), (f, v, v, tables, v), (f, v, tables, v))
+    f, v, handle = types.float64, types.float64[::1], types.int64[::1]
+    rows = ((f, v, v, v, handle), (f, v, v, handle, v), (f, v, v, handle, v), (f, v, handle, v))
     for function, signature in zip(found, rows, strict=True):
         function.compile(signature)
         function.disable_compile()

@@ -7,6 +7,7 @@ out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s
 from fvsolve.jit import njit
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.friction import drag
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.pipes import family_of, pipe_rates
 from fvsolve.kernels.records import (
@@ -29,7 +30,7 @@ from fvsolve.kernels.records import (
 from fvsolve.kernels.valves import flow_slope, valve_conductance
 
 
-@njit
+@njit(forceinline=True)
 def waves_out(y, out, tables):
     """Outgoing waves of all pipes into out[ends], and what they carry into their nodes into out[net]."""
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
@@ -50,7 +51,7 @@ def waves_out(y, out, tables):
         out[layout["net"] + pipe["to_node"]] += 2.0 * r_out - admittance * pipe["to_offset"]
 
 
-@njit
+@njit(forceinline=True)
 def waves_in(out, tables):
     """Waves that the nodes send back: incoming = Y (p' + offset) - outgoing."""
     layout, pipes = tables[I_LAYOUT][0], tables[I_PIPES]
@@ -63,7 +64,7 @@ def waves_in(out, tables):
         out[at + 3] = pipe["admittance"] * p_to - out[at + 2]
 
 
-@njit
+@njit(forceinline=True)
 def net_flows(out, tables):
     """Net flow into every node from its links [kg/s], total, profile included."""
     layout, pipes, nodes = tables[I_LAYOUT][0], tables[I_PIPES], tables[I_NODES]
@@ -85,7 +86,7 @@ def net_flows(out, tables):
         out[net + columns[k]["to_node"]] += change
 
 
-@njit
+@njit(forceinline=True)
 def stored_rates(y, dydt, out, tables):
     """d/dt of stored masses; what reservoirs give, tanks spill, and dry tanks are asked for goes to supply."""
     layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
@@ -105,7 +106,7 @@ def stored_rates(y, dydt, out, tables):
         out[layout["supply"] + i] = supply
 
 
-@njit
+@njit(forceinline=True)
 def column_rates(y, dydt, out, tables):
     """d/dt of the flow in rigid columns: (A / L) (drop') - drag'."""
     layout, columns, pressure = tables[I_LAYOUT][0], tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
@@ -123,7 +124,7 @@ def column_rates(y, dydt, out, tables):
         dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
 
 
-@njit
+@njit(forceinline=True)
 def greatest_rate(t, out, tables):
     """Greatest rate of the scene [1/s]: waves over cells, and stored masses against what touches them."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
@@ -148,8 +149,9 @@ def greatest_rate(t, out, tables):
 
 
 @njit
-def rhs_linear(t, y, dydt, out, tables):
+def rhs_linear(t, y, dydt, out, handle):
     """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch."""
+    tables = open_tables(handle)
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     out[STATUS], out[WHERE] = OK, -1.0
     waves_out(y, out, tables)

@@ -39,7 +39,7 @@ from fvsolve.kernels.valves import (
     valve_conductance,
 )
 
-@njit
+@njit(forceinline=True)
 def stored_pressures(t, y, out, tables):
     """Deviations [Pa] of given pressures, tanks and chambers."""
     settings, layout, nodes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES]
@@ -55,7 +55,7 @@ def stored_pressures(t, y, out, tables):
             out[at] = node["stiffness"] * y[node["y"]]
 
 
-@njit
+@njit(forceinline=True)
 def junction_flows(t, y, out, tables):
     """Change of flow into each node without storage at p' = 0, less its demand; kept in out[net]."""
     layout, nodes, columns = tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS]
@@ -71,7 +71,7 @@ def junction_flows(t, y, out, tables):
         out[layout["net"] + columns[k]["to_node"]] += change
 
 
-@njit
+@njit(forceinline=True)
 def close_alone(out, tables):
     """Nodes that no valve touches: p' = (sum of what arrives) / Y."""
     layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
@@ -80,7 +80,7 @@ def close_alone(out, tables):
             out[layout["pressure"] + i] = out[layout["net"] + i] / nodes[i]["admittance"]
 
 
-@njit
+@njit(forceinline=True)
 def side_of(out, layout, nodes, i):
     """Pressure deviation of a node at no change of valve flow, and how much a unit of outflow lowers it."""
     if nodes[i]["kind"] != JUNCTION:
@@ -88,7 +88,7 @@ def side_of(out, layout, nodes, i):
     return out[layout["net"] + i] / nodes[i]["admittance"], 1.0 / nodes[i]["admittance"]
 
 
-@njit
+@njit(forceinline=True)
 def close_single(t, out, tables):
     """Valves with at most one node without storage at each end, that no other valve touches: closed roots."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
@@ -142,7 +142,7 @@ def solve_dense(a, b, n):
     return True
 
 
-@njit
+@njit(forceinline=True)
 def valve_step(valve, g, x, change):
     """a, s with dx = a + s d(p_i' - p_j') for the next Newton step of one valve in a cluster.
 
@@ -165,7 +165,7 @@ def valve_step(valve, g, x, change):
     return (asked - present) / chord, g / chord
 
 
-@njit
+@njit(forceinline=True)
 def inner_row(nodes, i):
     """Row of a node in its cluster, -1 where its pressure is known."""
     return nodes[i]["row"] if nodes[i]["kind"] == JUNCTION else -1
@@ -250,7 +250,7 @@ def close_cluster(t, out, tables, which):
         out[layout["valve"] + k] = valves[k]["flow"] + x[e]
 
 
-@njit
+@njit(forceinline=True)
 def close_nodes(t, y, out, tables):
     """Pressure deviation of every node and flow of every valve, from out[net] and the stored masses."""
     stored_pressures(t, y, out, tables)

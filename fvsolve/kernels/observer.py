@@ -1,6 +1,7 @@
 """What is read off a state: probes, least and greatest values, marks and events. Changes no state."""
 
 from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
     I_ENVELOPE,
@@ -27,7 +28,7 @@ BLOCK = 64
 STOP_HERE = -2.0  # in out[WHERE]: the run is to end
 
 
-@njit
+@njit(forceinline=True)
 def wave_sum(probe, pipe, sign, which, y, out, tables):
     """r + l or r - l of a pipe at a place: at an end from the node, inside from a polynomial over cells."""
     at = tables[I_LAYOUT][0]["ends"] + 4 * which
@@ -43,8 +44,9 @@ def wave_sum(probe, pipe, sign, which, y, out, tables):
 
 
 @njit
-def observe_linear(t, y, out, tables, values):
+def observe_linear(t, y, out, handle, values):
     """values[k] = scale * quantity + offset of every probe."""
+    tables = open_tables(handle)
     layout, probes = tables[I_LAYOUT][0], tables[I_PROBES]
     for k in range(probes.size):
         probe = probes[k]
@@ -68,7 +70,7 @@ def observe_linear(t, y, out, tables, values):
         values[k] = probe["scale"] * value + probe["offset"]
 
 
-@njit
+@njit(forceinline=True)
 def widen(envelope, c, t, value):
     """Let the least and greatest value of column c, and their times, include a value."""
     if value < envelope[0, c]:
@@ -77,7 +79,7 @@ def widen(envelope, c, t, value):
         envelope[2, c], envelope[3, c] = value, t
 
 
-@njit
+@njit(forceinline=True)
 def outside(r, l, least, greatest):
     """How many of the cells lie outside of what was seen before."""
     count = 0
@@ -88,37 +90,59 @@ def outside(r, l, least, greatest):
 
 
 @njit
-def record_pipe(t, r, l, pipe, which, tables):
+def widen_cells(t, r, l, least, t_least, greatest, t_greatest):
+    """`widen` for many cells, without a branch."""
+    for i in range(r.size):
+        s = r[i] + l[i]
+        low, high = s < least[i], s > greatest[i]
+        least[i] = s if low else least[i]
+        t_least[i] = t if low else t_least[i]
+        greatest[i] = s if high else greatest[i]
+        t_greatest[i] = t if high else t_greatest[i]
+
+
+@njit
+def count_below(r, l, admittance, profile, vapor):
+    """How many of the cells are below vapour pressure."""
+    count = 0
+    for i in range(r.size):
+        count += profile[i] + (r[i] + l[i]) / admittance < vapor
+    return count
+
+
+@njit
+def record_pipe(t, r, l, pipe, which, envelope, profile, vapor, marks):
     """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
-    envelope, profile = tables[I_ENVELOPE], tables[I_PROFILE]
-    vapor, marks = tables[I_SETTINGS][0]["vapor"], tables[I_MARKS]
     start, at = 0, pipe["cell"]
     while start < r.size:
         stop = min(start + BLOCK, r.size)
-        low, high = envelope[0, at + start : at + stop], envelope[2, at + start : at + stop]
-        if outside(r[start:stop], l[start:stop], low, high) > 0:
-            for i in range(start, stop):
-                s = r[i] + l[i]
-                widen(envelope, at + i, t, s)
-                if profile[at + i] + s / pipe["admittance"] < vapor and marks[which] != marks[which]:
+        a, b = at + start, at + stop
+        if outside(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b]) > 0:
+            e = envelope
+            widen_cells(t, r[start:stop], l[start:stop], e[0, a:b], e[1, a:b], e[2, a:b], e[3, a:b])
+            if marks[which] != marks[which]:
+                if count_below(r[start:stop], l[start:stop], pipe["admittance"], profile[a:b], vapor) > 0:
                     marks[which] = t
         start = stop
 
 
 @njit
-def record_linear(t, y, out, tables, values):
+def record_linear(t, y, out, handle, values):
     """Extremes of probes, envelopes of pipes and first times of marks, after every accepted step.
 
     marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
     """
-    observe_linear(t, y, out, tables, values)
+    tables = open_tables(handle)
+    observe_linear(t, y, out, handle, values)
     pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
     marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
     for k in range(values.size):
         widen(extremes, k, t, values[k])
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
-        record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
+        record_pipe(
+            t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables[I_ENVELOPE], tables[I_PROFILE], vapor, marks
+        )
     for i in range(nodes.size):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
@@ -134,9 +158,9 @@ def record_linear(t, y, out, tables, values):
 
 
 @njit
-def events(t, y, tables, g):
+def events(t, y, handle, g):
     """Functions that are located where they fall through zero: a tank's content, and its room below the rim."""
-    nodes, k = tables[I_NODES], 0
+    nodes, k = open_tables(handle)[I_NODES], 0
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK:
             stored = nodes[i]["mass"] + y[nodes[i]["y"]]

@@ -4,7 +4,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.records import I_PIECES, I_SCHEDULES, I_SETTINGS
 
 
-@njit
+@njit(forceinline=True)
 def piece_at(pieces, first, count, t, limit):
     """Row of the piece that holds at t; from `limit` on the piece that ends there (left limit)."""
     low, high = first, first + count
@@ -18,7 +18,7 @@ def piece_at(pieces, first, count, t, limit):
     return low
 
 
-@njit
+@njit(forceinline=True)
 def piece_value(pieces, row, t):
     """a + b s + c s^2 + d s^3 with s = t - origin, or the power v1 + (v0 - v1) (1 - s / duration)^exponent."""
     s = t - pieces[row, 2]
@@ -28,7 +28,7 @@ def piece_value(pieces, row, t):
     return pieces[row, 4] + (pieces[row, 3] - pieces[row, 4]) * rest ** pieces[row, 6]
 
 
-@njit
+@njit(forceinline=True)
 def schedule_value(tables, index, t):
     """Value of schedule `index` at t [s], right-continuous, but its left limit from settings.limit on."""
     limit = tables[I_SETTINGS][0]["limit"]

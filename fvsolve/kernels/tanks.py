@@ -27,7 +27,7 @@ def level_of_volume(floats, shape, rows, volume):
     return z0 + 2.0 * rest / (a0 + sqrt(max(a0 * a0 + 2.0 * growth * rest, 0.0)))
 
 
-@njit
+@njit(forceinline=True)
 def tank_level(node, floats, rho, stored):
     """Level [m] of a tank whose mass deviates by `stored` [kg] from the profile's."""
     if node["shape"] < 0:

@@ -10,7 +10,7 @@ from fvsolve.kernels.records import I_FLOATS, I_VALVES
 from fvsolve.kernels.schedules import schedule_value
 
 
-@njit
+@njit(forceinline=True)
 def relative_area(kind, floats, table, size, opening):
     """Relative flow area at a stem position: linear, equal-percentage (rangeability 50, shut at 0), or a table."""
     if kind == 0:
@@ -27,7 +27,7 @@ def relative_area(kind, floats, table, size, opening):
     return floats[table + 2 * size - 1]
 
 
-@njit
+@njit(forceinline=True)
 def valve_conductance(tables, index, t):
     """G = 2 rho (Cd A)^2 at time t [kg2/s2/Pa]."""
     valve = tables[I_VALVES][index]
@@ -36,7 +36,7 @@ def valve_conductance(tables, index, t):
     return valve["conductance"] * area * area
 
 
-@njit
+@njit(forceinline=True)
 def flow_at_drop(conductance, transition, drop):
     """Mass flow at a pressure drop; below `transition` [kg/s] an odd polynomial with a bounded slope, C2 joined."""
     if conductance <= 0.0:
@@ -50,7 +50,7 @@ def flow_at_drop(conductance, transition, drop):
     return flow if drop >= 0.0 else -flow
 
 
-@njit
+@njit(forceinline=True)
 def flow_slope(conductance, transition, drop):
     """d flow / d drop [kg/s per Pa]."""
     if conductance <= 0.0:
@@ -62,7 +62,7 @@ def flow_slope(conductance, transition, drop):
     return 0.5 * conductance / sqrt(size) if size > 0.0 else 0.0
 
 
-@njit
+@njit(forceinline=True)
 def flow_change(conductance, impedance, flow, surplus):
     """Exact root x of |M + x| (M + x) - |M| M + G Z x = surplus: what a valve between pipe ends adds to M.
 

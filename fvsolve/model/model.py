@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,6 +79,13 @@ class Model:
 
         return self.tables[I_LAYOUT][0]
 
+    @cached_property
+    def handle(self):
+        """The tables as compiled functions take them."""
+        from fvsolve.kernels.handle import make_handle
+
+        return make_handle(self.tables)
+
     def functions(self) -> tuple:
         """(rhs, observe, record, events) for the density law of the case, compiled."""
         from fvsolve.kernels.functions import functions
@@ -98,7 +106,7 @@ class Model:
 
         self.tables[I_SETTINGS][0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
-        self.functions()[0](float(t), np.ascontiguousarray(y, dtype=np.float64), dydt, out, self.tables)
+        self.functions()[0](float(t), np.ascontiguousarray(y, dtype=np.float64), dydt, out, self.handle)
         return dydt, out
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
@@ -117,7 +125,7 @@ class Model:
         """Values of all probes : float64[probes] [SI]."""
         out = self.evaluate(t, y, limit)[1]
         values = np.zeros(len(self.probes))
-        self.functions()[1](float(t), y, out, self.tables, values)
+        self.functions()[1](float(t), y, out, self.handle, values)
         return values
 
     # what the numbers mean ----------------------------------------------------------------------------------

@@ -28,6 +28,8 @@ class RunDirectory:
     def __init__(self, folder: Path, model, force: bool = False, resume: bool = False):
         self.folder = Path(folder)
         self.model = model
+        if force and resume:
+            raise RunError("--resume goes on with a run and --force starts it again; state one of them")
         _refuse_names(model.case)
         self.who = identity(model.case)
         self.restart = self._checkpoint() if resume else None
@@ -39,20 +41,24 @@ class RunDirectory:
 
     @property
     def ended(self) -> bool:
-        """True where there is nothing to go on with: the run in the directory came to its end."""
-        there = self.restart is not None and (self.folder / ENDED).is_file()
-        return there and self.restart.t >= self.model.case.numerics.end
+        """True where there is nothing to go on with: this very run in the directory came to its end."""
+        if self.restart is None or not (self.folder / ENDED).is_file():
+            return False
+        said = read_summary(self.folder / ENDED)
+        return said["ok"] and said["versions"] == self.who and said["t"] >= self.model.case.numerics.end
 
-    def begin(self, model, state, resume=None) -> None:
+    def begin(self, model, state) -> None:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
         (self.folder / ENDED).unlink(missing_ok=True)
         if self.restart is None:
             self._start()
-        else:
-            self.history.continue_from(self.restart.rows, self.restart.history_bytes)
-            if self.fields:
-                self.fields.continue_from(self.restart.frames)
+            self._write_case()
+            self.checkpoint(state, {})
+            return
         self._write_case()
+        self.history.continue_from(self.restart.rows, self.restart.history_bytes)
+        if self.fields:
+            self.fields.continue_from(self.restart.frames)
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
@@ -96,7 +102,10 @@ class RunDirectory:
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
-        return read_restart(path, self.who) if path.is_file() else None
+        found = read_restart(path, self.who) if path.is_file() else None
+        if found and found.t > self.model.case.numerics.end:
+            raise RunError(f"{path} is at t = {found.t:.6g} s, after numerics.end; start again with --force")
+        return found
 
     def _start(self) -> None:
         clear(self.folder)

@@ -21,7 +21,7 @@ class MemorySink:
         self._blocks: list[np.ndarray] = []
         self._envelope: dict = {}
 
-    def begin(self, model, state, resume=None) -> None:
+    def begin(self, model, state) -> None:
         """Nothing to open."""
 
     def rows(self, t, values) -> None:

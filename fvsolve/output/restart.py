@@ -89,8 +89,8 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
 def _check(path: Path, found: dict[str, str], wanted: dict[str, str]) -> None:
     if found.get("case") != wanted["case"]:
         raise RunError(
-            f"{path} belongs to another case: more than numerics.end has changed since; "
-            "start again with --force, or keep both with --out DIR"
+            f"{path} belongs to another case: more than numerics.end has changed since (an [output] every "
+            "that is not stated changes with it); start again with --force, or keep both with --out DIR"
         )
     other = [name for name in wanted if found.get(name) != wanted[name]]
     if other:

@@ -9,7 +9,7 @@ from pathlib import Path
 from fvsolve.errors import RunError
 from fvsolve.output.directory import RunDirectory, read_directory
 from fvsolve.output.memory import MemorySink
-from fvsolve.output.restart import versions
+from fvsolve.output.restart import identity
 from fvsolve.output.summary import described, write_summary
 from fvsolve.run.claims import claims
 from fvsolve.run.result import Result
@@ -71,10 +71,10 @@ def _solve(model, sink, progress):
     from fvsolve.model import State
     from fvsolve.solve import initial_state, solve
 
-    if sink.restart is None:
-        return solve(model, initial_state(model), sink, progress)
-    state = State(sink.restart.t, sink.restart.y, sink.restart.memory)
-    return solve(model, state, sink, progress, resume=sink.restart.extra)
+    kept = sink.restart
+    state = initial_state(model) if kept is None else State(kept.t, kept.y, kept.memory)
+    sink.begin(model, state)
+    return solve(model, state, sink, progress)
 
 
 def _result(model, summary, sink, begun: float) -> Result:
@@ -82,7 +82,7 @@ def _result(model, summary, sink, begun: float) -> Result:
     result = Result(said, sink.table, sink.envelope, sink.folder)
     result.case = model.case
     said |= claims(model, summary.extremes, result)
-    said["versions"] = versions(model.case)
+    said["versions"] = identity(model.case)
     if sink.folder is not None:
         _draw(result)
         said["files"] = sink.files()

@@ -80,7 +80,7 @@ class Run:
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
         out = self.model.evaluate(t, self.loop.now, limit)[1]
-        self.loop.record(t, self.loop.now, out, self.model.tables, self.loop.values)
+        self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.values)
         self.sink.rows(np.array([t]), self.loop.values[None, :].copy())
         return out
 

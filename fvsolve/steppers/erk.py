@@ -7,6 +7,7 @@ import functools
 from math import isfinite, sqrt
 
 from fvsolve.jit import njit
+from fvsolve.steppers.borrow import borrow
 
 # What the loop remembers, in one flat array of floats that a restart stores.
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST = range(11)
@@ -31,16 +32,21 @@ def function_types():
     """Numba types of (rhs, observe, record, events): declared, so that the loop is cached."""
     from numba import types
 
-    from fvsolve.kernels.records import tables_type
-
-    f, v, tables = types.float64, types.float64[::1], tables_type()
-    rhs = types.FunctionType(types.void(f, v, v, v, tables))
-    observe = types.FunctionType(types.void(f, v, v, tables, v))
-    events = types.FunctionType(types.void(f, v, tables, v))
+    f, v, handle = types.float64, types.float64[::1], types.int64[::1]
+    rhs = types.FunctionType(types.void(f, v, v, v, handle))
+    observe = types.FunctionType(types.void(f, v, v, handle, v))
+    events = types.FunctionType(types.void(f, v, handle, v))
     return rhs, observe, observe, events
 
 
-@njit
+@njit(forceinline=True)
+def copy(source, target):
+    """target = source, by a plain loop: numba's slice assignment looks for overlaps first."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@njit(forceinline=True)
 def combine(y, h, weights, count, k, out):
     """out = y + h sum of weights[j] k[j] over j < count; up to three terms a pass."""
     terms, c, which = 0, (0.0, 0.0, 0.0), (0, 0, 0)
@@ -60,7 +66,7 @@ def combine(y, h, weights, count, k, out):
     if terms > 0:
         add(y if first else out, c, which, terms, k, out)
     elif first:
-        out[:] = y
+        copy(y, out)
 
 
 @njit
@@ -79,14 +85,14 @@ def add(y, c, which, terms, k, out):
             out[i] = y[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
 
 
-@njit
-def stages(rhs, tables, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new):
+@njit(forceinline=True)
+def stages(rhs, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new):
     """Stages 2 .. s from k[0], then y_new; supply[i] keeps the ledger rates of stage i."""
     s = b.size
     for i in range(1, s):
         target = y_new if last_is_new and i == s - 1 else y_stage
         combine(y, h, a[i], i, k, target)
-        rhs(t + c[i] * h, target, k[i], out, tables)
+        rhs(t + c[i] * h, target, k[i], out, handle)
         for m in range(supply.shape[1]):
             supply[i, m] = out[where + m]
     if not last_is_new:
@@ -120,7 +126,7 @@ def first_step(k, scale, order, tolerance, span):
 def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
     """Dense output at t + theta h: the method's own polynomial, else the cubic through both ends."""
     if dense.shape[0] > 0:
-        out[:] = y
+        copy(y, out)
         for j in range(dense.shape[0]):
             w, power = 0.0, theta
             for m in range(dense.shape[1]):
@@ -140,14 +146,14 @@ def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
 
 @njit
 def all_finite(y):
-    """False where any value is not finite: one sum tells."""
-    total = 0.0
+    """False where any value is not finite: counted in integers, since a sum of floats is not vectorised."""
+    bad = 0
     for i in range(y.size):
-        total += y[i] * 0.0
-    return total == 0.0
+        bad += y[i] - y[i] != 0.0
+    return bad == 0
 
 
-@njit
+@njit(forceinline=True)
 def fallen(g, g_new):
     """Whether an event function went from above to zero or below."""
     for i in range(g.size):
@@ -167,7 +173,7 @@ def nearness(g, g_new):
 
 
 @njit
-def locate(rhs, events, tables, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new, g, g_new):
+def locate(rhs, events, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new, g, g_new):
     """The step that ends just past the first event, by the Illinois rule on its length; y_new belongs to it."""
     low, high, at_low, at_high = 0.0, h, 1.0, nearness(g, g_new)
     for _ in range(100):
@@ -177,19 +183,19 @@ def locate(rhs, events, tables, a, b, c, last_is_new, t, h, y, k, supply, where,
         guess += 1e-3 * EVENT_TOLERANCE * h
         if not low < guess < high:
             guess = 0.5 * (low + high)
-        stages(rhs, tables, a, b, c, last_is_new, t, guess, y, k, supply, where, out, y_stage, y_new)
-        events(t + guess, y_new, tables, g_new)
+        stages(rhs, handle, a, b, c, last_is_new, t, guess, y, k, supply, where, out, y_stage, y_new)
+        events(t + guess, y_new, handle, g_new)
         here = nearness(g, g_new)
         if here <= 0.0:
             high, at_high, at_low = guess, here, 0.5 * at_low
         else:
             low, at_low, at_high = guess, here, 0.5 * at_high
-    stages(rhs, tables, a, b, c, last_is_new, t, high, y, k, supply, where, out, y_stage, y_new)
-    events(t + high, y_new, tables, g_new)
+    stages(rhs, handle, a, b, c, last_is_new, t, high, y, k, supply, where, out, y_stage, y_new)
+    events(t + high, y_new, handle, g_new)
     return high
 
 
-@njit
+@njit(forceinline=True)
 def next_step(orders, memory, out_rate, k, scale, order):
     """Length of the step to try, before the end of the segment is looked at [s]."""
     if orders[CONTROL] == TOLERANCE:
@@ -204,7 +210,7 @@ def next_step(orders, memory, out_rate, k, scale, order):
     return h
 
 
-@njit
+@njit(forceinline=True)
 def output_due(orders, memory, count_at, every, limit):
     """Time of the next row or field: START + count * every, or infinity."""
     if every <= 0.0 or memory[count_at] > limit:
@@ -212,8 +218,15 @@ def output_due(orders, memory, count_at, every, limit):
     return orders[START] + memory[count_at] * every
 
 
+@njit(forceinline=True)
+def next_due(orders, memory):
+    """Time of whatever is to be written next [s]."""
+    row = output_due(orders, memory, NEXT_OUTPUT, orders[EVERY], 1e300)
+    return min(row, output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT]))
+
+
 @njit
-def emit(rhs, observe, tables, orders, memory, flags, t_old, y_old, f_old, y, k, dense, rates, out, y_out, rows):
+def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k, dense, rates, out, y_out, rows):
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
     while True:
@@ -225,10 +238,10 @@ def emit(rhs, observe, tables, orders, memory, flags, t_old, y_old, f_old, y, k,
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
         interpolate((due - t_old) / h, h, y_old, f_old, y, k[0], k, dense, y_out)
-        rhs(due, y_out, rates, out, tables)
+        rhs(due, y_out, rates, out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
-            observe(due, y_out, out, tables, rows[flags[ROWS], 1:])
+            observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
             flags[ROWS] += 1
             memory[NEXT_OUTPUT] += 1.0
         if field <= due:
@@ -238,7 +251,7 @@ def emit(rhs, observe, tables, orders, memory, flags, t_old, y_old, f_old, y, k,
 
 @njit
 def run_erk(
-    rhs, observe, record, events, tables,
+    rhs, observe, record, events, handle,
     a, b, c, error, dense, order, last_is_new,
     orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, y_out,
     rates, rows,
@@ -248,20 +261,24 @@ def run_erk(
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[m] advanced with the step's own weights from out[where:]; rows : float64[cap, 1 + probes].
     """
+    handle, a, b, c, error, dense = borrow(handle), borrow(a), borrow(b), borrow(c), borrow(error), borrow(dense)
+    orders, memory, flags, y, k, f_old = borrow(orders), borrow(memory), borrow(flags), borrow(y), borrow(k), borrow(f_old)
+    supply, ledger, scale, out, out_row = borrow(supply), borrow(ledger), borrow(scale), borrow(out), borrow(out_row)
+    values, g, g_new, y_out, rates, rows = borrow(values), borrow(g), borrow(g_new), borrow(y_out), borrow(rates), borrow(rows)
     s, reuse = b.size, False
     for _ in range(1 << 62):
         now, old = flags[NOW], flags[OLD]
         new = 3 - now - old
         if flags[PHASE] == FRESH:
             if reuse:
-                k[0, :] = k[s - 1]
+                copy(k[s - 1], k[0])
             else:
-                rhs(memory[T], y[now], k[0], out, tables)
+                rhs(memory[T], y[now], k[0], out, handle)
                 memory[CALLS] += 1.0
             reuse = False
             flags[PHASE] = EMIT
-            record(memory[T], y[now], out, tables, values)
-            events(memory[T], y[now], tables, g)
+            record(memory[T], y[now], out, handle, values)
+            events(memory[T], y[now], handle, g)
             if not all_finite(y[now]) or not isfinite(out[RATE]):
                 return BAD_VALUE
             if out[STATUS] != 0.0:
@@ -269,9 +286,9 @@ def run_erk(
             for m in range(ledger.size):
                 supply[0, m] = out[where + m]
         if flags[PHASE] == EMIT:
-            if flags[BEHIND] == 1:
+            if flags[BEHIND] == 1 and next_due(orders, memory) <= memory[T]:
                 why = emit(
-                    rhs, observe, tables, orders, memory, flags, memory[T] - memory[LAST], y[old], f_old, y[now],
+                    rhs, observe, handle, orders, memory, flags, memory[T] - memory[LAST], y[old], f_old, y[now],
                     k, dense, rates, out_row, y_out, rows,
                 )  # fmt: skip
                 if why != DONE:
@@ -291,7 +308,7 @@ def run_erk(
                 h = rest
             if not h > 4e-16 * max(abs(memory[T]), abs(orders[END])) and not last:
                 return TINY_STEP
-            stages(rhs, tables, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new])
+            stages(rhs, handle, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new])
             memory[CALLS] += s - 1.0
             if orders[CONTROL] != TOLERANCE:
                 break
@@ -305,10 +322,10 @@ def run_erk(
             memory[REJECTIONS] += 1.0
             h *= max(0.1, 0.9 * e ** (-1.0 / order)) if e == e else 0.1
             memory[STEP] = h
-        events(memory[T] + h, y[new], tables, g_new)
+        events(memory[T] + h, y[new], handle, g_new)
         if fallen(g, g_new):
             h = locate(
-                rhs, events, tables, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new],
+                rhs, events, handle, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new],
                 g, g_new,
             )  # fmt: skip
             last = last and memory[T] + h >= orders[END]
@@ -330,7 +347,7 @@ def run_erk(
         memory[LAST] = memory[T] - t_old
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
-        f_old[:] = k[0]
+        copy(k[0], f_old)
         reuse = last_is_new and orders[CONTROL] == TOLERANCE and not last
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, FRESH
     return DONE
@@ -343,11 +360,9 @@ def compiled():
         return run_erk
     from numba import types
 
-    from fvsolve.kernels.records import tables_type
-
     f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
     run_erk.compile(
-        (*function_types(), tables_type(), w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
+        (*function_types(), types.int64[::1], w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
          i, v, v, v, v, v, v, v, v, v, w)
     )  # fmt: skip
     run_erk.disable_compile()

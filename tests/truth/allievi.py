@@ -1,8 +1,9 @@
 """Allievi's interlocking recursion for a reservoir, a frictionless pipe and a closing valve. Knows no grid.
 
-`z_k^2 + z_(k-1)^2 - 2 = 2 A (tau_(k-1) z_(k-1) - tau_k z_k)` at the times `t_k = 2 L k / a`, with
+`d_k + d_(k-1) - 2 = 2 A (tau_(k-1) z_(k-1) - tau_k z_k)` at the times `t_k = 2 L k / a`, with
 `A = rho a v / (2 dp)` from the velocity v and the valve's drop dp in the steady start, `tau` the opening
-relative to that start and `z^2` the valve's drop relative to dp (Allievi 1902; Wylie and Streeter 1993).
+relative to that start, `d` the valve's drop relative to dp and `z |z| = d` (Allievi 1902; Wylie and
+Streeter 1993), which also holds while the valve flows back.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ def relative_drop(parameter: float, opening: Sequence[float]) -> list[float]:
     """The valve's drop at `t = 2 L k / a` over that at the start, for relative openings at those times."""
     z, drops = 1.0, [1.0]
     for before, now in zip(opening[:-1], opening[1:], strict=True):
-        known = 2 + 2 * parameter * before * z - z * z
-        z = -parameter * now + math.sqrt((parameter * now) ** 2 + known)
-        drops.append(z * z)
+        known = 2 + 2 * parameter * before * z - drops[-1]
+        size = -parameter * now + math.sqrt((parameter * now) ** 2 + abs(known))
+        z = math.copysign(size, known)
+        drops.append(z * abs(z))
     return drops

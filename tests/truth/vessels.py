@@ -41,7 +41,7 @@ def tapered(foot: float, growth: float, flow_area: float, level: float, t: Array
     found = []
     for left in total - speed * np.asarray(t, float):
         found.append(
-            brentq(lambda r, v=left: volume_time(r) - v, 0, 2 * math.sqrt(level), xtol=1e-15) ** 2
+            brentq(lambda r, v=left: volume_time(r) - v, 0, math.sqrt(level) * (1 + 1e-12), xtol=1e-15) ** 2
             if left > 0
             else 0.0
         )
