@@ -18,12 +18,12 @@ _HOMES = {
     "advance": "fvsolve.solve",
     "build": "fvsolve.model",
     "initial_state": "fvsolve.solve",
-    "integrate": "fvsolve.steppers",
+    "integrate": "fvsolve.steppers.ode",
     "load": "fvsolve.case",
     "open_run": "fvsolve.run",
     "run": "fvsolve.run",
     "solve": "fvsolve.solve",
-    "tableau": "fvsolve.steppers",
+    "tableau": "fvsolve.steppers.tableau",
 }
 
 __all__ = sorted(_HOMES)  # noqa: PLE0605

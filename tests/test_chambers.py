@@ -164,3 +164,50 @@ def test_a_valve_between_pipe_and_chamber_and_a_junction_between_valves_run(open
     else:
         mid = (1e-4**2 * result["pot.pressure"] + 2e-4**2 * 5e5) / (1e-4**2 + 2e-4**2)
         assert result["mid.pressure"] == pytest.approx(mid, rel=1e-7)
+
+
+PSI, GALLON = 6894.757293168361, 3.785411784e-3
+SIZES = {
+    "discharge": ({"area": 2e-4, "discharge_coefficient": 0.7}, 0.7 * 2e-4),
+    "by diameter": ({"diameter": 0.02}, 0.61 * math.pi / 4 * 0.02**2),
+    "loss": ({"loss_coefficient": 4.0, "area": 2e-4}, 1e-4),
+    "loss by diameter": ({"loss_coefficient": 2.0, "diameter": 0.05}, math.pi / 4 * 0.05**2 / math.sqrt(2.0)),
+    "Kv": ({"Kv": 10.0}, 10 / 3600 / math.sqrt(2 * 1e5 / RHO)),
+    "Cv": ({"Cv": 10.0}, 10 * GALLON / 60 / math.sqrt(2 * PSI / 999.016)),
+}
+
+
+@pytest.mark.parametrize("kind", ["valve", "orifice"])
+@pytest.mark.parametrize("name", SIZES)
+def test_a_valve_passes_what_its_size_says_both_ways(name, kind):
+    size, flow_area = SIZES[name]
+    nodes = {"a": reservoir(3e5), "b": reservoir(2e5), "c": reservoir(4.5e5)}
+    links = {
+        "down": {"type": kind, "from": "a", "to": "b", **size},
+        "up": {"type": kind, "from": "b", "to": "c", **size},
+    }
+    result = fvsolve.run(
+        scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["down.flow", "up.flow"], 0.1)
+    )
+    assert result["down.flow"] == pytest.approx(flow_area * math.sqrt(2 * 1e5 / RHO), rel=1e-4)
+    assert result["up.flow"] == pytest.approx(-flow_area * math.sqrt(2 * 2.5e5 / RHO), rel=1e-4)
+
+
+CHARACTERISTICS = {
+    "linear": ("linear", lambda x: x),
+    "equal-percentage": ("equal-percentage", lambda x: 50.0 ** (x - 1)),
+    "table": (
+        {"opening": [0.0, 0.5, 1.0], "flow_area": [0.0, 0.1, 1.0]},
+        lambda x: np.interp(x, [0, 0.5, 1], [0, 0.1, 1]),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CHARACTERISTICS)
+@pytest.mark.parametrize("opening", [0.2, 0.5, 0.8, 1.0])
+def test_a_characteristic_turns_the_stem_into_flow_area(name, opening):
+    given, share = CHARACTERISTICS[name]
+    nodes = {"a": reservoir(3e5), "b": reservoir(2e5)}
+    links = {"v": valve("a", "b", 1e-4, opening, characteristic=given)}
+    result = fvsolve.run(scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["v.flow"], 0.1))
+    assert result["v.flow"] == pytest.approx(1e-4 * share(opening) * math.sqrt(2 * 1e5 / RHO), rel=1e-9)

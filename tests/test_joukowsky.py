@@ -55,7 +55,7 @@ def square_wave(t: np.ndarray, fraction: float, shut: float) -> tuple[np.ndarray
 
 
 def worst(result, jump: float, shut: float, turned: bool = False) -> float:
-    """Greatest distance from the square wave over the jump, three steps clear of fronts (probes blend cells)."""
+    """Greatest distance from the square wave over the jump, three steps clear of fronts (a probe blends)."""
     t, errors = np.asarray(result.t), []
     for name in result.probes:
         fraction = 1.0 if "@" not in str(name) else float(str(name).split("@")[1])

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from truth.bumps import gaussian_averages
 from truth.orders import mean_error, observed_order
-from truth.scenes import NO_FRICTION, junction, pipe, ramp, reservoir, scene
+from truth.scenes import NO_FRICTION, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 
@@ -41,7 +41,7 @@ def advected_bump(cells: int, scheme: str, backward: bool = False, **numerics) -
 
 
 SCHEMES = {
-    "upwind": (1, 3200),
+    "upwind": (1, 1600),
     "linear-upwind": (2, 200),
     "fromm": (2, 200),
     "central": (2, 200),
@@ -145,3 +145,53 @@ def test_an_error_controlled_run_meets_its_tolerance_in_proportion():
         errors.append(np.max(np.abs(fvsolve.advance(model, state, 0.03).y - run.y[:, -1])))
     assert errors[0] < 1e-3 and errors[1] < 1e-5
     assert errors[1] < errors[0] / 20
+
+
+def pots(step_size: float, every: float, method: str, kink: float) -> fvsolve.Result:
+    """Two chambers in a row, the second with an outlet that starts to close in a straight line at `kink`."""
+    nodes = {"pump": reservoir(8e6), "a": chamber(0.02, 5e6), "b": chamber(0.05, 3e6), "out": reservoir(5e5)}
+    links = {
+        "in": valve("pump", "a", 2e-7),
+        "mid": valve("a", "b", 4e-7),
+        "tap": valve("b", "out", 2e-7, ramp(kink, 0.6, 1.0, 0.3)),
+    }
+    numerics = {"method": method, "step": step_size}
+    return fvsolve.run(scene(nodes, links, 1.0, numerics, ["a.pressure", "b.pressure"], every))
+
+
+def pots_exact(t: np.ndarray, kink: float) -> np.ndarray:
+    beta, k = WATER["bulk_modulus"], math.sqrt(2 / RHO)
+
+    def rate(now, p):
+        closing = min(max((now - kink) / 0.6, 0.0), 1.0)
+        mid = 4e-7 * k * math.sqrt(p[0] - p[1])
+        out = 2e-7 * (1 - 0.7 * closing) * k * math.sqrt(p[1] - 5e5)
+        return [beta / 0.02 * (2e-7 * k * math.sqrt(8e6 - p[0]) - mid), beta / 0.05 * (mid - out)]
+
+    found, y, start = [], [5e6, 3e6], 0.0
+    for end in (kink, kink + 0.6, 1.0):
+        inside = t[(t >= start) & (t < end)]
+        run = solve_ivp(rate, (start, end), y, "DOP853", rtol=1e-13, atol=1e-6, t_eval=np.append(inside, end))
+        found.append(run.y[1][: len(inside)])
+        y, start = run.y[:, -1], end
+    found.append(np.full(np.sum(t >= 1.0), y[1]))
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("method, order", [("heun", 3), ("rk4", 4), ("dormand-prince", 5)])
+def test_a_kink_that_no_step_falls_on_costs_no_order(method, order):
+    errors, kink, steps = [], 0.123456789, (0.04, 0.02)
+    for size in steps:
+        result = pots(size, 1.0, method, kink)
+        errors.append(abs(result["b.pressure"][-1] - pots_exact(np.array([1.0]), kink)[0]))
+    assert observed_order(errors, steps) > order - 0.4
+
+
+@pytest.mark.parametrize("method, order", [("improved-euler", 2), ("rk4", 4), ("dormand-prince", 4)])
+def test_values_between_steps_are_as_good_as_the_steps_up_to_the_dense_output_s_order(method, order):
+    errors, kink, steps = [], 0.2, (0.04, 0.02)
+    for size in steps:
+        result = pots(size, 0.0137, method, kink)
+        t = np.asarray(result.t)
+        errors.append(np.max(np.abs(result["b.pressure"] - pots_exact(t, kink))))
+    assert observed_order(errors, steps) > order - 0.4

@@ -37,7 +37,7 @@ def long_run(**numerics) -> dict:
         "area": 0.01,
         "discharge_coefficient": 0.6,
     }
-    case["numerics"] = {"end": 900.0, "scheme": "muscl", "method": "ssp-rk3", **numerics}
+    case["numerics"] = {"end": 2500.0, "scheme": "muscl", "method": "ssp-rk3", **numerics}
     case["output"] |= {"every": 0.1, "probes": [*case["output"]["probes"], "tower.level"]}
     return case
 
@@ -69,15 +69,13 @@ def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, nume
     moments = random.Random(seed)
     case, script = long_run(**numerics), tmp_path / "often.py"
     script.write_text(OFTEN)
-    begun = time.perf_counter()
     whole = fvsolve.run(case, out=tmp_path / "whole")
-    took = time.perf_counter() - begun
     assert whole.ok, whole.reason
     file, broken, kills = tmp_path / "whole" / "case.toml", tmp_path / "broken", 0
     for _ in range(KILLS):
         running = started(script, file, broken)
         wait_for_a_run(broken, running)
-        time.sleep(moments.uniform(0.0, 0.4 * took))
+        time.sleep(moments.uniform(0.0, 0.4) * whole.summary["seconds"])
         kills += running.poll() is None
         running.kill()
         running.communicate()
@@ -167,6 +165,6 @@ def test_a_history_that_lost_rows_is_refused_with_a_remedy(tmp_path):
     fvsolve.run(branched(), out=tmp_path / "run")
     (tmp_path / "run" / "summary.json").unlink()
     history = tmp_path / "run" / "history.csv"
-    history.write_bytes(history.read_bytes()[:-100])
+    history.write_bytes(history.read_bytes()[:10])
     with pytest.raises(fvsolve.RunError, match="shorter.*--force"):
         fvsolve.run(branched(), out=tmp_path / "run", resume=True)

@@ -68,7 +68,7 @@ def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B00
 
     model = build(_load(case, set))
     if as_json:
-        _json(report.checks_data(model))
+        _json(model.checks)
     else:
         report.checks(model)
 

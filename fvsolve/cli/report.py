@@ -6,6 +6,16 @@ import sys
 
 ROWS = 20  # of a table at most; the rest is on disk
 WIDTH = 140  # of output that goes to no terminal
+PIPE = {
+    "length": "length [m]",
+    "cells": "cells",
+    "wave_speed": "wave speed [m/s]",
+    "velocity": "velocity [m/s]",
+    "reynolds": "Reynolds",
+    "friction_factor": "friction factor",
+    "from_head": "head at from [m]",
+    "to_head": "head at to [m]",
+}
 
 
 def result(one) -> None:
@@ -43,6 +53,24 @@ def exit_code(one) -> int:
     return 0 if one.ok and all(claim.ok for claim in one.expectations) else 1
 
 
+def checks(model) -> None:
+    """Nodes and pipes at the start, the step and its cost, what will move."""
+    found, console = model.checks, _console()
+    _line(console, model.case.title or model.case.name, "bold")
+    rows = [[name, *map(_number, one.values())] for name, one in found["nodes"].items()]
+    _table(["node", "elevation [m]", "pressure [Pa]", "head [m]"], rows, console)
+    _line(console, "")
+    rows = [[name, *(_number(one[key]) for key in PIPE)] for name, one in found["pipes"].items()]
+    if rows:
+        _table(["pipe", *PIPE.values()], rows, console)
+        _line(console, "")
+    for text in found["moving"]:
+        _line(console, f"moves from the start: {text}")
+    for text in found["warnings"]:
+        _line(console, f"note: {text}")
+    _line(console, _step(found))
+
+
 def titles(found: dict[str, str]) -> None:
     """The shipped cases."""
     _table(["case", "title"], [[name, title] for name, title in found.items()])
@@ -67,6 +95,15 @@ def _extremes(console, one) -> None:
     if len(rows) > ROWS:
         where = f"in {one.directory / 'summary.json'}" if one.directory else "in Result.extremes"
         _line(console, f"... {len(rows) - ROWS} more {where}")
+
+
+def _step(found: dict) -> str:
+    if found["step"] is None:
+        return f"step: {found['step_set_by']}"
+    return (
+        f"step {_number(found['step'])} s, set by {found['step_set_by']}; {found['steps']} steps, "
+        f"about {found['expected_seconds']:.2g} s"
+    )
 
 
 def _ledger(ledger: dict) -> str:
@@ -123,6 +160,8 @@ def _table(headers: list[str], rows: list[list[str]], console=None) -> None:
 
 
 def _numeric(text: str) -> bool:
+    if text == "-":
+        return True
     try:
         float(text)
     except ValueError:

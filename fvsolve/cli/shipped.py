@@ -8,6 +8,8 @@ from pathlib import Path
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 
+SCHEMA = "schema.json"  # beside the cases: what editors complete and check them by
+
 
 def folder() -> Path:
     """Where the cases are: inside the installed package, or beside it in a checkout."""
@@ -57,9 +59,12 @@ def copy(name: str, to: Path) -> list[Path]:
     pairs += [
         (Path(path), to.parent / Path(path).absolute().relative_to(folder())) for path in load(source).files
     ]
+    described = to.parent / SCHEMA
     for _, target in pairs:
         if target.exists():
             raise FvsolveError(f"{target} exists; state another file: fvsolve new {name} FILE")
+    if (folder() / SCHEMA).is_file() and not described.exists():
+        pairs.append((folder() / SCHEMA, described))
     for path, target in pairs:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, target)
