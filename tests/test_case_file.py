@@ -1,16 +1,20 @@
 """The case file: what it says is what the case holds, and the resolved case says the same again."""
 
+import json
 import pickle
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx
 
-from fvsolve.case import Case, load, schema
+from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.errors import CaseError
+from fvsolve.parts import KINDS, Friction, Wall
 
 # The example of the design, fluid by numbers.
 SCENE = """
@@ -254,8 +258,6 @@ def test_the_resolved_case_says_the_same(tmp_path):
 
 
 def test_a_dict_says_what_the_file_says(scene):
-    import tomllib
-
     given = tomllib.loads(SCENE)
     case = load(given)
     assert case == load(scene) and case.path is None and case.name == "case"
@@ -383,6 +385,24 @@ def test_a_parts_key_is_documented_with_its_unit():
     assert pipe["required"] == ["type", "from", "to", "length", "diameter"]
     assert pipe["properties"]["length"]["description"] == "along its axis [m]"
     assert made["required"] == ["fluid", "nodes", "links", "numerics"]
+
+
+def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
+    page = (Path(__file__).parents[1] / "docs" / "case-file.md").read_text(encoding="utf-8")
+    models = [*KINDS["nodes"].values(), *KINDS["links"].values(), FluidSpec, Numerics, Output, Friction, Wall]
+    keys = {key for model in models for key in model.keys()} | set(KINDS["nodes"]) | set(KINDS["links"])
+    assert [key for key in sorted(keys) if not re.search(rf"\b{re.escape(key)}\b", page)] == []
+    example = tomllib.loads(re.search(r"```toml\n(.*?)```", page, re.DOTALL)[1])
+    assert load({**example, "fluid": tomllib.loads(SCENE)["fluid"]}).links["main"].cells == 100
+
+
+def test_shipped_cases_point_editors_to_the_schema():
+    folder = Path(__file__).parents[1] / "cases"
+    assert (
+        json.loads((folder / "schema.json").read_text()) == schema()
+    )  # else: fvsolve schema > cases/schema.json
+    for path in folder.glob("*.toml"):
+        assert path.read_text(encoding="utf-8").startswith("#:schema schema.json\n"), path.name
 
 
 def test_reading_a_case_is_light():

@@ -353,6 +353,7 @@ BAD = {
     # the fluid: what fluid.py refuses comes with its key
     "fluid without density": (swap("density = 998\n", ""), "fluid.density:"),
     "density law": (add("fluid", 'law = "cubic"'), 'fluid.law: no density law named "cubic"'),
+    "fluid name": (swap('"user"', '"Watr"'), "line 5: fluid.name: "),
     "temperature in coulombs": (add("fluid", 'temperature = "20 C"'), 'did you mean "20 degC"?'),
     # elevations
     "some elevations": (

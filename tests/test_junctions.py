@@ -370,3 +370,38 @@ def test_noise_in_short_frictionless_pipes_does_not_grow_in_a_long_run(scheme):
         before = np.max(np.abs(state.y))
         state = fvsolve.advance(model, state, 300.0)
         assert np.max(np.abs(state.y)) < 1.5 * before, cells
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_every_valve_of_a_random_bunch_obeys_its_law_and_every_junction_balances(seed):
+    """Three junctions between given pressures and a pipe, valves that move and shut in between."""
+    rng = np.random.default_rng(seed)
+    nodes = {"r0": reservoir(1e6), "r1": reservoir(float(rng.uniform(2e5, 2e6))), "r2": reservoir(4e5)}
+    nodes |= {f"j{i}": junction(float(rng.choice([0.0, 1e-3]))) for i in range(3)}
+    links = {"main": pipe("r0", "j0", 100.0, 0.2, 1000.0, 10)}
+    ways = [("j0", "j1"), ("j1", "j2"), ("j2", "r1"), ("j0", "j2"), ("r2", "j1"), ("j1", "r1")]
+    areas = {}
+    for k, way in enumerate(ways):
+        way = way if rng.random() < 0.5 else way[::-1]
+        areas[f"v{k}"] = float(rng.uniform(1e-4, 5e-3))
+        before, after = float(rng.uniform(0.1, 1.0)), float(rng.choice([0.0, 1.0, rng.uniform(0, 1)]))
+        after = after if k != 2 else 0.5  # one way out stays open for the demands
+        links[f"v{k}"] = valve(*way, areas[f"v{k}"], ramp(0.1, 0.3, before, after))
+    probes = [f"{n}.pressure" for n in nodes] + [f"{n}.flow" for n in areas] + ["main.flow@1"]
+    result = fvsolve.run(scene(nodes, links, 0.8, SMOOTH, probes, 0.01))
+    assert result.ok, result.reason
+    t = np.asarray(result.t)
+    total = {n: -np.full(len(t), nodes[n].get("demand", 0.0)) for n in nodes}
+    total["j0"] += result["main.flow@1"]
+    for name, flow_area in areas.items():
+        link, moved = links[name], np.clip((t - 0.1) / 0.3, 0, 1)
+        v0, v1 = link["opening"]["value"]
+        opening = v1 + (v0 - v1) * (1 - moved)
+        drop = result[f"{link['from']}.pressure"] - result[f"{link['to']}.pressure"]
+        law = flow_area * opening * np.sign(drop) * np.sqrt(2 * np.abs(drop) / RHO)
+        clear = (np.abs(drop) > 1.0) | (opening == 0)  # below, the laminar part and round-off of the drop
+        assert result[f"{name}.flow"][clear] == pytest.approx(law[clear], rel=1e-8, abs=1e-11), name
+        total[link["from"]] -= result[f"{name}.flow"]
+        total[link["to"]] += result[f"{name}.flow"]
+    for name in ("j0", "j1", "j2"):
+        assert np.max(np.abs(total[name])) < 1e-12, name

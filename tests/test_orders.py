@@ -171,7 +171,8 @@ def pots_exact(t: np.ndarray, kink: float) -> np.ndarray:
     found, y, start = [], [5e6, 3e6], 0.0
     for end in (kink, kink + 0.6, 1.0):
         inside = t[(t >= start) & (t < end)]
-        run = solve_ivp(rate, (start, end), y, "DOP853", rtol=1e-13, atol=1e-6, t_eval=np.append(inside, end))
+        stops = np.append(inside, end)
+        run = solve_ivp(rate, (start, end), y, "DOP853", rtol=1e-13, atol=1e-6, t_eval=stops, max_step=0.02)
         found.append(run.y[1][: len(inside)])
         y, start = run.y[:, -1], end
     found.append(np.full(np.sum(t >= 1.0), y[1]))
@@ -189,7 +190,7 @@ def test_a_kink_that_no_step_falls_on_costs_no_order(method, order):
 
 @pytest.mark.parametrize("method, order", [("improved-euler", 2), ("rk4", 4), ("dormand-prince", 4)])
 def test_values_between_steps_are_as_good_as_the_steps_up_to_the_dense_output_s_order(method, order):
-    errors, kink, steps = [], 0.2, (0.04, 0.02)
+    errors, kink, steps = [], 0.2, (0.08, 0.04)
     for size in steps:
         result = pots(size, 0.0137, method, kink)
         t = np.asarray(result.t)

@@ -178,3 +178,27 @@ def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():
     t = np.asarray(result.t)
     assert result["surge.level"] == pytest.approx(10 + 0.5 * np.cos(w * t), abs=1e-6)
     assert result["main.flow"] == pytest.approx(-section * 0.5 * w * np.sin(w * t), abs=1e-6)
+
+
+def test_a_rigid_column_behind_a_valve_that_opens_at_once_starts_as_a_hyperbolic_tangent():
+    """`L / (g A) q' = H - (q / K)^2`: q = q1 tanh((t - 1) / T + artanh 0.2), T = L q1 / (g A H)."""
+    length, diameter, head = 1000.0, 0.3, 20.0
+    nodes = {"lake": lake(head), "gate": scenes.junction(), "air": reservoir(AMBIENT)}
+    column = {"type": "rigid-column", "from": "lake", "to": "gate", "length": length, "diameter": diameter}
+    links = {
+        "main": {**column, "friction": scenes.NO_FRICTION},
+        "valve": valve("gate", "air", OUTLET, scenes.step(1.0, 0.2, 1.0)),
+    }
+    case = scene(nodes, links, 40.0, {**CLOSE, "rtol": 1e-10}, ["valve.flow", "main.flow", "gate.head"], 0.5)
+    result = fvsolve.run(case)
+    most = OUTLET * math.sqrt(2 * GRAVITY * head)
+    scale = length * most / (GRAVITY * scenes.area(diameter) * head)
+    t = np.asarray(result.t)
+    after = (t > 1.0) | (np.arange(len(t)) == np.flatnonzero(t == 1.0)[-1])
+    flow = np.where(after, most * np.tanh((t - 1) / scale + math.atanh(0.2)), 0.2 * most)
+    assert result["main.flow"] == pytest.approx(flow, abs=1e-8 * most)
+    assert result["valve.flow"] == pytest.approx(flow, abs=1e-8 * most)
+    opened = np.where(after, 1.0, 0.2)
+    assert result["gate.head"] == pytest.approx(
+        (flow / (opened * OUTLET)) ** 2 / (2 * GRAVITY), abs=1e-6 * head
+    )

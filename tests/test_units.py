@@ -188,6 +188,11 @@ def test_pint_knows_the_rest():
         ("1e999 m", "length", '"1e999 m" is not finite; wanted a length, for example "300 mm"'),
         ("2 GPag", "modulus", '"2 GPag": no unit "GPag"'),
         ("2 barg", "modulus", '"2 barg" is a gauge pressure; wanted a modulus, for example "210 GPa"'),
+        (
+            "2 bara",
+            "gauge_pressure",
+            '"2 bara" is an absolute pressure; wanted a gauge one, for example "5 barg"',
+        ),
         ("3 m/s", "number", '"3 m/s" is a velocity; wanted a number, for example 0.5'),
         ("3 V", "length", '"3 V" is a quantity of [kg·m²/A/s³]; wanted a length, for example "300 mm"'),
         ("3 9**9**9", "length", '"3 9**9**9": no unit "9**9**9"; wanted a length, for example "300 mm"'),

@@ -29,9 +29,9 @@ def network(table: dict[str, Any]) -> Found:
         if isinstance(found["from"], str) and found["from"] == found["to"]:
             yield ("links", name, "to"), f"joins {show(found['to'])} to itself"
         ends[name] = [place for place in found.values() if isinstance(place, str) and place in nodes]
-    for group, members in (("nodes", nodes), ("links", links)):
+    for group in ("nodes", "links"):
         if table.get(group) == {}:
-            yield (group,), f"[{group}] is empty; a case has {group} at least two and a link between"
+            yield (group,), "is empty; wanted two places and a link between them at least"
     touched = {place for places in ends.values() for place in places}
     for name in nodes:
         if name not in touched:
@@ -126,11 +126,12 @@ def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
 
 
 def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Found:
+    touching: dict[str, set[str]] = {}
+    for link, places in ends.items():
+        for place in places:
+            touching.setdefault(place, set()).add(str(_dict(links[link]).get("type")))
     for name, node in nodes.items():
-        touching = [
-            links[link].get("type") == "rigid-column" for link, places in ends.items() if name in places
-        ]
-        if _dict(node).get("type") in ("junction", "inflow") and touching and all(touching):
+        if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {"rigid-column"}:
             message = "only rigid columns meet here, so nothing sets its pressure; give it a chamber volume"
             yield ("nodes", name), message
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import re
 
 Path = tuple[str | int, ...]
@@ -29,6 +30,7 @@ class _Scan:
         self.at = 0
         self.lines: dict[Path, int] = {}
         self.counts: dict[Path, int] = {}
+        self.breaks = [match.start() for match in re.finditer("\n", text)]
 
     def document(self) -> None:
         prefix: Path = ()
@@ -115,7 +117,7 @@ class _Scan:
 
     def mark(self, path: Path, at: int | None = None) -> None:
         position = self.at if at is None else at
-        self.lines.setdefault(path, self.text.count("\n", 0, position) + 1)
+        self.lines.setdefault(path, bisect.bisect_left(self.breaks, position) + 1)
 
 
 def _unquote(key: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import tomllib
 from collections.abc import Mapping
@@ -18,14 +19,19 @@ DEEPEST = 40
 
 @dataclass
 class Raw:
-    """What a source says and where: `table` as nested dicts, `lines` per key path, `overridden` paths."""
+    """What a source says and where: `table` as nested dicts, `text` it comes from, `overridden` paths."""
 
     table: dict[str, Any]
     name: str = "case"
     path: Path | None = None
     folder: Path | None = None
-    lines: dict[tuple, int] = field(default_factory=dict)
+    text: str = ""
     overridden: list[tuple] = field(default_factory=list)
+
+    @functools.cached_property
+    def lines(self) -> dict[tuple, int]:
+        """Key path -> line; found when the first fault asks."""
+        return key_lines(self.text)
 
     @property
     def file(self) -> str:
@@ -71,7 +77,7 @@ def read_raw(source: Any) -> Raw:
         raise CaseError([Fault("", "tables or lists nested too deep")], path.name) from None
     except ValueError as error:
         raise CaseError([_syntax_fault(error, text)], path.name) from None
-    return Raw(_copy(table), path.stem, path, path.parent.absolute(), key_lines(text))
+    return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
 
 
 def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:

@@ -108,7 +108,7 @@ class OutputUnits(Value):
         if faults:
             raise Misfit(faults)
         filled = dict(given)
-        if "pressure" in given:
+        if "pressure" in given and not units.find(given["pressure"], "pressure").absolute:
             filled.setdefault("gauge_pressure", given["pressure"])
         return filled
 

@@ -69,4 +69,4 @@ class Bar:
         self.first = self.first or (t, seconds)
         spent = seconds - self.first[1]
         speed = f", {(t - self.first[0]) / spent:.3g} s per s" if spent > 0.0 else ""
-        self.shown.update(self.task, completed=t - self.start, now=f"{t:.4g} of {self.end:.4g} s{speed}")
+        self.shown.update(self.task, completed=t - self.start, now=f"{t:.6g} of {self.end:.6g} s{speed}")

@@ -47,8 +47,9 @@ def envelope_figure(envelope, units, title=""):
     down = -(-len(names) // across)
     figure = style.figure(0.9 + (2.9 if down == 1 else 2.2 * down))
     grid = figure.subplots(down, across, squeeze=False, sharey=True)
+    hilly = any(np.any(envelope[pipe]["elevation"]) for pipe in names)
     for axes, pipe in zip(grid.flat, names, strict=False):
-        _profile(axes, envelope[pipe])
+        _profile(axes, envelope[pipe], hilly)
         axes.set_title(pipe, fontsize=9, color=style.INK, loc="left", pad=4)
     for axes in list(grid.flat)[len(names) :]:
         axes.set_visible(False)
@@ -126,22 +127,16 @@ def _shade(axes, t, marks, first: bool) -> None:
         )
 
 
-def _profile(axes, arrays) -> None:
+def _profile(axes, arrays, hilly: bool) -> None:
     style.dress(axes)
     x, ground = arrays["distance"], arrays["elevation"]
     low, high = arrays["least_head"], arrays["greatest_head"]
     blue = style.COLOURS[0]
     axes.fill_between(x, low, high, color=blue, alpha=0.10, linewidth=0)
     axes.plot(x, high, color=blue, linewidth=1.2, label="greatest head")
-    if "initial_head" in arrays:
-        axes.plot(
-            x,
-            arrays["initial_head"],
-            color=style.INK,
-            linewidth=0.9,
-            linestyle=(0, (5, 3)),
-            label="at the start",
-        )
+    start = arrays["initial_head"]
+    axes.plot(x, start, color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)), label="at the start")
     axes.plot(x, low, color=style.COLOURS[1], linewidth=1.2, label="least head")
-    axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
+    if hilly:  # elevations that nobody stated would only squeeze the heads
+        axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
     axes.set_xlim(0.0, x[-1] + x[0])

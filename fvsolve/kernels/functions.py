@@ -22,6 +22,7 @@ def functions(law: str) -> tuple:
     f, v, handle = types.float64, types.float64[::1], types.int64[::1]
     rows = ((f, v, v, v, handle), (f, v, v, handle, v), (f, v, v, handle, v), (f, v, handle, v))
     for function, signature in zip(found, rows, strict=True):
-        function.compile(signature)
-        function.disable_compile()
+        if not function.overloads:
+            function.compile(signature)
+            function.disable_compile()
     return found

@@ -58,12 +58,19 @@ def stored_pressures(t, y, out, tables):
 @njit(forceinline=True)
 def junction_flows(t, y, out, tables):
     """Change of flow into each node without storage at p' = 0, less its demand; kept in out[net]."""
-    layout, nodes, columns = tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS]
+    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
             demand = schedule_value(tables, nodes[i]["schedule"], t)
             out[layout["supply"] + i] = -demand
             out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
+    column_inflows(y, out, tables)
+
+
+@njit(forceinline=True)
+def column_inflows(y, out, tables):
+    """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
+    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
     for k in range(columns.size):
         change = y[columns[k]["y"]]
         out[layout["column"] + k] = columns[k]["flow"] + change

@@ -102,16 +102,16 @@ def widen_cells(t, r, l, least, t_least, greatest, t_greatest):
 
 
 @njit
-def count_below(r, l, admittance, profile, vapor):
-    """How many of the cells are below vapour pressure."""
+def count_below(r, l, boiling):
+    """How many of the cells are below vapour pressure, r + l below `boiling`."""
     count = 0
     for i in range(r.size):
-        count += profile[i] + (r[i] + l[i]) / admittance < vapor
+        count += (r[i] + l[i]) < boiling[i]
     return count
 
 
 @njit
-def record_pipe(t, r, l, pipe, which, envelope, profile, vapor, marks):
+def record_pipe(t, r, l, pipe, which, envelope, profile, marks):
     """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
     start, at = 0, pipe["cell"]
     while start < r.size:
@@ -121,19 +121,17 @@ def record_pipe(t, r, l, pipe, which, envelope, profile, vapor, marks):
             e = envelope
             widen_cells(t, r[start:stop], l[start:stop], e[0, a:b], e[1, a:b], e[2, a:b], e[3, a:b])
             if marks[which] != marks[which]:
-                if count_below(r[start:stop], l[start:stop], pipe["admittance"], profile[a:b], vapor) > 0:
+                if count_below(r[start:stop], l[start:stop], profile[a:b]) > 0:
                     marks[which] = t
         start = stop
 
 
 @njit
-def record_linear(t, y, out, handle, values):
+def record_all(t, y, out, tables, values):
     """Extremes of probes, envelopes of pipes and first times of marks, after every accepted step.
 
     marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
     """
-    tables = open_tables(handle)
-    observe_linear(t, y, out, handle, values)
     pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
     marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
     for k in range(values.size):
@@ -141,7 +139,7 @@ def record_linear(t, y, out, handle, values):
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
         record_pipe(
-            t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables[I_ENVELOPE], tables[I_PROFILE], vapor, marks
+            t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables[I_ENVELOPE], tables[I_PROFILE], marks
         )
     for i in range(nodes.size):
         at = pipes.size + i
@@ -155,6 +153,13 @@ def record_linear(t, y, out, handle, values):
         for i in range(pipes.size + nodes.size):
             if marks[i] == marks[i]:
                 out[WHERE] = STOP_HERE
+
+
+@njit
+def record_linear(t, y, out, handle, values):
+    """Extremes, envelopes and marks after every accepted step."""
+    observe_linear(t, y, out, handle, values)
+    record_all(t, y, out, open_tables(handle), values)
 
 
 @njit

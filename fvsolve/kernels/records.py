@@ -73,7 +73,11 @@ PIPE = np.dtype(
         ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
         ("slope", "f8"),  # rise per length
-        ("face", "i8"),  # offset of its faces in per-face arrays of the profile
+        ("face", "i8"),  # offsets in `profile`: mass per length at faces, momentum flux there, mass at centres
+        ("flux", "i8"),
+        ("center", "i8"),
+        ("from_base", "f8"),  # laws log and table: flow into the node that the profile computes to
+        ("to_base", "f8"),
     ],
     align=True,
 )
@@ -98,7 +102,8 @@ NODE = np.dtype(
         ("shapes", "i8"),  # rows of that table
         ("volume", "f8"),  # chamber [m3]
         ("row", "i8"),  # row in its cluster
-        ("head_given", "i8"),  # the schedule is a head [m]
+        ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
+        ("density", "f8"),  # of what a tank holds [kg/m3]
     ],
     align=True,
 )
@@ -117,6 +122,8 @@ VALVE = np.dtype(
         ("open", "f8"),  # conductance of the profile
         ("flow", "f8"),  # of the profile [kg/s]
         ("drop", "f8"),  # of the profile [Pa]
+        ("base", "f8"),  # laws log and table: M |M| or flow that the profile asks for
+        ("leak_flow", "f8"),
         ("leak", "f8"),  # conductance when shut beside a node with no other hold, else 0; its flow counts as 0
     ],
     align=True,
@@ -137,6 +144,7 @@ COLUMN = np.dtype(
         ("flow", "f8"),
         ("drag", "f8"),
         ("offset", "f8"),  # driving pressure of the profile that friction does not balance [Pa]
+        ("base", "f8"),  # laws log and table: driving pressure of the profile [Pa]
     ],
     align=True,
 )
@@ -176,6 +184,8 @@ PROBE = np.dtype(
         ("weights", "i8"),  # offset of their weights in `floats`
         ("scale", "f8"),
         ("offset", "f8"),
+        ("head", "i8"),  # laws log and table: 1 a head, 2 a velocity
+        ("mass", "f8"),  # laws log and table: mass per length of the profile there [kg/m]
     ],
     align=True,
 )

@@ -74,7 +74,7 @@ class Scene:
     def node_reservoir(self, name, node, row) -> None:
         row["kind"] = rec.FIXED
         if node.head is not None:
-            row["schedule"] = self.law.add_head(self.schedules, node.head, row["elevation"])
+            row["schedule"] = self.law.add_head(self.schedules, node.head, row)
         else:
             row["schedule"] = self.schedules.add(node.pressure)
 
@@ -88,7 +88,7 @@ class Scene:
 
     def node_tank(self, name, node, row) -> None:
         rho = self.law.tank_density
-        row["kind"], row["level"] = rec.TANK, node.level
+        row["kind"], row["level"], row["density"] = rec.TANK, node.level, rho
         if hasattr(node.area, "area"):
             level, area = node.area.level, node.area.area
             volume = np.concatenate(([0.0], np.cumsum(np.diff(level) * 0.5 * (area[1:] + area[:-1]))))
@@ -147,11 +147,11 @@ class Scene:
         self.ends(link, row)
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
-        row["cell"], row["face"] = sum(mesh.cells for mesh in self.meshes), sum(m.cells + 1 for m in self.meshes)
+        row["cell"] = sum(mesh.cells for mesh in self.meshes)
         z = self.node_table["elevation"][[row["from_node"], row["to_node"]]]
         row["slope"] = (z[1] - z[0]) / link.length
         row["noise"] = (1e-9 * self.fluid.density * area * speed) ** 2
-        row["compliance"] = 1.0 / (self.fluid.density * speed**2) - 1.0 / self.fluid.bulk_modulus
+        row["compliance"] = self.law.compliance(name, speed, self.fault)
         self.law.friction(name, link, row, self.fault)
         names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
         row["y"] = self.states(names, 0.5e5 * row["admittance"])
@@ -204,7 +204,7 @@ class Scene:
         leak = 1e-30 * max(valves["conductance"], default=0.0)
         for root, ks in touched.items():
             soft = np.all(nodes["admittance"][members[root]] > 0.0)
-            single = len(ks) == 1 and soft
+            single = len(ks) == 1 and soft and self.case.fluid.law == "linear"
             nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
             valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
             if not np.any(nodes["admittance"][members[root]] > 0.0):
@@ -218,6 +218,11 @@ class Scene:
             nodes["row"][members[root]] = np.arange(len(members[root]))
             clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
             integers += members[root] + ks
+        if self.case.fluid.law != "linear":
+            for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
+                nodes["row"][i] = 0
+                clusters.append((len(integers), 1, len(integers) + 1, 0))
+                integers.append(int(i))
         stiff = [k for k, v in enumerate(valves) if not inner[v["from_node"]] and not inner[v["to_node"]]]
         self.soften(stiff)
         self.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
@@ -241,9 +246,21 @@ class Scene:
     def settle(self) -> None:
         self.clusters()
         self.check()
-        self.pack(np.zeros(sum(mesh.cells for mesh in self.meshes)))
+        self.profiles: dict[int, np.ndarray] = {}  # pipe -> pressure of the profile at centres [Pa]
+        self.pack(np.zeros(self.profile_size()))
         self.steady = start_profile(self)
         self.check()
+
+    def profile_size(self) -> int:
+        """Place of every pipe's profile: a threshold a cell; under `log` and `table` masses and fluxes behind it."""
+        at = sum(mesh.cells for mesh in self.meshes)
+        if self.case.fluid.law == "linear":
+            return at
+        for row in self.pipe_table:
+            n = row["cells"]
+            row["face"], row["flux"], row["center"] = at, at + n + 1, at + 2 * n + 2
+            at += 3 * n + 2
+        return int(at)
 
     def pack(self, profile: np.ndarray) -> None:
         """Make the tuple of tables; records stay the same arrays, so later changes are seen."""
@@ -257,10 +274,12 @@ class Scene:
         s["vapor"] = self.fluid.vapor_pressure
         s["stop_below"] = case.numerics.below_vapor == "stop"
         s["law"] = {"linear": rec.LAW_LINEAR, "log": rec.LAW_LOG, "table": rec.LAW_TABLE}[case.fluid.law]
+        if self.fluid.table is not None:
+            self.pack_table(s)
         s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
-        most, cells = max(pipes["cells"], default=0), len(profile)
+        most, cells = max(pipes["cells"], default=0), sum(mesh.cells for mesh in self.meshes)
         layout = np.zeros(1, rec.LAYOUT)
         at = rec.OUT_HEAD
         for name, size in (
@@ -279,6 +298,24 @@ class Scene:
             profile, np.zeros(2 * most + 64), marks, pieces, envelope, extremes,
         )  # fmt: skip
 
+    def pack_table(self, s) -> None:
+        """The density table: ln(rho / rho_ref), its slope, enthalpy and its slope, on a uniform grid."""
+        table, n = self.fluid.table, len(self.fluid.table.pressure)
+        p, k = np.asarray(table.pressure), np.asarray(table.compressibility)
+        step = (p[-1] - p[0]) / (n - 1)
+        s["table"], s["table_size"], s["table_start"], s["table_step"] = len(self.floats), n, p[0], step
+        value = hermite_at(p, np.asarray(table.log_density), k, self.fluid.pressure)
+        log_density = np.asarray(table.log_density) - value
+        nodes, weights = np.polynomial.legendre.leggauss(6)
+        h = np.zeros(n)
+        for x, w in zip(nodes, weights, strict=True):
+            at = p[:-1] + 0.5 * (1.0 + x) * step
+            h[1:] += 0.5 * w * step / (self.fluid.density * np.exp(hermite_at(p, log_density, k, at)))
+        h = np.cumsum(h)
+        slope = 1.0 / (self.fluid.density * np.exp(log_density))
+        h -= hermite_at(p, h, slope, self.fluid.pressure)
+        self.floats += [*log_density, *k, *h, *slope]
+
     def column_rates(self):
         stiff = self.node_table["stiffness"]
         for row in self.column_table:
@@ -294,6 +331,7 @@ class Scene:
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.nodes), list(case.links), self.valve_names, self.column_names,
             {name: case.elevation(name) for name in case.nodes}, case.probes, self.warnings, self.steady,
+            self.profiles,
         )  # fmt: skip
 
 
@@ -304,6 +342,17 @@ def shaped_volume(level, area, volume, z: float) -> float:
     k = int(np.searchsorted(level, z, side="right")) - 1
     s = z - level[k]
     return float(volume[k] + s * (area[k] + 0.5 * s * (area[k + 1] - area[k]) / (level[k + 1] - level[k])))
+
+
+def hermite_at(grid, values, slopes, at):
+    """Cubic Hermite interpolant of a uniform table at given places."""
+    step = grid[1] - grid[0]
+    k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
+                len(grid) - 2)  # fmt: skip
+    s = (at - grid[k]) / step
+    r = 1.0 - s
+    rise = values[k + 1] - values[k]
+    return values[k] + s * s * (3 - 2 * s) * rise + s * r * step * (r * slopes[k] - s * slopes[k + 1])
 
 
 def union(n: int, pairs) -> list[int]:

@@ -18,11 +18,24 @@ class Hydraulics:
 
     @property
     def tank_density(self) -> float:
-        """Density of what tanks hold [kg/m3]."""
-        return self.rho
+        """Density of what tanks hold [kg/m3]: the reference density, or under `log` and `table` that at ambient."""
+        if self.fluid.law == "linear":
+            return self.rho
+        change = self.ambient - self.fluid.pressure
+        if self.fluid.table is not None:
+            from numpy import interp
 
-    def add_head(self, schedules, head, elevation: float) -> int:
-        """A schedule of head [m] as one of pressure [Pa] at an elevation [m]."""
+            table = self.fluid.table
+            low, here = interp([self.fluid.pressure, self.ambient], table.pressure, table.log_density)
+            return self.rho * math.exp(here - low)
+        return self.rho * math.exp(change / self.fluid.bulk_modulus)
+
+    def add_head(self, schedules, head, row) -> int:
+        """A schedule of head [m] as one of pressure [Pa] at an elevation [m]; under `log` and `table` it stays head."""
+        if self.fluid.law != "linear":
+            row["head_given"] = 1
+            return schedules.add(head)
+        elevation = row["elevation"]
         weight = self.rho * self.gravity
         return schedules.add(head, weight, self.ambient - weight * elevation)
 
@@ -49,6 +62,16 @@ class Hydraulics:
             row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
             row["roughness"] = law.roughness / link.diameter
             row["reynolds"] = link.diameter / (area * self.fluid.viscosity)
+
+    def compliance(self, name: str, speed: float, fault) -> float:
+        """Growth of a pipe's area with pressure, 1 / (rho a^2) - 1 / beta [1/Pa]; none may be negative."""
+        if self.fluid.law == "linear":
+            return 0.0
+        found = 1.0 / (self.rho * speed**2) - 1.0 / self.fluid.bulk_modulus
+        if found < -1e-9 / self.fluid.bulk_modulus:
+            fault(f"links.{name}.wave_speed", f"{speed:.6g} m/s is faster than sound in the fluid, "
+                  f"{self.fluid.sound_speed:.6g} m/s; wanted at most that, or law = \"linear\"")  # fmt: skip
+        return found if found > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
         """Mass flow [kg/s] at a Reynolds number of the full opening, Re = 4 M / (pi d mu)."""

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fvsolve.kernels import records as rec
+
 if TYPE_CHECKING:
     from fvsolve.case import Case
 
@@ -61,6 +63,7 @@ class Model:
     probes: list[Any]
     warnings: list[str]
     steady: dict[str, Any]  # what the start looks like, for `check`
+    profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
 
     @property
     def y_size(self) -> int:
@@ -75,9 +78,7 @@ class Model:
     @property
     def layout(self):
         """Offsets of what the rhs writes beside dydt."""
-        from fvsolve.kernels.records import I_LAYOUT
-
-        return self.tables[I_LAYOUT][0]
+        return self.tables[rec.I_LAYOUT][0]
 
     @cached_property
     def handle(self):
@@ -102,9 +103,7 @@ class Model:
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
-        from fvsolve.kernels.records import I_SETTINGS
-
-        self.tables[I_SETTINGS][0]["limit"] = limit
+        self.tables[rec.I_SETTINGS][0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
         self.functions()[0](float(t), np.ascontiguousarray(y, dtype=np.float64), dydt, out, self.handle)
         return dydt, out
@@ -132,34 +131,58 @@ class Model:
 
     def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
         """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
-        from fvsolve.kernels.records import I_PIPES, I_PROFILE
+        row = self.tables[rec.I_PIPES][k]
+        if self.case.fluid.law == "linear":
+            return self.profiles[k] + waves / row["admittance"]
+        from fvsolve.kernels.density import pressure_of_mass
 
-        row = self.tables[I_PIPES][k]
-        return self.tables[I_PROFILE][row["cell"] + np.arange(self.pipes[k].cells)] + waves / row["admittance"]
+        st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
+        masses = self.tables[rec.I_PROFILE][row["center"] + np.arange(len(waves))] + waves / row["speed"]
+        return np.array([pressure_of_mass(st, floats, row, float(m)) for m in masses])
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
         """Head [m] of the case's fluid above datum, measured from ambient."""
-        weight = self.case.properties.density * self.case.gravity
-        return (pressure - self.case.ambient_pressure) / weight + elevation
+        ambient, gravity = self.case.ambient_pressure, self.case.gravity
+        if self.case.fluid.law == "linear":
+            return (pressure - ambient) / (self.case.properties.density * gravity) + elevation
+        from fvsolve.kernels.density import enthalpy
+
+        st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
+        base = enthalpy(st, floats, float(ambient))
+        h = np.array([enthalpy(st, floats, float(p)) - base for p in np.ravel(pressure)])
+        return h.reshape(np.shape(pressure)) / gravity + elevation
+
+    @property
+    def reference(self) -> float:
+        """Pressure at which density and areas are the stated ones [Pa]."""
+        return self.case.properties.pressure
+
+    def density(self, pressure: np.ndarray) -> np.ndarray:
+        """Density [kg/m3] at pressures, under the laws log and table."""
+        from fvsolve.kernels.density import density
+
+        st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
+        return np.array([density(st, floats, float(p)) for p in pressure])
 
     def frame(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI."""
-        from fvsolve.kernels.records import I_ENVELOPE, I_NODES, I_PIPES
-
         found, rho = {}, self.case.properties.density
+        linear = self.case.fluid.law == "linear"
         for k, pipe in enumerate(self.pipes):
-            row = self.tables[I_PIPES][k]
+            row = self.tables[rec.I_PIPES][k]
             n, o = pipe.cells, row["y"]
             cells = row["cell"] + np.arange(n)
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
-            pressure, flow = self.cell_pressure(k, r + l), (row["flow"] + (r - l)) / rho
-            low, high = (self.cell_pressure(k, self.tables[I_ENVELOPE][i, cells]) for i in (0, 2))
+            pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
+            swollen = row["area"] if linear else row["area"] * np.exp(row["compliance"] * (pressure - self.reference))
+            flow = mass_flow / (rho if linear else self.density(pressure))
+            low, high = (self.cell_pressure(k, self.tables[rec.I_ENVELOPE][i, cells]) for i in (0, 2))
             found[pipe.name] = {
-                "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / row["area"],
+                "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / swollen,
                 "flow": flow, "least_pressure": np.minimum(low, pressure),
                 "greatest_pressure": np.maximum(high, pressure),
             }  # fmt: skip
-        nodes = self.tables[I_NODES]
+        nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
@@ -169,17 +192,17 @@ class Model:
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
         """Mass stored in the profile and by how much the state deviates from it [kg]."""
-        from fvsolve.kernels.records import I_NODES, I_PIPES, I_PROFILE
-
         fluid, initial, change = self.case.properties, 0.0, 0.0
         for k, pipe in enumerate(self.pipes):
-            row = self.tables[I_PIPES][k]
-            p = self.tables[I_PROFILE][row["cell"] + np.arange(pipe.cells)]
-            stiffness = fluid.density * row["speed"] ** 2
-            initial += float(np.sum(fluid.density * row["area"] * row["dx"] * (1 + (p - fluid.pressure) / stiffness)))
+            row = self.tables[rec.I_PIPES][k]
             o, n = row["y"], pipe.cells
+            if fluid.law == "linear":
+                strain = (self.profiles[k] - fluid.pressure) / (fluid.density * row["speed"] ** 2)
+                initial += float(np.sum(fluid.density * row["area"] * row["dx"] * (1 + strain)))
+            else:
+                initial += float(np.sum(self.tables[rec.I_PROFILE][row["center"] + np.arange(n)])) * row["dx"]
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
-        for row in self.tables[I_NODES]:
+        for row in self.tables[rec.I_NODES]:
             if row["y"] >= 0:
                 initial += float(row["mass"])
                 change += float(y[row["y"]])

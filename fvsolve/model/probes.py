@@ -47,22 +47,46 @@ def reading_weights(x: float, degree: int) -> np.ndarray:
     return np.linalg.solve(averages.T, float(x) ** powers)
 
 
-def probe_offsets(scene) -> None:
+def probe_offsets(scene, start) -> None:
     """Scale and offset of every probe, once the profile is known."""
-    weight = scene.fluid.density * scene.case.gravity
     for row, probe in zip(scene.probe_table, scene.case.probes, strict=True):
-        row["scale"], row["offset"] = 1.0, 0.0
-        if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW):
-            row["scale"] = 1.0 / scene.fluid.density
-            if probe.quantity == "velocity":
-                row["scale"] /= scene.pipe_table[row["index"]]["area"]
-        elif row["kind"] != rec.LEVEL:
-            if row["kind"] == rec.PRESSURE:
-                base, z = (scene.node_table[row["index"]][key] for key in ("pressure", "elevation"))
-            else:
-                base, z = scene.profile_at(row["index"], probe.fraction)
-                row["scale"] = 1.0 / scene.pipe_table[row["index"]]["admittance"]
-            row["offset"] = base - (0.0 if probe.quantity == "pressure" else scene.case.ambient_pressure)
-            if probe.quantity == "head":
-                row["scale"] /= weight
-                row["offset"] = row["offset"] / weight + z
+        if scene.case.fluid.law == "linear":
+            linear_offsets(scene, start, row, probe)
+        else:
+            barotropic_offsets(scene, start, row, probe)
+
+
+def linear_offsets(scene, start, row, probe) -> None:
+    """scale * (deviation of pressure or flow) + offset."""
+    weight = scene.fluid.density * scene.case.gravity
+    row["scale"], row["offset"] = 1.0, 0.0
+    if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW):
+        row["scale"] = 1.0 / scene.fluid.density
+        if probe.quantity == "velocity":
+            row["scale"] /= scene.pipe_table[row["index"]]["area"]
+    elif row["kind"] != rec.LEVEL:
+        if row["kind"] == rec.PRESSURE:
+            base, z = (scene.node_table[row["index"]][key] for key in ("pressure", "elevation"))
+        else:
+            base, z = start.profile_at(int(row["index"]), probe.fraction)
+            row["scale"] = 1.0 / scene.pipe_table[row["index"]]["admittance"]
+        row["offset"] = base - (0.0 if probe.quantity == "pressure" else scene.case.ambient_pressure)
+        if probe.quantity == "head":
+            row["scale"] /= weight
+            row["offset"] = row["offset"] / weight + z
+
+
+def barotropic_offsets(scene, start, row, probe) -> None:
+    """What turns a pressure into gauge pressure or head, and the profile's mass per length at the place."""
+    if row["kind"] in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):
+        row["mass"] = start.mass_at(int(row["index"]), probe.fraction)
+    if probe.quantity == "gauge_pressure":
+        row["offset"] = -scene.case.ambient_pressure
+    elif probe.quantity == "velocity":
+        row["head"] = 2
+    elif probe.quantity == "head":
+        row["head"] = 1
+        if row["kind"] == rec.PRESSURE:
+            row["offset"] = scene.node_table[row["index"]]["elevation"]
+        else:
+            row["offset"] = start.profile_at(int(row["index"]), probe.fraction)[1]

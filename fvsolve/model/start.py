@@ -20,15 +20,19 @@ SNAP = 1e-12  # flows below this share of the scene's are zero
 
 def start_profile(scene) -> dict[str, Any]:
     """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
-    start = Start(scene)
+    if scene.case.fluid.law == "linear":
+        start = Start(scene)
+    else:
+        from fvsolve.model.barotropic import BarotropicStart
+
+        start = BarotropicStart(scene)
     start.solve()
     start.freeze_factors()
     start.fill_nodes()
     start.fill_pipes()
     start.fill_columns()
     start.fill_valves()
-    scene.profile_at = start.profile_at
-    probe_offsets(scene)
+    probe_offsets(scene, start)
     return start.report()
 
 
@@ -46,6 +50,22 @@ class Start:
         sizes = [1e-9, *(scene.fluid.density * self.pipes["area"]), *(scene.fluid.density * self.columns["area"])]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
+        self.extra: dict[str, float] = {}  # drop beside the law's [Pa], of laws with a changing density
+        self.factor: dict[int, float] = {}  # on the conductance of valves, likewise
+
+    def potential_of(self, pressure: float, elevation: float) -> float:
+        """Potential [Pa] of a pressure at an elevation."""
+        return pressure + self.weight * elevation
+
+    def pressure_of(self, potential: float, elevation: float) -> float:
+        """Pressure [Pa] of a potential at an elevation."""
+        return potential - self.weight * elevation
+
+    def given_pressure(self, row, node) -> float:
+        """Pressure [Pa] of a reservoir or tank at the start."""
+        if row["kind"] == rec.TANK:
+            return self.case.ambient_pressure + self.weight * node.level
+        return schedule_value(self.scene.tables, int(row["schedule"]), self.t)
 
     def solve(self) -> None:
         held, self.demand = self.givens()
@@ -72,13 +92,10 @@ class Start:
         """Potentials that are held (nan: to be found) and demands of junctions [kg/s]."""
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.nodes.values(), self.nodes, strict=True)):
-            lift = self.weight * row["elevation"]
-            if row["kind"] == rec.FIXED:
-                held[i] = schedule_value(self.scene.tables, int(row["schedule"]), self.t) + lift
-            elif row["kind"] == rec.TANK:
-                held[i] = self.case.ambient_pressure + self.weight * node.level + lift
+            if row["kind"] in (rec.FIXED, rec.TANK):
+                held[i] = self.potential_of(self.given_pressure(row, node), row["elevation"])
             elif row["kind"] == rec.CHAMBER and node.initial_pressure is not None:
-                held[i] = node.initial_pressure + lift
+                held[i] = self.potential_of(node.initial_pressure, row["elevation"])
             elif row["kind"] == rec.JUNCTION:
                 demand[i] = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
         return held, np.zeros_like(demand) if self.rest else demand
@@ -90,8 +107,10 @@ class Start:
         least = drag_slope(*law, 1e-6 * self.flow_scale)
         link = self.case.links[name]
 
+        extra = self.extra.get(name, 0.0)
+
         def drop(flow):
-            return per * drag(*law, flow)
+            return per * drag(*law, flow) + extra
 
         def newton(flow, present):
             return per * max(drag_slope(*law, flow), least), 1.0, present - drop(flow)
@@ -109,6 +128,7 @@ class Start:
         g = valve_conductance(self.scene.tables, k, self.t)
         transition = float(row["transition"])
         row["open"] = g
+        g *= self.factor.get(k, 1.0)
         i, j = int(row["from_node"]), int(row["to_node"])
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
@@ -166,8 +186,6 @@ class Start:
         self.nodes["pressure"] = self.answer.potential - self.weight * self.nodes["elevation"]
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
         fluid = self.scene.fluid
-        for row in self.nodes[self.nodes["kind"] == rec.CHAMBER]:
-            pass
         chambers = self.nodes["kind"] == rec.CHAMBER
         self.nodes["mass"][chambers] = fluid.density * self.nodes["volume"][chambers] * (
             1.0 + (self.nodes["pressure"][chambers] - fluid.pressure) / fluid.bulk_modulus)  # fmt: skip
@@ -186,7 +204,8 @@ class Start:
             offset = p[1] - (p[0] - slope * mesh.length)
             row["to_offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
             cells = slice(int(row["cell"]), int(row["cell"]) + mesh.cells)
-            profile[cells] = p[0] - slope * mesh.x - self.weight * mesh.elevation
+            pressure = self.scene.profiles[k] = p[0] - slope * mesh.x - self.weight * mesh.elevation
+            profile[cells] = (self.scene.fluid.vapor_pressure - pressure) * row["admittance"]
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""

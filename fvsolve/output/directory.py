@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fvsolve.errors import RunError
 from fvsolve.output.column import probe_columns, time_column
-from fvsolve.output.envelope import read_envelope, write_envelope
+from fvsolve.output.envelope import read_envelope, with_start, write_envelope
 from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
@@ -80,7 +80,8 @@ class RunDirectory:
         """Close the history and write the envelope; summary.json is the caller's last word."""
         self.history.close()
         if summary.envelope:
-            write_envelope(self.folder / "envelope.csv", summary.envelope, self.model.case)
+            envelope = with_start(summary.envelope, self.model)
+            write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
 
     def close(self) -> None:
         """Let go of open files, also when a run broke off."""

@@ -27,14 +27,21 @@ def envelope_columns(case) -> list[Column]:
     return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
 
 
+def with_start(envelope: dict, model) -> dict:
+    """The envelope of a solver with the heads that the run began from, `initial_head` [m]."""
+    found = {}
+    for k, pipe in enumerate(model.pipes):
+        pressure = model.cell_pressure(k, np.zeros(pipe.cells))
+        found[pipe.name] = {**envelope[pipe.name], "initial_head": model.head(pressure, pipe.elevation)}
+    return found
+
+
 def write_envelope(path: Path, envelope: dict, case) -> None:
     """One row per cell: pipe, distance from `from`, elevation, extremes and their times.
 
     `envelope` maps a pipe to `float64[cells]` arrays in SI named as in `QUANTITIES`.
     """
-    columns = [
-        one for one in envelope_columns(case) if all(one.name in arrays for arrays in envelope.values())
-    ]
+    columns = envelope_columns(case)
     with open(path, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pipe", *(one.header for one in columns)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.output.column import converted, probe_columns, time_column
-from fvsolve.output.envelope import envelope_columns
+from fvsolve.output.envelope import envelope_columns, with_start
 
 
 class MemorySink:
@@ -38,7 +38,7 @@ class MemorySink:
 
     def end(self, summary) -> None:
         """Keep the envelope."""
-        self._envelope = summary.envelope
+        self._envelope = with_start(summary.envelope, self.model)
 
     def close(self) -> None:
         """Nothing is open."""
@@ -51,6 +51,6 @@ class MemorySink:
         """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
         columns = envelope_columns(self.model.case)
         return {
-            pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns if one.name in arrays}
+            pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns}
             for pipe, arrays in self._envelope.items()
         }

@@ -203,7 +203,9 @@ class Result:
         from fvsolve.draw.view import view
 
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
-            raise RunError("no frames to draw: state [output] fields = 50 and run into a directory")
+            raise RunError(
+                "no frames to draw: the case has no pipes, [output] fields is 0, or nothing was written"
+            )
         frames = read_series(self.directory / "fields.pvd")
         if not frames:
             raise RunError(f"{self.directory / 'fields.pvd'} lists no frames")

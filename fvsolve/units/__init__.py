@@ -72,6 +72,8 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
             )
         words = DIMENSIONS[unit.dimension].words if unit.dimension in DIMENSIONS else f"a {unit.dimension}"
         raise ValueError(f"{text} is {words}; {hint}")
+    if dimension == "gauge_pressure" and unit.absolute:
+        raise ValueError(f"{text} is an absolute pressure; wanted a gauge one, for example {show('5 barg')}")
     if unit.gauge and not DIMENSIONS[dimension].gauge:
         raise ValueError(f"{text} is a gauge pressure; {wanted(dimension)}")
     return unit

@@ -10,13 +10,17 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Unit:
-    """SI value = (number + offset) numerator / denominator; a gauge unit counts from ambient pressure."""
+    """SI value = (number + offset) numerator / denominator; a gauge unit counts from ambient pressure.
+
+    An absolute one says that it does not; a plain one is absolute where a pressure is absolute.
+    """
 
     dimension: str
     numerator: float
     denominator: float = 1
     offset: float = 0
     gauge: bool = False
+    absolute: bool = False
 
     def si(self, number: Any) -> Any:
         """The SI value of a number (or array of numbers) of this unit, gauge where the unit is."""
@@ -112,6 +116,8 @@ SPELLINGS: dict[str, dict[str, Any]] = {
         "mH2O": WATER, "cmH2O": WATER / 100, "mmH2O": WATER / 1000, "mwc": WATER, "inH2O": WATER * INCH,
         "ftH2O": WATER * FOOT, "mmHg": MERCURY, "inHg": MERCURY * 25.4, "Torr": (101325, 760),
         "torr": (101325, 760),
+    },
+    "absolute": {
         "Paa": 1, "kPaa": 1000, "MPaa": 10**6, "mbara": 100, "bara": 10**5, "psia": PSI,
     },
     "gauge": {
@@ -171,10 +177,10 @@ SPELLINGS: dict[str, dict[str, Any]] = {
 def _table() -> dict[str, Unit]:
     table = {}
     for dimension, spellings in SPELLINGS.items():
-        gauge = dimension == "gauge"
+        kinds = {kind: dimension == kind for kind in ("gauge", "absolute")}
         for spelling, factor in spellings.items():
             pair = factor if isinstance(factor, tuple) else (factor,)
-            table[spelling] = Unit("pressure" if gauge else dimension, *pair, gauge=gauge)
+            table[spelling] = Unit("pressure" if any(kinds.values()) else dimension, *pair, **kinds)
     table["K"] = Unit("temperature", 1)
     table["degC"] = table["celsius"] = Unit("temperature", 1, offset=273.15)
     table["degF"] = Unit("temperature", 5, 9, offset=459.67)

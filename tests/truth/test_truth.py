@@ -228,3 +228,44 @@ def test_steady_flows_of_a_loop_balance_at_every_node_and_around_it():
     for (a, b, length, _), line, flow in zip(rows, lines, m, strict=True):
         drop = line.friction * length * abs(flow) ** 0.852 * flow
         assert {**p, "r": 1e6}[a] - p[b] == approx(drop, rel=1e-9)
+
+
+def rusanov(rho: np.ndarray, flux: np.ndarray, dx: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """The balance laws themselves by the crudest stable scheme: knows no wave curves and no invariants."""
+    u, t = np.array([rho, flux]), 0.0
+    while t < end:
+        speed = np.abs(u[1] / u[0]) + np.sqrt(SOFT.bulk_modulus / u[0])
+        dt = min(0.9 * dx / speed.max(), end - t)
+        f = np.array([u[1], u[1] ** 2 / u[0] + SOFT.p(u[0])])
+        most = np.maximum(speed[1:], speed[:-1])
+        face = (f[:, 1:] + f[:, :-1]) / 2 - most * (u[:, 1:] - u[:, :-1]) / 2
+        u[:, 1:-1] -= dt / dx * np.diff(face, axis=1)
+        t += dt
+    return u[0], u[1]
+
+
+@pytest.mark.parametrize("left, right", [((1.3e5, 0.0), (1e5, 0.0)), ((1e5, -1.0), (1.1e5, 1.0))])
+def test_the_exact_riemann_solution_is_what_a_crude_scheme_converges_to(left, right):
+    riemann, errors = Riemann(SOFT, left, right), []
+    for cells in (800, 1600):
+        x = (np.arange(cells) + 0.5) / cells * 40 - 20
+        rho = np.where(x < 0, SOFT.rho(left[0]), SOFT.rho(right[0]))
+        found = rusanov(rho, rho * np.where(x < 0, left[1], right[1]), 40 / cells, 1.2)
+        exact = np.array([(SOFT.rho(p), SOFT.rho(p) * u) for p, u in (riemann.at(s / 1.2) for s in x)]).T
+        errors.append(np.mean(np.abs(found[1] - exact[1])) / np.ptp(exact[1]))
+    assert errors[1] < 0.02
+    assert observed_order(errors, [2.0, 1.0]) > 0.4
+
+
+def test_the_simple_wave_is_what_a_crude_scheme_converges_to():
+    def velocity(x):
+        return 2.0 * np.exp(-(((x - 15) / 3) ** 2))
+
+    wave, errors = SimpleWave(SOFT, 1e5, velocity, lambda x: -2 * (x - 15) / 9 * velocity(x)), []
+    for cells in (1600, 3200):
+        edges = np.linspace(0, 50, cells + 1)
+        found = rusanov(*wave.averages(edges, 0.0), 50 / cells, 1.0)
+        exact = wave.averages(edges, 1.0)
+        errors.append(np.mean(np.abs(found[0] - exact[0])) / np.ptp(exact[0]))
+    assert errors[1] < 0.02
+    assert observed_order(errors, [2.0, 1.0]) == approx(1.0, abs=0.2)

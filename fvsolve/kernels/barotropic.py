@@ -1,0 +1,197 @@
+"""The right-hand side under the density laws log and table: the full momentum flux. Knows the tables.
+
+m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope. Waves r = (c m' + M') / 2, l = (c m' - M') / 2 are
+reconstructed from their own sides; the flux is that of the state both make at a face (a linearised Riemann
+solution with the reference wave speed c), less the profile's.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.barotropic_nodes import close_nodes_barotropic, drive
+from fvsolve.kernels.density import (
+    density,
+    enthalpy,
+    local_speed,
+    pressure_of_mass,
+    thrust,
+)
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.network import greatest_rate, net_flows, stored_rates, waves_out
+from fvsolve.kernels.nodes import column_inflows
+from fvsolve.kernels.observer import record_all
+from fvsolve.kernels.pipes import GAUSS, both_faces
+from fvsolve.kernels.records import (
+    COLUMN_FLOW,
+    I_COLUMNS,
+    I_FLOATS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PROBES,
+    I_PROFILE,
+    I_SCRATCH,
+    I_SETTINGS,
+    I_VALVES,
+    LEVEL,
+    OK,
+    PIPE_FLOW,
+    PIPE_PRESSURE,
+    PRESSURE,
+    RATE,
+    STATUS,
+    VALVE_FLOW,
+    WHERE,
+)
+from fvsolve.kernels.tanks import tank_level
+
+
+@njit
+def momentum_flux(st, floats, pipe, m, flow):
+    """M^2 / m + integral of A dp [N]."""
+    return flow * flow / m + thrust(st, pipe, pressure_of_mass(st, floats, pipe, m))
+
+
+@njit
+def wall_force(pipe, reference, m, flow):
+    """Friction per length [kg/s2] of a flow in a pipe that holds m [kg/m]."""
+    pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+    return pull * (reference / m)
+
+
+@njit
+def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
+    """d/dt of both waves of one pipe; returns its greatest |v| + c over a cell [1/s]."""
+    n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
+    fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
+    both_faces(st, pipe, r, l, ends[0], ends[1], ends[2], ends[3], scratch, fr, fl)
+    face, cell = pipe["face"], pipe["center"]
+    reference = st["rho"] * pipe["area"]
+    weight = st["gravity"] * pipe["slope"]
+    least, greatest, quickest = 1e300, 0.0, 0.0
+    left_flow, left_flux, left_mass = 0.0, 0.0, 0.0
+    for i in range(n + 1):
+        dm, dflow = (fr[i] + fl[i]) / c, fr[i] - fl[i]
+        m, total = profile[face + i] + dm, flow + dflow
+        flux = momentum_flux(st, floats, pipe, m, total) - profile[pipe["flux"] + i]
+        least, greatest, quickest = min(least, m), max(greatest, m), max(quickest, abs(total))
+        if i > 0:
+            k = i - 1
+            m0 = profile[cell + k]
+            dm_cell, m_flow = (r[k] + l[k]) / c, flow + (r[k] - l[k])
+            a, b = GAUSS * (dflow - left_flow), GAUSS * (dm - left_mass)
+            pull = wall_force(pipe, reference, m0 + dm_cell + b, m_flow + a)
+            pull += wall_force(pipe, reference, m0 + dm_cell - b, m_flow - a)
+            force = -weight * dm_cell - (0.5 * pull - pipe["drag"] * (reference / m0))
+            mass_rate = -(dflow - left_flow) / dx
+            flow_rate = -(flux - left_flux) / dx + force
+            dr[k] = 0.5 * (c * mass_rate + flow_rate)
+            dl[k] = 0.5 * (c * mass_rate - flow_rate)
+        left_flow, left_flux, left_mass = dflow, flux, dm
+    low = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, least))
+    high = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, greatest))
+    return (quickest / least + max(low, high)) / dx
+
+
+@njit
+def column_rates_barotropic(dydt, out, tables):
+    """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
+    st, layout, nodes, columns = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS]
+    for k in range(columns.size):
+        col = columns[k]
+        i, j = col["from_node"], col["to_node"]
+        p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
+        p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
+        now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+        change = now - col["base"] + col["offset"]
+        flow = out[layout["column"] + k]
+        pull = drag(col["friction"], col["loss"], col["rough"], col["roughness"], col["reynolds"], flow)
+        dydt[col["y"]] = col["area"] / col["length"] * change - (pull - col["drag"])
+
+
+@njit
+def rhs_barotropic(t, y, dydt, out, handle):
+    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch."""
+    tables = open_tables(handle)
+    st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
+    floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
+    out[STATUS], out[WHERE] = OK, -1.0
+    waves_out(y, out, tables)
+    net = layout["net"]
+    for i in range(tables[I_NODES].size):
+        out[net + i] = 0.0
+    column_inflows(y, out, tables)
+    close_nodes_barotropic(t, y, out, tables)
+    net_flows(out, tables)
+    stored_rates(y, dydt, out, tables)
+    column_rates_barotropic(dydt, out, tables)
+    rate = greatest_rate(t, out, tables)
+    for i in range(pipes.size):
+        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
+        own = pipe_rates_barotropic(
+            st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch,
+            dydt[o : o + n], dydt[o + n : o + 2 * n],
+        )  # fmt: skip
+        rate = max(rate, own)
+    out[RATE] = rate
+
+
+@njit
+def pipe_place(probe, which, y, out, tables):
+    """(mass per length, mass flow) of a pipe at the place of a probe."""
+    pipe, at = tables[I_PIPES][which], tables[I_LAYOUT][0]["ends"] + 4 * which
+    r, l = out[at], out[at + 1]
+    if probe["side"] > 0:
+        r, l = out[at + 2], out[at + 3]
+    if probe["side"] == 0:
+        r, l = 0.0, 0.0
+        for k in range(probe["count"]):
+            cell, weight = pipe["y"] + probe["cell"] + k, tables[I_FLOATS][probe["weights"] + k]
+            r += weight * y[cell]
+            l += weight * y[cell + pipe["cells"]]
+    return probe["mass"] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
+
+
+@njit
+def as_asked(st, floats, probe, p):
+    """A pressure as absolute or gauge pressure, or as head, h(p) - h(ambient) over g above the elevation."""
+    if probe["head"] == 1:
+        return (enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
+    return p + probe["offset"]
+
+
+@njit
+def observe_barotropic(t, y, out, handle, values):
+    """Values of every probe; flows in m3/s at the density of the place, or upstream of a valve."""
+    tables = open_tables(handle)
+    st, floats, layout, nodes = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_LAYOUT][0], tables[I_NODES]
+    probes = tables[I_PROBES]
+    for k in range(probes.size):
+        probe = probes[k]
+        kind, i = probe["kind"], probe["index"]
+        value = 0.0
+        if kind == PRESSURE:
+            value = as_asked(st, floats, probe, nodes[i]["pressure"] + out[layout["pressure"] + i])
+        elif kind == LEVEL:
+            value = tank_level(nodes[i], floats, nodes[i]["density"], y[nodes[i]["y"]])
+        elif kind == PIPE_PRESSURE or kind == PIPE_FLOW:
+            m, flow = pipe_place(probe, i, y, out, tables)
+            p = pressure_of_mass(st, floats, tables[I_PIPES][i], m)
+            if kind == PIPE_PRESSURE:
+                value = as_asked(st, floats, probe, p)
+            else:
+                value = flow / m if probe["head"] == 2 else flow / density(st, floats, p)
+        elif kind == VALVE_FLOW:
+            flow = out[layout["valve"] + i]
+            valve = tables[I_VALVES][i]
+            up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
+            value = flow / density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
+        elif kind == COLUMN_FLOW:
+            value = out[layout["column"] + i] / st["rho"]
+        values[k] = value
+
+
+@njit
+def record_barotropic(t, y, out, handle, values):
+    """Extremes, envelopes and marks after every accepted step."""
+    observe_barotropic(t, y, out, handle, values)
+    record_all(t, y, out, open_tables(handle), values)

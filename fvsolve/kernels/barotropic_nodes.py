@@ -1,0 +1,249 @@
+"""Nodes under the laws log and table: stagnation enthalpy is conserved, flows carry the upstream density.
+
+A pipe end with outgoing wave w and mass per length m carries 2 w - c (m - m0) more into its node than the
+profile did; h(p_end) + v^2 / 2 = h(p_node), but a jet into a tank, chamber or reservoir loses its v^2 / 2.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import (
+    density,
+    enthalpy,
+    mass_of_pressure,
+    pressure_of_enthalpy,
+    pressure_of_log,
+)
+from fvsolve.kernels.nodes import inner_row, solve_dense
+from fvsolve.kernels.records import (
+    CHAMBER,
+    FIXED,
+    I_CLUSTERS,
+    I_FLOATS,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PROFILE,
+    I_SETTINGS,
+    I_VALVES,
+    JUNCTION,
+    NO_SOLUTION,
+    NOT_CONVERGED,
+    STATUS,
+    TANK,
+    WHERE,
+)
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.tanks import tank_level
+from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
+
+
+@njit
+def head_pressure(st, floats, head):
+    """Pressure [Pa] under a column of `head` [m] open to ambient: h(p) = h(ambient) + g head."""
+    return pressure_of_enthalpy(st, floats, enthalpy(st, floats, st["ambient"]) + st["gravity"] * head)
+
+
+@njit
+def stored_pressures_barotropic(t, y, out, tables):
+    """Deviations [Pa] of given pressures, tanks and chambers."""
+    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
+    for i in range(nodes.size):
+        node = nodes[i]
+        at, kind = layout["pressure"] + i, node["kind"]
+        if kind == FIXED:
+            value = schedule_value(tables, node["schedule"], t)
+            p = head_pressure(st, floats, value - node["elevation"]) if node["head_given"] == 1 else value
+            out[at] = p - node["pressure"]
+        elif kind == TANK:
+            level = tank_level(node, floats, node["density"], y[node["y"]])
+            out[at] = head_pressure(st, floats, level) - head_pressure(st, floats, node["level"])
+        elif kind == CHAMBER:
+            q = np.log((node["mass"] + y[node["y"]]) / (st["rho"] * node["volume"]))
+            q0 = np.log(node["mass"] / (st["rho"] * node["volume"]))
+            out[at] = pressure_of_log(st, floats, 0.0, q) - pressure_of_log(st, floats, 0.0, q0)
+
+
+@njit
+def end_flow(st, floats, pipe, m0, flow, wave, p_node, still):
+    """(flow into the node, its slope over p_node) of a pipe end, by Newton on the pressure at the end.
+
+    flow : the profile's flow into the node [kg/s]; wave : outgoing; still : the node is a vessel at rest.
+    """
+    c = pipe["speed"]
+    target = enthalpy(st, floats, p_node)
+    p = p_node
+    m, dm = mass_of_pressure(st, floats, pipe, p)
+    into = flow + 2.0 * wave - c * (m - m0)
+    if still and into >= 0.0:
+        return into, -c * dm
+    rise = 1.0
+    for _ in range(30):
+        v = into / m
+        rise = dm / (m * (dm / m)) / density(st, floats, p) - v * (c * dm + v * dm) / m
+        step = (enthalpy(st, floats, p) + 0.5 * v * v - target) / rise
+        p -= step
+        m, dm = mass_of_pressure(st, floats, pipe, p)
+        into = flow + 2.0 * wave - c * (m - m0)
+        if abs(step) <= 1e-15 * abs(p) + 1e-12:
+            break
+    return into, -c * dm / (rise * density(st, floats, p_node))
+
+
+@njit
+def ends_into_nodes(out, tables, slope):
+    """Change of flow from pipes into every node at the present pressures, in out[net], and its slope."""
+    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
+    pipes, profile = tables[I_PIPES], tables[I_PROFILE]
+    for i in range(nodes.size):
+        out[layout["net"] + i], slope[i] = 0.0, 0.0
+    for k in range(pipes.size):
+        pipe = pipes[k]
+        at, first = layout["ends"] + 4 * k, pipe["face"]
+        for side in range(2):
+            i = pipe["to_node"] if side == 1 else pipe["from_node"]
+            face = first + pipe["cells"] if side == 1 else first
+            sign = 1.0 if side == 1 else -1.0
+            wave = out[at + 2] if side == 1 else out[at + 1]
+            base = pipe["to_base"] if side == 1 else pipe["from_base"]
+            p = nodes[i]["pressure"] + out[layout["pressure"] + i]
+            still = nodes[i]["kind"] != JUNCTION
+            into, rise = end_flow(st, floats, pipe, profile[face], sign * pipe["flow"], wave, p, still)
+            change = into - base
+            out[layout["net"] + i] += change
+            slope[i] += rise
+            if side == 1:
+                out[at + 3] = wave - change
+            else:
+                out[at] = wave - change
+
+
+@njit
+def drive(st, floats, p_i, z_i, p_j, z_j):
+    """(rho_mean (dh + g dz), upstream density): the pressure that drives a link, p_i - p_j on one level."""
+    dp = p_i - p_j
+    if z_i != z_j:
+        dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)
+        mean = dp / dh if abs(dp) > 1e-3 else density(st, floats, p_i)
+        dp = mean * (dh + st["gravity"] * (z_i - z_j))
+    return dp, density(st, floats, p_i if dp >= 0.0 else p_j)
+
+
+@njit
+def valve_target(tables, out, k, g):
+    """(M |M| that a valve asks for, or its laminar flow; the slope over pressure of the same; is it laminar)."""
+    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
+    valve = tables[I_VALVES][k]
+    i, j = valve["from_node"], valve["to_node"]
+    p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
+    p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
+    drop, rho = drive(st, floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])
+    dense = g * rho / st["rho"]
+    if valve["transition"] > 0.0:
+        return flow_at_drop(dense, valve["transition"], drop), flow_slope(dense, valve["transition"], drop)
+    return dense * drop, dense
+
+
+@njit
+def valve_move(tables, out, k, g, x):
+    """a, s with dx = a + s d(p_i - p_j) for the next Newton step of a valve; base values are subtracted."""
+    valve = tables[I_VALVES][k]
+    target, slope = valve_target(tables, out, k, g)
+    if valve["transition"] > 0.0:
+        return target - valve["base"] - x, slope
+    flow = valve["flow"]
+    if valve["open"] <= 0.0 and g == valve["leak"]:
+        flow = valve["leak_flow"]
+    asked = target - valve["base"]
+    present = abs(flow + x) * (flow + x) - abs(flow) * flow
+    chord = abs(flow + x) + sqrt(abs(abs(flow) * flow + asked))
+    chord = max(chord, 1e-6 * sqrt(slope))
+    return (asked - present) / chord, slope / chord
+
+
+@njit
+def newton_sweep(out, tables, g, x, slope, given):
+    """One Newton step of every cluster; returns the greatest change of flow [kg/s]."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    integers, clusters = tables[I_INTEGERS], tables[I_CLUSTERS]
+    moved = 0.0
+    for which in range(clusters.size):
+        cluster = clusters[which]
+        n, m = cluster["nodes"], cluster["valves"]
+        matrix, right = np.zeros((n, n)), np.zeros(n)
+        a, s = np.zeros(m), np.zeros(m)
+        for r in range(n):
+            i = integers[cluster["first_node"] + r]
+            right[r] = out[layout["net"] + i] + given[i]
+            matrix[r, r] = -slope[i]
+        for e in range(m):
+            k = integers[cluster["first_valve"] + e]
+            i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
+            a[e] = -x[k] - valves[k]["flow"]
+            if g[k] > 0.0:
+                a[e], s[e] = valve_move(tables, out, k, g[k], x[k])
+            if i >= 0:
+                right[i] -= x[k] + a[e]
+                matrix[i, i] += s[e]
+            if j >= 0:
+                right[j] += x[k] + a[e]
+                matrix[j, j] += s[e]
+            if i >= 0 and j >= 0:
+                matrix[i, j] -= s[e]
+                matrix[j, i] -= s[e]
+        if not solve_dense(matrix, right, n):
+            out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
+            return 0.0
+        for r in range(n):
+            i = integers[cluster["first_node"] + r]
+            out[layout["pressure"] + i] += right[r]
+            moved = max(moved, abs(slope[i] * right[r]))
+        for e in range(m):
+            k = integers[cluster["first_valve"] + e]
+            i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
+            step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
+            x[k] += step
+            moved = max(moved, abs(step))
+    return moved
+
+
+@njit
+def close_nodes_barotropic(t, y, out, tables):
+    """Pressure deviation of every node, flow of every valve and incoming wave of every pipe end, by Newton."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    g, x = np.zeros(valves.size), np.zeros(valves.size)
+    slope, given = np.zeros(nodes.size), np.zeros(nodes.size)
+    stored_pressures_barotropic(t, y, out, tables)
+    scale = 1e-300
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == JUNCTION:
+            demand = schedule_value(tables, nodes[i]["schedule"], t)
+            out[layout["supply"] + i] = -demand
+            given[i] = out[layout["net"] + i] + nodes[i]["inflow"] - (demand - nodes[i]["demand"])
+            out[layout["pressure"] + i] = 0.0
+            scale = max(scale, abs(demand))
+    for k in range(valves.size):
+        g[k] = max(valve_conductance(tables, k, t), valves[k]["leak"])
+        scale = max(scale, abs(valves[k]["flow"]))
+        if nodes[valves[k]["from_node"]]["kind"] != JUNCTION and nodes[valves[k]["to_node"]]["kind"] != JUNCTION:
+            x[k] = valve_move(tables, out, k, g[k], 0.0)[0] if g[k] > 0.0 else -valves[k]["flow"]
+    moved = 0.0
+    for sweep in range(100):
+        ends_into_nodes(out, tables, slope)
+        for i in range(nodes.size):
+            scale = max(scale, abs(out[layout["net"] + i]))
+        moved = newton_sweep(out, tables, g, x, slope, given)
+        if moved <= 1e-14 * scale:
+            break
+    ends_into_nodes(out, tables, slope)
+    if moved > 1e-8 * scale:
+        out[STATUS] = NOT_CONVERGED
+    for k in range(valves.size):
+        if valves[k]["leak"] > 0.0 and g[k] == valves[k]["leak"]:
+            if abs(valves[k]["flow"] + x[k]) > 1e-9 * scale:
+                out[STATUS], out[WHERE] = NO_SOLUTION, valves[k]["from_node"]
+            x[k] = -valves[k]["flow"]
+        out[layout["valve"] + k] = valves[k]["flow"] + x[k]

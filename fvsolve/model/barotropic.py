@@ -1,0 +1,165 @@
+"""The starting profile under the density laws log and table. Knows what the linear start lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import density as law
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, valve_target
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.valves import flow_at_drop
+from fvsolve.model.start import PRESSURE_SCALE, Start
+
+
+class BarotropicStart(Start):
+    """Potentials are rho_ref (h(p) + g z); what densities change in drops is lagged until nothing moves."""
+
+    def __init__(self, scene) -> None:
+        super().__init__(scene)
+        self.st, self.floats = scene.tables[rec.I_SETTINGS][0], scene.tables[rec.I_FLOATS]
+        self.rho, self.g = scene.fluid.density, self.case.gravity
+
+    def solve(self) -> None:
+        before = None
+        for _ in range(80):
+            super().solve()
+            now = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
+            if before is not None and np.max(np.abs(now - before), initial=0.0) <= 1e-14 * (1 + np.max(np.abs(now))):
+                break
+            before = now
+            self.correct()
+
+    def potential_of(self, pressure: float, elevation: float) -> float:
+        return self.rho * (law.enthalpy(self.st, self.floats, float(pressure)) + self.g * elevation)
+
+    def pressure_of(self, potential: float, elevation: float) -> float:
+        return law.pressure_of_enthalpy(self.st, self.floats, float(potential / self.rho - self.g * elevation))
+
+    def given_pressure(self, row, node) -> float:
+        if row["kind"] == rec.TANK:
+            return head_pressure(self.st, self.floats, float(node.level))
+        value = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
+        return head_pressure(self.st, self.floats, value - row["elevation"]) if row["head_given"] else value
+
+    def still(self, i: int) -> bool:
+        return self.nodes["kind"][i] != rec.JUNCTION
+
+    def correct(self) -> None:
+        """What drops differ from those of a constant density, at the present answer."""
+        potential = self.answer.potential
+        names = self.scene.pipe_names
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
+            flow, i, j = float(self.pipe_flow[k]), int(row["from_node"]), int(row["to_node"])
+            b_to = self.march(row, mesh, flow)[2]
+            plain = self.edges[k].drop(flow) - self.extra.get(names[k], 0.0)
+            if flow > 0.0 and self.still(j):
+                m = self.ends[1]
+                b_to -= 0.5 * (flow / m) ** 2
+            self.extra[names[k]] = (potential[i] - self.rho * b_to) - plain if flow != 0.0 else 0.0
+        for k, row in enumerate(self.valves):
+            i, j = int(row["from_node"]), int(row["to_node"])
+            self.factor[k] = self.dense(i, j)
+
+    def dense(self, i: int, j: int) -> float:
+        """(upstream density / rho)(driving pressure / change of potential)."""
+        z, p = self.nodes["elevation"], [self.pressure(i), self.pressure(j)]
+        drop, rho = drive(self.st, self.floats, p[0], z[i], p[1], z[j])
+        change = self.answer.potential[i] - self.answer.potential[j]
+        ratio = drop / change if abs(change) > 1e-3 else rho / self.rho
+        return rho / self.rho * ratio
+
+    def pressure(self, i: int) -> float:
+        return self.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
+
+    def march(self, row, mesh, flow: float):
+        """(mass per length at faces, at centres, Bernoulli constant at the `to` end) of a pipe's profile."""
+        i = int(row["from_node"])
+        z = float(self.nodes["elevation"][i])
+        start = self.answer.potential[i] / self.rho
+        if flow < 0.0 and self.still(i):
+            m, _ = law.mass_of_pressure(self.st, self.floats, row, self.pressure(i))
+            start += 0.5 * (flow / m) ** 2
+        faces, centers = np.zeros(mesh.cells + 1), np.zeros(mesh.cells)
+        b_to = law.profile_along(self.st, self.floats, row, float(start), z, flow, faces, centers)
+        self.ends = faces[0], faces[-1]
+        return faces, centers, b_to
+
+    def fill_nodes(self) -> None:
+        super().fill_nodes()
+        for i in range(len(self.nodes)):
+            self.nodes["pressure"][i] = self.pressure(i)
+        for row in self.nodes:
+            if row["kind"] == rec.CHAMBER:
+                row["mass"] = law.density(self.st, self.floats, float(row["pressure"])) * row["volume"]
+
+    def fill_pipes(self) -> None:
+        profile = self.scene.tables[rec.I_PROFILE]
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
+            flow = row["flow"] = float(self.pipe_flow[k])
+            row["drag"] = self.pipe_drop(row)
+            faces, centers, b_to = self.march(row, mesh, flow)
+            n = mesh.cells
+            profile[row["face"] : row["face"] + n + 1] = faces
+            profile[row["center"] : row["center"] + n] = centers
+            for side, m0, name, sign in ((0, faces[0], "from", -1.0), (1, faces[-1], "to", 1.0)):
+                i = int(row[f"{name}_node"])
+                into, _ = end_flow(self.st, self.floats, row, m0, sign * flow, 0.0,
+                                   float(self.nodes["pressure"][i]), bool(self.still(i)))  # fmt: skip
+                near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
+                row[f"{name}_base"] = into if near else sign * flow
+            row["to_offset"] = 0.0 if near else self.nodes["pressure"][i] - self.pressure_of_mass(row, faces[-1])
+            boiling, _ = law.mass_of_pressure(self.st, self.floats, row, self.scene.fluid.vapor_pressure)
+            profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
+            self.scene.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
+            self.flux(row, faces, profile)
+
+    def flux(self, row, faces, profile) -> None:
+        from fvsolve.kernels.barotropic import momentum_flux
+
+        for i, m in enumerate(faces):
+            profile[row["flux"] + i] = momentum_flux(self.st, self.floats, row, float(m), float(row["flow"]))
+
+    def pressure_of_mass(self, row, m: float) -> float:
+        return law.pressure_of_mass(self.st, self.floats, row, float(m))
+
+    def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
+        row, mesh = self.pipes[k], self.scene.meshes[k]
+        z = self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
+        return self.pressure_of_mass(row, self.mass_at(k, fraction)), z
+
+    def mass_at(self, k: int, fraction: float) -> float:
+        """Mass per length of the profile at a fraction of pipe k, linear between faces and centres."""
+        row, mesh = self.pipes[k], self.scene.meshes[k]
+        profile, n = self.scene.tables[rec.I_PROFILE], mesh.cells
+        both = np.empty(2 * n + 1)
+        both[0::2], both[1::2] = profile[row["face"] : row["face"] + n + 1], profile[row["center"] : row["center"] + n]
+        return float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), both))
+
+    def fill_columns(self) -> None:
+        for row, flow in zip(self.columns, self.column_flow, strict=True):
+            row["flow"] = flow
+            i, j = int(row["from_node"]), int(row["to_node"])
+            row["drag"] = self.pipe_drop(row)
+            z, p = self.nodes["elevation"], self.nodes["pressure"]
+            row["base"] = drive(self.st, self.floats, p[i], z[i], p[j], z[j])[0]
+            pull = row["drag"] * row["length"] / row["area"]
+            change = self.answer.potential[i] - self.answer.potential[j]
+            offset = row["base"] - pull
+            small = 1e-10 * (PRESSURE_SCALE + abs(change)) + abs(row["base"] - change)
+            row["offset"] = offset if abs(offset) > small else 0.0
+
+    def fill_valves(self) -> None:
+        out = np.zeros(int(self.scene.tables[rec.I_LAYOUT][0]["size"]))
+        for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
+            row["flow"] = flow
+            row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            g = row["open"] if row["open"] > 0.0 else row["leak"]
+            target = valve_target(self.scene.tables, out, k, float(g))[0] if g > 0.0 else 0.0
+            laminar = row["transition"] > 0.0
+            asked = target if laminar else np.sign(target) * np.sqrt(abs(target))
+            if row["open"] > 0.0 and abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
+                row["open"], target = 0.0, 0.0
+            row["base"] = target
+            row["leak_flow"] = asked if row["open"] == 0.0 and row["leak"] > 0.0 else 0.0
