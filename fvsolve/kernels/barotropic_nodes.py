@@ -16,7 +16,7 @@ from fvsolve.kernels.density import (
     pressure_of_enthalpy,
     pressure_of_log,
 )
-from fvsolve.kernels.nodes import inner_row, solve_dense
+from fvsolve.kernels.nodes import chord_slope, inner_row, solve_dense
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
@@ -38,7 +38,7 @@ from fvsolve.kernels.records import (
 )
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
-from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
+from fvsolve.kernels.valves import flow_at_drop, valve_conductance
 
 
 @njit
@@ -134,7 +134,7 @@ def drive(st, floats, p_i, z_i, p_j, z_j):
 
 @njit
 def valve_target(tables, out, k, g):
-    """(M |M| that a valve asks for, or its laminar flow; the slope over pressure of the same; is it laminar)."""
+    """(M |M| that a valve asks for, or the flow where its law has a laminar part; its conductance G now)."""
     st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
     valve = tables[I_VALVES][k]
     i, j = valve["from_node"], valve["to_node"]
@@ -143,7 +143,7 @@ def valve_target(tables, out, k, g):
     drop, rho = drive(st, floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])
     dense = g * rho / st["rho"]
     if valve["transition"] > 0.0:
-        return flow_at_drop(dense, valve["transition"], drop), flow_slope(dense, valve["transition"], drop)
+        return flow_at_drop(dense, valve["transition"], drop), dense
     return dense * drop, dense
 
 
@@ -153,7 +153,7 @@ def valve_move(tables, out, k, g, x):
     valve = tables[I_VALVES][k]
     target, slope = valve_target(tables, out, k, g)
     if valve["transition"] > 0.0:
-        return target - valve["base"] - x, slope
+        return target - valve["base"] - x, chord_slope(slope, valve["transition"], target, valve["flow"] + x)
     flow = valve["flow"]
     if valve["open"] <= 0.0 and g == valve["leak"]:
         flow = valve["leak_flow"]
@@ -206,7 +206,7 @@ def newton_sweep(out, tables, g, x, slope, given):
             i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
             step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
             x[k] += step
-            moved = max(moved, abs(step))
+            moved = max(moved, abs(step), abs(a[e]))
     return moved
 
 

@@ -35,7 +35,6 @@ from fvsolve.kernels.valves import (
     flow_at_drop,
     flow_change,
     flow_change_laminar,
-    flow_slope,
     valve_conductance,
 )
 
@@ -150,6 +149,13 @@ def solve_dense(a, b, n):
 
 
 @njit(forceinline=True)
+def chord_slope(g, transition, target, flow):
+    """Slope of the chord of M |M| = G dp between two flows, at most that of the laminar part at zero."""
+    steepest = 45.0 / 32.0 * g / transition
+    return min(steepest, g / max(abs(target) + abs(flow), 1e-300))
+
+
+@njit(forceinline=True)
 def valve_step(valve, g, x, change):
     """a, s with dx = a + s d(p_i' - p_j') for the next Newton step of one valve in a cluster.
 
@@ -160,8 +166,8 @@ def valve_step(valve, g, x, change):
     if valve["transition"] > 0.0:
         drop = valve["drop"] + change
         base = flow_at_drop(opened, valve["transition"], valve["drop"])
-        target = flow_at_drop(g, valve["transition"], drop) - base
-        return target - x, flow_slope(g, valve["transition"], drop)
+        target = flow_at_drop(g, valve["transition"], drop)
+        return target - base - x, chord_slope(g, valve["transition"], target, flow + x)
     if opened <= 0.0 and valve["leak"] == g:
         opened = g
         flow = flow_at_drop(g, 0.0, valve["drop"])
@@ -241,7 +247,7 @@ def close_cluster(t, out, tables, which):
             step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
             x[e] += step
             scale = max(scale, abs(x[e]))
-            moved = max(moved, abs(step))
+            moved = max(moved, abs(step), abs(a[e]))
         if moved <= 1e-14 * scale:
             break
     if moved > 1e-9 * scale:
