@@ -129,7 +129,7 @@ def table(title, runs, unit):
 
 
 def verdict(name, own, peer):
-    """Print the prices at the goals' errors and their ratio; own and peer: (runs halved, runs picked to fit)."""
+    """Print the prices at the goals' errors and their ratio; own, peer: (runs halved, runs picked to fit)."""
 
     def error(r):
         return r.greatest if name == "smooth" else r.mean

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 def watched(case) -> Iterator[Callable[[float, float, int], None]]:
     """A `progress` function for a run of `case`: draws a bar on a terminal, ends the run at Ctrl-C.
 
-    The first Ctrl-C lets the run come to a checkpoint, the second one breaks it off.
+    The first Ctrl-C ends the run where its state is whole, the second one breaks it off.
     """
     stop = threading.Event()
     bar = Bar(case) if sys.stderr.isatty() else None

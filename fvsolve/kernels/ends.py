@@ -57,13 +57,16 @@ END_VALUE, END_LEAVING, END_ENTERING = end_weights()
 
 
 @njit
-def near(c, right, k):
-    """The k-th cell from the left or right end."""
-    return c[c.size - 1 - k] if right else c[k]
+def edge_cells(c, right, edge):
+    """The five cells nearest to the left (0) or right (1) end, nearest first; the last one repeated if fewer."""
+    n = c.size
+    for k in range(5):
+        m = min(k, n - 1)
+        edge[k] = c[n - 1 - m] if right == 1 else c[m]
 
 
 @njit
-def end_degree(scheme, degree, n):
+def end_degree(degree, n):
     """Degree that n cells bear: below five cells the fifth-order closure would grow, the third-order one not."""
     return min(min(degree, 2) if n < 5 else degree, n - 1)
 
@@ -76,75 +79,70 @@ def roughness(d1, d2, d3, d4, small):
 
 
 @njit
-def leaving_cells(c, right, family, degree, limiter, small, ghosts):
-    """Three cells beyond an end that the wave leaves by, nearest first."""
-    n = c.size
+def leaving_cells(edge, n, family, degree, limiter, small, ghosts):
+    """Three cells beyond an end that the wave leaves by, nearest first, from the five `edge` cells of n."""
     if family == UPWIND or family == LINEAR:
-        d = end_degree(family, degree, n)
+        d = end_degree(degree, n)
         for g in range(3):
             total = 0.0
             for k in range(d + 1):
-                total += END_LEAVING[d, g, k] * near(c, right, k)
+                total += END_LEAVING[d, g, k] * edge[k]
             ghosts[g] = total
         return
-    a, b = near(c, right, 0), near(c, right, min(1, n - 1))
-    e = near(c, right, min(2, n - 1))
+    a, b, e = edge[0], edge[1], edge[2]
     low = 3.0 * a - 3.0 * b + e if n > 2 else 2.0 * a - b
-    slope = value_muscl(limiter, b, a, low) - a
-    ghosts[0] = low
-    ghosts[1] = low
-    ghosts[2] = low
+    for g in range(3):
+        ghosts[g] = low
     if family == WENO5:
-        d3, d4 = near(c, right, 3), near(c, right, 4)
+        slope = value_muscl(limiter, b, a, low) - a
+        d3, d4 = edge[3], edge[4]
         rough = roughness(a - b, a - 2.0 * b + e, a - 3.0 * b + 3.0 * e - d3,
                           a - 4.0 * b + 6.0 * e - 4.0 * d3 + d4, small)  # fmt: skip
         for g in range(3):
             high = 0.0
             for k in range(5):
-                high += END_LEAVING[4, g, k] * near(c, right, k)
+                high += END_LEAVING[4, g, k] * edge[k]
             ghosts[g] = high + rough * (a + 2.0 * (g + 1.0) * slope - high)
 
 
 @njit
-def entering_cells(c, right, family, degree, datum, small, ghosts):
+def entering_cells(edge, n, family, degree, datum, small, ghosts):
     """Three cells beyond an end that the wave enters by with the value `datum`, nearest first."""
-    n = c.size
     if family == UPWIND or family == LINEAR:
         d = min(min(degree, 2) if n < 5 else degree, n)
         for g in range(3):
             total = END_ENTERING[d, g, 0] * datum
             for k in range(d):
-                total += END_ENTERING[d, g, k + 1] * near(c, right, k)
+                total += END_ENTERING[d, g, k + 1] * edge[k]
             ghosts[g] = total
         return
-    a = near(c, right, 0)
-    ghosts[0] = 2.0 * datum - a
-    ghosts[1] = ghosts[0]
-    ghosts[2] = ghosts[0]
+    a, b, e, d3 = edge[0], edge[1], edge[2], edge[3]
+    for g in range(3):
+        ghosts[g] = 2.0 * datum - a
     if family == WENO5:
-        b, e, d3 = near(c, right, 1), near(c, right, 2), near(c, right, 3)
         bend = 5.5 * a - 3.5 * b + e - 3.0 * datum  # zero for every parabola
         rough = roughness(2.0 * (a - datum), b - a, bend, a - 3.0 * b + 3.0 * e - d3, small)
         for g in range(3):
             high = END_ENTERING[4, g, 0] * datum
             for k in range(4):
-                high += END_ENTERING[4, g, k + 1] * near(c, right, k)
+                high += END_ENTERING[4, g, k + 1] * edge[k]
             ghosts[g] = high + rough * (datum - high)
 
 
 @njit
-def end_value(c, right, family, degree, limiter, small, ghosts):
-    """Value at an end of the wave that leaves by it."""
-    n = c.size
+def end_value(c, right, family, degree, limiter, small, scratch):
+    """Value at the left (0) or right (1) end of the wave that leaves by it."""
+    n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
+    edge_cells(c, right, edge)
     if family == UPWIND or family == LINEAR:
-        d = end_degree(family, degree, n)
+        d = end_degree(degree, n)
         total = 0.0
         for k in range(d + 1):
-            total += END_VALUE[d, k] * near(c, right, k)
+            total += END_VALUE[d, k] * edge[k]
         return total
     if n == 1:
-        return c[0]
-    leaving_cells(c, right, family, degree, limiter, small, ghosts)
+        return edge[0]
+    leaving_cells(edge, n, family, degree, limiter, small, ghosts)
     if family == WENO5:
-        return value_weno5(near(c, right, 2), near(c, right, 1), near(c, right, 0), ghosts[0], ghosts[1], small)
-    return value_muscl(limiter, near(c, right, 1), near(c, right, 0), ghosts[0])
+        return value_weno5(edge[2], edge[1], edge[0], ghosts[0], ghosts[1], small)
+    return value_muscl(limiter, edge[1], edge[0], ghosts[0])

@@ -43,12 +43,12 @@ def waves_out(y, out, tables):
         r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
         family = family_of(settings, n)
         degree, limiter, small = settings["degree"], settings["limiter"], pipe["noise"]
-        l_out = end_value(l, False, family, degree, limiter, small, scratch[16:19])
-        r_out = end_value(r, True, family, degree, limiter, small, scratch[16:19])
-        out[at + 1], out[at + 2] = l_out, r_out
-        admittance = pipe["admittance"]
-        out[layout["net"] + pipe["from_node"]] += 2.0 * l_out - admittance * pipe["from_offset"]
-        out[layout["net"] + pipe["to_node"]] += 2.0 * r_out - admittance * pipe["to_offset"]
+        for right in range(2):
+            wave = end_value(r if right == 1 else l, right, family, degree, limiter, small, scratch)
+            out[at + 1 + right] = wave
+            node = pipe["to_node"] if right == 1 else pipe["from_node"]
+            offset = pipe["to_offset"] if right == 1 else pipe["from_offset"]
+            out[layout["net"] + node] += 2.0 * wave - pipe["admittance"] * offset
 
 
 @njit(forceinline=True)

@@ -5,7 +5,7 @@ length m = rho A and mass flow M from the profile. r_t + c r_x = -drag'/2, l_t -
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.ends import entering_cells, leaving_cells
+from fvsolve.kernels.ends import edge_cells, entering_cells, leaving_cells
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.reconstruction import faces
 from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH, MUSCL, UPWIND, WENO5
@@ -32,18 +32,15 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
             pad[2 - g], pad[n + 3 + g] = left[g], right[g]
         faces(settings, family, small, backward, pad, f)
         return
-    pad = scratch[:8]
-    for k in range(5):
-        pad[k + 3] = c[k]
-    for g in range(3):
-        pad[2 - g] = left[g]
-    faces(settings, family, small, backward, pad, f[:3])
     faces(settings, family, small, backward, c, f[3 : n - 2])
-    for k in range(5):
-        pad[k] = c[n - 5 + k]
-    for g in range(3):
-        pad[5 + g] = right[g]
-    faces(settings, family, small, backward, pad, f[n - 2 :])
+    for side in range(2):
+        pad, to = scratch[:8], f[:3]
+        for k in range(5):
+            pad[k + 3 - 3 * side] = c[k + side * (n - 5)]
+        for g in range(3):
+            pad[5 + g if side == 1 else 2 - g] = right[g] if side == 1 else left[g]
+        to = f[n - 2 :] if side == 1 else f[:3]
+        faces(settings, family, small, backward, pad, to)
 
 
 @njit
@@ -51,13 +48,15 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
     """Face values of both waves; the values at the two ends are the nodes' and the outgoing ones."""
     n, small = r.size, pipe["noise"]
     family, degree, limiter = family_of(settings, n), settings["degree"], settings["limiter"]
-    left, right = scratch[16:19], scratch[19:22]
-    entering_cells(r, False, family, degree, r_in, small, left)
-    leaving_cells(r, True, family, degree, limiter, small, right)
-    wave_faces(settings, family, small, False, r, left, right, scratch, fr)
-    leaving_cells(l, False, family, degree, limiter, small, left)
-    entering_cells(l, True, family, degree, l_in, small, right)
-    wave_faces(settings, family, small, True, l, left, right, scratch, fl)
+    edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
+    for backward in range(2):
+        c = l if backward == 1 else r
+        edge_cells(c, backward, edge)
+        entering_cells(edge, n, family, degree, l_in if backward == 1 else r_in, small, ghosts)
+        edge_cells(c, 1 - backward, edge)
+        leaving_cells(edge, n, family, degree, limiter, small, beyond)
+        left, right = (beyond, ghosts) if backward == 1 else (ghosts, beyond)
+        wave_faces(settings, family, small, backward, c, left, right, scratch, fl if backward == 1 else fr)
     fr[0], fr[n] = r_in, r_out
     fl[0], fl[n] = l_out, l_in
 

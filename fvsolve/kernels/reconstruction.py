@@ -51,20 +51,20 @@ def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
 def faces_muscl(limiter, backward, p, f):
     """Limited second-order values; one loop a limiter, so that each becomes straight vector code."""
     if limiter == MINMOD:
-        if backward:
+        if backward == 1:
             for j in range(f.size):
                 f[j] = p[j + 3] - 0.5 * slope_minmod(p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
         else:
             for j in range(f.size):
                 f[j] = p[j + 2] + 0.5 * slope_minmod(p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
     elif limiter == VAN_LEER:
-        if backward:
+        if backward == 1:
             for j in range(f.size):
                 f[j] = p[j + 3] - 0.5 * slope_van_leer(p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
         else:
             for j in range(f.size):
                 f[j] = p[j + 2] + 0.5 * slope_van_leer(p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
-    elif backward:
+    elif backward == 1:
         for j in range(f.size):
             f[j] = p[j + 3] - 0.5 * slope_monotonized_central(p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
     else:
@@ -75,7 +75,7 @@ def faces_muscl(limiter, backward, p, f):
 @njit
 def faces_weno5(small, backward, p, f):
     """Fifth-order WENO-Z values."""
-    if backward:
+    if backward == 1:
         for j in range(f.size):
             f[j] = value_weno5(p[j + 5], p[j + 4], p[j + 3], p[j + 2], p[j + 1], small)
     else:
@@ -88,10 +88,10 @@ def faces(settings, scheme, small, backward, p, f):
     """Values at the faces of window `p` by the case's scheme; `scheme` is its family there."""
     if scheme == UPWIND:
         for j in range(f.size):
-            f[j] = p[j + 3] if backward else p[j + 2]
+            f[j] = p[j + 3] if backward == 1 else p[j + 2]
     elif scheme == LINEAR:
         s = settings
-        if backward:
+        if backward == 1:
             faces_linear(s["w5"], s["w4"], s["w3"], s["w2"], s["w1"], s["w0"], p, f)
         else:
             faces_linear(s["w0"], s["w1"], s["w2"], s["w3"], s["w4"], s["w5"], p, f)

@@ -35,18 +35,19 @@ class FieldSeries:
     def start(self) -> None:
         """Begin an empty series."""
         (self.folder / "fields").mkdir(exist_ok=True)
-        (self.folder / "fields.pvd").write_text(HEAD + TAIL)
+        (self.folder / "fields.pvd").write_bytes((HEAD + TAIL).encode())
 
     def continue_from(self, frames: int) -> None:
         """Keep the first `frames` of a series, drop what came after its checkpoint."""
-        lines = (self.folder / "fields.pvd").read_text().splitlines(keepends=True)
-        kept = [line for line in lines if line.startswith("<DataSet")][:frames]
+        listed = self.folder / "fields.pvd"
+        lines = listed.read_text().splitlines() if listed.is_file() else []
+        kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:frames]
         if len(kept) < frames:
-            raise RunError(f"{self.folder / 'fields.pvd'} lacks frames; start the run again with --force")
+            raise RunError(f"{listed} lacks frames; start the run again with --force")
         for path in (self.folder / "fields").glob("*.vtu"):
             if int(path.stem) >= frames:
                 path.unlink()
-        (self.folder / "fields.pvd").write_text(HEAD + "".join(kept) + TAIL)
+        listed.write_bytes((HEAD + "".join(kept) + TAIL).encode())
         self.frames = frames
 
     def write(self, t: float, frame: dict) -> None:
