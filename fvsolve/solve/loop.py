@@ -32,7 +32,8 @@ class Loop:
         self.rows = np.zeros((ROW_CAPACITY, 1 + probes))
         self.memory, self.orders = np.zeros(erk.MEMORY), np.zeros(erk.ORDERS)
         self.flags = np.array([erk.FRESH, 0, 0, 1, 0], dtype=np.int64)
-        self.orders[erk.STEP_MAX], self.orders[erk.STOP_AT] = model.step_max, NO_LIMIT
+        self.orders[erk.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
+        self.orders[erk.STOP_AT] = NO_LIMIT
         for control, key in ((erk.COURANT, "courant"), (erk.FIXED_STEP, "step"), (erk.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[erk.CONTROL], self.orders[erk.SIZE] = control, getattr(numerics, key)

@@ -201,7 +201,8 @@ def next_step(orders, memory, out_rate, k, scale, order):
     if orders[CONTROL] == TOLERANCE:
         if memory[STEP] <= 0.0:
             memory[STEP] = first_step(k, scale, order, orders[SIZE], orders[END] - memory[T])
-        return min(memory[STEP], orders[STEP_MAX])
+        stable = 2.0 / out_rate if out_rate > 0.0 else orders[STEP_MAX]  # error control alone would chatter there
+        return min(memory[STEP], orders[STEP_MAX], stable)
     h = orders[SIZE]
     if orders[CONTROL] == COURANT:
         h = min(orders[SIZE] / out_rate, orders[STEP_MAX]) if out_rate > 0.0 else orders[STEP_MAX]
