@@ -16,7 +16,7 @@ from fvsolve.kernels.density import (
     pressure_of_enthalpy,
     pressure_of_log,
 )
-from fvsolve.kernels.nodes import chord_slope, inner_row, solve_dense
+from fvsolve.kernels.nodes import MOST, chord_slope, inner_row, solve_dense
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
@@ -27,6 +27,7 @@ from fvsolve.kernels.records import (
     I_NODES,
     I_PIPES,
     I_PROFILE,
+    I_SCRATCH,
     I_SETTINGS,
     I_VALVES,
     JUNCTION,
@@ -157,15 +158,17 @@ def valve_move(tables, out, k, g, x):
     flow = valve["flow"]
     if valve["open"] <= 0.0 and g == valve["leak"]:
         flow = valve["leak_flow"]
-    asked = target - valve["base"]
-    present = abs(flow + x) * (flow + x) - abs(flow) * flow
-    chord = abs(flow + x) + sqrt(abs(abs(flow) * flow + asked))
+    if abs(x) > 0.5 * abs(flow):
+        rest = target - abs(flow + x) * (flow + x)
+    else:
+        rest = (target - valve["base"]) - (abs(flow + x) * (flow + x) - abs(flow) * flow)
+    chord = abs(flow + x) + sqrt(abs(target))
     chord = max(chord, 1e-6 * sqrt(slope))
-    return (asked - present) / chord, slope / chord
+    return rest / chord, slope / chord
 
 
 @njit
-def newton_sweep(out, tables, g, x, slope, given):
+def newton_sweep(out, tables, g, x, slope, given, work):
     """One Newton step of every cluster; returns the greatest change of flow [kg/s]."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     integers, clusters = tables[I_INTEGERS], tables[I_CLUSTERS]
@@ -173,27 +176,30 @@ def newton_sweep(out, tables, g, x, slope, given):
     for which in range(clusters.size):
         cluster = clusters[which]
         n, m = cluster["nodes"], cluster["valves"]
-        matrix, right = np.zeros((n, n)), np.zeros(n)
-        a, s = np.zeros(m), np.zeros(m)
+        at = n * n + n
+        matrix, right = work[: n * n], work[n * n : at]
+        a, s = work[at : at + m], work[at + m : at + 2 * m]
+        for r in range(n * n):
+            matrix[r] = 0.0
         for r in range(n):
             i = integers[cluster["first_node"] + r]
             right[r] = out[layout["net"] + i] + given[i]
-            matrix[r, r] = -slope[i]
+            matrix[n * r + r] = -slope[i]
         for e in range(m):
             k = integers[cluster["first_valve"] + e]
             i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
-            a[e] = -x[k] - valves[k]["flow"]
+            a[e], s[e] = -x[k] - valves[k]["flow"], 0.0
             if g[k] > 0.0:
                 a[e], s[e] = valve_move(tables, out, k, g[k], x[k])
             if i >= 0:
                 right[i] -= x[k] + a[e]
-                matrix[i, i] += s[e]
+                matrix[n * i + i] += s[e]
             if j >= 0:
                 right[j] += x[k] + a[e]
-                matrix[j, j] += s[e]
+                matrix[n * j + j] += s[e]
             if i >= 0 and j >= 0:
-                matrix[i, j] -= s[e]
-                matrix[j, i] -= s[e]
+                matrix[n * i + j] -= s[e]
+                matrix[n * j + i] -= s[e]
         if not solve_dense(matrix, right, n):
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
             return 0.0
@@ -214,11 +220,13 @@ def newton_sweep(out, tables, g, x, slope, given):
 def close_nodes_barotropic(t, y, out, tables):
     """Pressure deviation of every node, flow of every valve and incoming wave of every pipe end, by Newton."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    g, x = np.zeros(valves.size), np.zeros(valves.size)
-    slope, given = np.zeros(nodes.size), np.zeros(nodes.size)
+    n, m, work = nodes.size, valves.size, tables[I_SCRATCH]
+    g, x, work = work[:m], work[m : 2 * m], work[2 * m :]
+    slope, given, work = work[:n], work[n : 2 * n], work[2 * n :]
     stored_pressures_barotropic(t, y, out, tables)
     scale = 1e-300
     for i in range(nodes.size):
+        given[i] = 0.0
         if nodes[i]["kind"] == JUNCTION:
             demand = schedule_value(tables, nodes[i]["schedule"], t)
             out[layout["supply"] + i] = -demand
@@ -226,7 +234,7 @@ def close_nodes_barotropic(t, y, out, tables):
             out[layout["pressure"] + i] = 0.0
             scale = max(scale, abs(demand))
     for k in range(valves.size):
-        g[k] = max(valve_conductance(tables, k, t), valves[k]["leak"])
+        g[k], x[k] = max(valve_conductance(tables, k, t), valves[k]["leak"]), 0.0
         scale = max(scale, abs(valves[k]["flow"]))
         if nodes[valves[k]["from_node"]]["kind"] != JUNCTION and nodes[valves[k]["to_node"]]["kind"] != JUNCTION:
             x[k] = valve_move(tables, out, k, g[k], 0.0)[0] if g[k] > 0.0 else -valves[k]["flow"]
@@ -235,7 +243,7 @@ def close_nodes_barotropic(t, y, out, tables):
         ends_into_nodes(out, tables, slope)
         for i in range(nodes.size):
             scale = max(scale, abs(out[layout["net"] + i]))
-        moved = newton_sweep(out, tables, g, x, slope, given)
+        moved = newton_sweep(out, tables, g, x, slope, given, work)
         if moved <= 1e-14 * scale:
             break
     ends_into_nodes(out, tables, slope)
@@ -243,7 +251,7 @@ def close_nodes_barotropic(t, y, out, tables):
         out[STATUS] = NOT_CONVERGED
     for k in range(valves.size):
         if valves[k]["leak"] > 0.0 and g[k] == valves[k]["leak"]:
-            if abs(valves[k]["flow"] + x[k]) > 1e-9 * scale:
+            if (valves[k]["flow"] + x[k]) ** 2 > MOST * valves[k]["leak"]:
                 out[STATUS], out[WHERE] = NO_SOLUTION, valves[k]["from_node"]
             x[k] = -valves[k]["flow"]
         out[layout["valve"] + k] = valves[k]["flow"] + x[k]

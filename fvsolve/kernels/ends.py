@@ -11,7 +11,7 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.reconstruction import value_muscl, value_weno5
-from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
+from fvsolve.kernels.records import LINEAR, SHORT, UPWIND, WENO5
 
 GREATEST = 4  # degree of the steepest polynomial
 GHOSTS = 3
@@ -81,7 +81,7 @@ def roughness(d1, d2, d3, d4, small):
 @njit
 def leaving_cells(edge, n, family, degree, limiter, small, ghosts):
     """Three cells beyond an end that the wave leaves by, nearest first, from the five `edge` cells of n."""
-    if family == UPWIND or family == LINEAR:
+    if family == UPWIND or family == LINEAR or family == SHORT:
         d = end_degree(degree, n)
         for g in range(3):
             total = 0.0
@@ -108,7 +108,7 @@ def leaving_cells(edge, n, family, degree, limiter, small, ghosts):
 @njit
 def entering_cells(edge, n, family, degree, datum, small, ghosts):
     """Three cells beyond an end that the wave enters by with the value `datum`, nearest first."""
-    if family == UPWIND or family == LINEAR:
+    if family == UPWIND or family == LINEAR or family == SHORT:
         d = min(min(degree, 2) if n < 5 else degree, n)
         for g in range(3):
             total = END_ENTERING[d, g, 0] * datum
@@ -134,7 +134,7 @@ def end_value(c, right, family, degree, limiter, small, scratch):
     """Value at the left (0) or right (1) end of the wave that leaves by it."""
     n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
     edge_cells(c, right, edge)
-    if family == UPWIND or family == LINEAR:
+    if family == UPWIND or family == LINEAR or family == SHORT:
         d = end_degree(degree, n)
         total = 0.0
         for k in range(d + 1):

@@ -6,8 +6,6 @@ Y = area / speed. A node without storage makes these and the flows of its other 
 
 from math import sqrt
 
-import numpy as np
-
 from fvsolve.jit import njit
 from fvsolve.kernels.records import (
     ALONE,
@@ -20,6 +18,7 @@ from fvsolve.kernels.records import (
     I_INTEGERS,
     I_LAYOUT,
     I_NODES,
+    I_SCRATCH,
     I_SETTINGS,
     I_VALVES,
     JUNCTION,
@@ -37,6 +36,8 @@ from fvsolve.kernels.valves import (
     flow_change_laminar,
     valve_conductance,
 )
+MOST = 1e14  # a pressure drop that only a flow nobody can bring would need [Pa]
+
 
 @njit(forceinline=True)
 def stored_pressures(t, y, out, tables):
@@ -113,7 +114,7 @@ def close_single(t, out, tables):
             )
         else:
             surplus = (g - valve["open"]) * valve["drop"] + g * (pi - pj)
-            x = flow_change(g, zi + zj, valve["flow"], surplus)
+            x = flow_change(g, zi + zj, valve["flow"], surplus, g * (valve["drop"] + (pi - pj)))
         out[layout["valve"] + k] = valve["flow"] + x
         if nodes[i]["kind"] == JUNCTION:
             out[layout["pressure"] + i] = pi - zi * x
@@ -123,28 +124,31 @@ def close_single(t, out, tables):
 
 @njit
 def solve_dense(a, b, n):
-    """b <- a^-1 b by elimination with partial pivoting; False where a is singular. Overwrites both."""
+    """b <- a^-1 b by elimination with partial pivoting; False where a is singular. Overwrites both.
+
+    a : float64[n * n]  row by row
+    """
     for i in range(n):
-        pivot = i
+        pivot, row = i, n * i
         for k in range(i + 1, n):
-            if abs(a[k, i]) > abs(a[pivot, i]):
+            if abs(a[n * k + i]) > abs(a[n * pivot + i]):
                 pivot = k
-        if a[pivot, i] == 0.0:
+        if a[n * pivot + i] == 0.0:
             return False
         if pivot != i:
             for k in range(n):
-                a[i, k], a[pivot, k] = a[pivot, k], a[i, k]
+                a[row + k], a[n * pivot + k] = a[n * pivot + k], a[row + k]
             b[i], b[pivot] = b[pivot], b[i]
         for k in range(i + 1, n):
-            f = a[k, i] / a[i, i]
+            f = a[n * k + i] / a[row + i]
             if f != 0.0:
                 for m in range(i, n):
-                    a[k, m] -= f * a[i, m]
+                    a[n * k + m] -= f * a[row + m]
                 b[k] -= f * b[i]
     for i in range(n - 1, -1, -1):
         for k in range(i + 1, n):
-            b[i] -= a[i, k] * b[k]
-        b[i] /= a[i, i]
+            b[i] -= a[n * i + k] * b[k]
+        b[i] /= a[n * i + i]
     return True
 
 
@@ -171,11 +175,14 @@ def valve_step(valve, g, x, change):
     if opened <= 0.0 and valve["leak"] == g:
         opened = g
         flow = flow_at_drop(g, 0.0, valve["drop"])
-    asked = (g - opened) * valve["drop"] + g * change
-    present = abs(flow + x) * (flow + x) - abs(flow) * flow
-    chord = abs(flow + x) + sqrt(abs(abs(flow) * flow + asked))
+    total = g * (valve["drop"] + change)
+    if abs(x) > 0.5 * abs(flow):  # far from the profile its own numbers would only bring their rounding
+        rest = total - abs(flow + x) * (flow + x)
+    else:
+        rest = ((g - opened) * valve["drop"] + g * change) - (abs(flow + x) * (flow + x) - abs(flow) * flow)
+    chord = abs(flow + x) + sqrt(abs(total))
     chord = max(chord, 1e-6 * sqrt(g))  # the flow at a drop of 1e-12 Pa
-    return (asked - present) / chord, g / chord
+    return rest / chord, g / chord
 
 
 @njit(forceinline=True)
@@ -188,12 +195,13 @@ def inner_row(nodes, i):
 def assemble(cluster, tables, out, g, x, p, a, s, matrix, right):
     """Linear system for the change of the cluster's pressures, with the valves' changes put in."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers = tables[I_INTEGERS]
-    matrix[:, :] = 0.0
-    for i in range(p.size):
+    integers, n = tables[I_INTEGERS], p.size
+    for i in range(matrix.size):
+        matrix[i] = 0.0
+    for i in range(n):
         node = integers[cluster["first_node"] + i]
         right[i] = out[layout["net"] + node] - nodes[node]["admittance"] * p[i]
-        matrix[i, i] = nodes[node]["admittance"]
+        matrix[n * i + i] = nodes[node]["admittance"]
     for e in range(x.size):
         valve = valves[integers[cluster["first_valve"] + e]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
@@ -204,13 +212,13 @@ def assemble(cluster, tables, out, g, x, p, a, s, matrix, right):
             a[e], s[e] = valve_step(valve, g[e], x[e], pi - pj)
         if i >= 0:
             right[i] -= x[e] + a[e]
-            matrix[i, i] += s[e]
+            matrix[n * i + i] += s[e]
         if j >= 0:
             right[j] += x[e] + a[e]
-            matrix[j, j] += s[e]
+            matrix[n * j + j] += s[e]
         if i >= 0 and j >= 0:
-            matrix[i, j] -= s[e]
-            matrix[j, i] -= s[e]
+            matrix[n * i + j] -= s[e]
+            matrix[n * j + i] -= s[e]
 
 
 @njit
@@ -222,15 +230,18 @@ def close_cluster(t, out, tables, which):
     """
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     integers, cluster = tables[I_INTEGERS], tables[I_CLUSTERS][which]
-    n, m = cluster["nodes"], cluster["valves"]
-    matrix, right, p = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    g, x, a, s = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
+    n, m, work = cluster["nodes"], cluster["valves"], tables[I_SCRATCH]
+    at = n * n + 2 * n
+    matrix, right, p = work[: n * n], work[n * n : n * n + n], work[n * n + n : at]
+    g, x = work[at : at + m], work[at + m : at + 2 * m]
+    a, s = work[at + 2 * m : at + 3 * m], work[at + 3 * m : at + 4 * m]
     scale = 1e-300
     for e in range(m):
-        k = integers[cluster["first_valve"] + e]
+        k, x[e] = integers[cluster["first_valve"] + e], 0.0
         g[e] = max(valve_conductance(tables, k, t), valves[k]["leak"])
         scale = max(scale, abs(valves[k]["flow"]))
     for i in range(n):
+        p[i] = 0.0
         scale = max(scale, abs(out[layout["net"] + integers[cluster["first_node"] + i]]))
     moved = 1.0
     for _ in range(100):
@@ -257,7 +268,7 @@ def close_cluster(t, out, tables, which):
     for e in range(m):
         k = integers[cluster["first_valve"] + e]
         if g[e] == valves[k]["leak"]:
-            if abs(valves[k]["flow"] + x[e]) > 1e-9 * scale:
+            if (valves[k]["flow"] + x[e]) ** 2 > MOST * valves[k]["leak"]:
                 out[STATUS], out[WHERE] = NO_SOLUTION, valves[k]["from_node"]
             x[e] = -valves[k]["flow"]
         out[layout["valve"] + k] = valves[k]["flow"] + x[e]

@@ -8,15 +8,17 @@ from fvsolve.jit import njit
 from fvsolve.kernels.ends import edge_cells, entering_cells, leaving_cells
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.reconstruction import faces
-from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH, MUSCL, UPWIND, WENO5
+from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH, LINEAR, MUSCL, SHORT, UPWIND, WENO5
 
 GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell widths from its centre
 
 
 @njit
 def family_of(settings, n):
-    """Scheme family that a pipe of n cells bears."""
+    """Scheme family that a pipe of n cells bears: below five, fifth-order stencils would grow or not fit."""
     family = settings["scheme"]
+    if n < 5 and family == LINEAR and settings["degree"] > 2:
+        return SHORT
     return MUSCL if family == WENO5 and n < 5 else family
 
 

@@ -6,7 +6,7 @@ P[j] .. P[j+4], a backward wave at P[j+5] .. P[j+1].
 
 from fvsolve.jit import njit
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.records import LINEAR, MINMOD, MUSCL, UPWIND, VAN_LEER
+from fvsolve.kernels.records import LINEAR, MINMOD, MUSCL, SHORT, UPWIND, VAN_LEER
 
 
 @njit
@@ -95,6 +95,12 @@ def faces(settings, scheme, small, backward, p, f):
             faces_linear(s["w5"], s["w4"], s["w3"], s["w2"], s["w1"], s["w0"], p, f)
         else:
             faces_linear(s["w0"], s["w1"], s["w2"], s["w3"], s["w4"], s["w5"], p, f)
+    elif scheme == SHORT:
+        b, c, d = -1.0 / 6.0, 5.0 / 6.0, 1.0 / 3.0
+        if backward == 1:
+            faces_linear(0.0, 0.0, d, c, b, 0.0, p, f)
+        else:
+            faces_linear(0.0, b, c, d, 0.0, 0.0, p, f)
     elif scheme == MUSCL:
         faces_muscl(settings["limiter"], backward, p, f)
     else:

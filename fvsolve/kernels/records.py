@@ -11,7 +11,7 @@ import numpy as np
 # Codes of kinds, as the kernels see them.
 FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
-UPWIND, LINEAR, MUSCL, WENO5 = 0, 1, 2, 3  # scheme families; LINEAR ones are six weights
+UPWIND, LINEAR, MUSCL, WENO5, SHORT = 0, 1, 2, 3, 4  # scheme families; LINEAR ones are six weights, SHORT upwind3
 MINMOD, VAN_LEER, MONOTONIZED_CENTRAL = 0, 1, 2
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE = 0, 1, 2

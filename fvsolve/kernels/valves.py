@@ -63,22 +63,22 @@ def flow_slope(conductance, transition, drop):
 
 
 @njit(forceinline=True)
-def flow_change(conductance, impedance, flow, surplus):
-    """Exact root x of |M + x| (M + x) - |M| M + G Z x = surplus: what a valve between pipe ends adds to M.
+def flow_change(conductance, impedance, flow, surplus, asked):
+    """Exact root x of |M + x| (M + x) = G (dp0 + dp' - Z x): what a valve between pipe ends adds to M.
 
     conductance G [kg2/s2/Pa]; impedance Z of the ends together [Pa s/kg], zero for given pressures;
-    surplus = (G - G0) dp0 + G dp', the drop that M does not use up yet, times G. Zero surplus gives zero.
+    asked = G (dp0 + dp'); surplus = asked - |M| M, formed so that it is zero while nothing changes: then x is too.
     """
     if conductance <= 0.0:
         return -flow
     gz = conductance * impedance
-    total = surplus + abs(flow) * flow + gz * flow  # decides the sign of M + x
-    side = 1.0 if flow > 0.0 or (flow == 0.0 and surplus > 0.0) else -1.0
-    if side * total >= 0.0:
+    side = 1.0 if flow >= 0.0 else -1.0
+    if abs(surplus) <= 0.5 * flow * flow:
         b = 2.0 * abs(flow) + gz
-        root = b + sqrt(max(b * b + 4.0 * side * surplus, 0.0))
-        return 2.0 * surplus / root if root > 0.0 else 0.0
-    return 2.0 * total / (gz + sqrt(gz * gz + 4.0 * abs(total))) - flow
+        return 2.0 * surplus / (b + sqrt(b * b + 4.0 * side * surplus)) if b > 0.0 else 0.0
+    total = asked + gz * flow
+    root = gz + sqrt(gz * gz + 4.0 * abs(total))
+    return (2.0 * total / root if root > 0.0 else 0.0) - flow
 
 
 @njit

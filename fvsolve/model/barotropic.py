@@ -89,7 +89,8 @@ class BarotropicStart(Start):
     def fill_nodes(self) -> None:
         super().fill_nodes()
         for i in range(len(self.nodes)):
-            self.nodes["pressure"][i] = self.pressure(i)
+            if self.nodes["kind"][i] not in (rec.FIXED, rec.TANK):
+                self.nodes["pressure"][i] = self.pressure(i)
         for row in self.nodes:
             if row["kind"] == rec.CHAMBER:
                 row["mass"] = law.density(self.st, self.floats, float(row["pressure"])) * row["volume"]

@@ -280,6 +280,8 @@ class Scene:
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
         most, cells = max(pipes["cells"], default=0), sum(mesh.cells for mesh in self.meshes)
+        system = max((c["nodes"] * (c["nodes"] + 2) + 4 * c["valves"] for c in self.cluster_table), default=0)
+        system += 2 * (len(self.node_table) + len(self.valve_table))
         layout = np.zeros(1, rec.LAYOUT)
         at = rec.OUT_HEAD
         for name, size in (
@@ -295,7 +297,7 @@ class Scene:
         self.tables = (
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float),
-            profile, np.zeros(2 * most + 64), marks, pieces, envelope, extremes,
+            profile, np.zeros(max(2 * most + 64, system)), marks, pieces, envelope, extremes,
         )  # fmt: skip
 
     def pack_table(self, s) -> None:

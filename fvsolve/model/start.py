@@ -120,7 +120,9 @@ class Start:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
         if link.initial_flow is not None:
             return Edge(i, j, None, link.initial_flow * self.scene.fluid.density, drop=drop)
-        return Edge(i, j, newton, self.scene.fluid.density * row["area"], drop=drop)
+        free = row["friction"] == rec.FRICTION_NONE
+        first = 0.0 if free else self.scene.fluid.density * row["area"]  # so that free loops get the least norm
+        return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:
         """A valve: M |M| = G dP, with the chord of the root as slope."""
@@ -184,6 +186,9 @@ class Start:
 
     def fill_nodes(self) -> None:
         self.nodes["pressure"] = self.answer.potential - self.weight * self.nodes["elevation"]
+        for node, row in zip(self.case.nodes.values(), self.nodes, strict=True):
+            if row["kind"] in (rec.FIXED, rec.TANK):
+                row["pressure"] = self.given_pressure(row, node)
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
         fluid = self.scene.fluid
         chambers = self.nodes["kind"] == rec.CHAMBER
@@ -226,6 +231,8 @@ class Start:
         for row, flow in zip(self.valves, self.valve_flow, strict=True):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            if flow == 0.0 and abs(row["drop"]) <= SNAP * (PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])):
+                row["drop"] = 0.0
             law = flow_at_drop(row["open"], row["transition"], row["drop"])
             if abs(law - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                 row["open"] = 0.0

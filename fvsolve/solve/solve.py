@@ -150,11 +150,13 @@ class Run:
 
     def steps(self) -> str:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
+        left, spent = self.budget, 0.0  # rows and frames interrupt a chunk, they do not begin another
         while True:
-            before = time.perf_counter()
-            code = self.loop.run(self.budget)
-            spent = time.perf_counter() - before
-            self.seconds += spent
+            before, steps = time.perf_counter(), self.loop.memory[erk.STEPS]
+            code = self.loop.run(left)
+            left = max(1.0, left - (self.loop.memory[erk.STEPS] - steps))
+            spent += time.perf_counter() - before
+            self.seconds += time.perf_counter() - before
             self.flush()
             if code == erk.FIELD:
                 count = self.loop.memory[erk.NEXT_FIELD] - 1
@@ -162,6 +164,7 @@ class Run:
                 self.frame(due, self.loop.y_out, self.loop.out_row)
             elif code == erk.CHUNK:
                 self.pause(spent)
+                left, spent = self.budget, 0.0
             elif code == erk.DONE:
                 return ""
             elif code != erk.ROWS_FULL:
