@@ -52,6 +52,8 @@ def source_hash() -> str:
 def njit(function: Callable | None = None, /, **options: Any) -> Callable:
     """`numba.njit` as the package wants it: `error_model="numpy"`, cached in a folder named by the sources.
 
+    Arrays are not reference counted (`_nrt=False`): each count is an atomic operation, and with the tables of a
+    model they cost microseconds a step. So compiled code allocates nothing; a function that must says `_nrt=True`.
     Used bare or with numba's own options. With `NUMBA_DISABLE_JIT=1` the plain function comes back.
     Only functions of `ROOMS` are cached: the hash does not see other files, and `exec` has none.
     """
@@ -61,7 +63,7 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         return function
     numba = _numba()
     cache = Path(function.__code__.co_filename).resolve() in _sources()
-    options = {"error_model": "numpy", "cache": cache} | options
+    options = {"error_model": "numpy", "cache": cache, "_nrt": False} | options
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_code_folder()) if options["cache"] else before
     try:

@@ -7,7 +7,6 @@ import functools
 from math import isfinite, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.steppers.borrow import borrow
 
 # What the loop remembers, in one flat array of floats that a restart stores.
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST = range(11)
@@ -262,10 +261,6 @@ def run_erk(
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[m] advanced with the step's own weights from out[where:]; rows : float64[cap, 1 + probes].
     """
-    handle, a, b, c, error, dense = borrow(handle), borrow(a), borrow(b), borrow(c), borrow(error), borrow(dense)
-    orders, memory, flags, y, k, f_old = borrow(orders), borrow(memory), borrow(flags), borrow(y), borrow(k), borrow(f_old)
-    supply, ledger, scale, out, out_row = borrow(supply), borrow(ledger), borrow(scale), borrow(out), borrow(out_row)
-    values, g, g_new, y_out, rates, rows = borrow(values), borrow(g), borrow(g_new), borrow(y_out), borrow(rates), borrow(rows)
     s, reuse = b.size, False
     for _ in range(1 << 62):
         now, old = flags[NOW], flags[OLD]
