@@ -56,6 +56,23 @@ def end_weights():
 END_VALUE, END_LEAVING, END_ENTERING = end_weights()
 
 
+def difference_rows(weights, degree):
+    """What a linear scheme makes of F[i] - F[i+1]: (inside [6], enter [3, 6], leave [2, 5]), see `records.SETTINGS`.
+
+    weights : of cells i-2 .. i+2 ... of the wave's own side first, in the value at face i; polynomials of `degree`
+    """
+    inside = np.append(weights, 0.0) - np.append(0.0, weights)
+    unit = np.eye(6)
+    beyond = np.pad(END_ENTERING[degree], ((0, 0), (0, 1)))
+    near = [*beyond[::-1], *unit[1:]]  # cells -3 .. 4 from where a wave enters, in datum and cells 0 .. 4
+    face = [unit[0], *(sum(w * near[j + m] for m, w in enumerate(weights)) for j in range(1, 4))]
+    enter = np.array([face[j] - face[j + 1] for j in range(3)])
+    near = [*END_LEAVING[degree][::-1], *unit[:5, :5]]  # the same from where it leaves
+    face = [END_VALUE[degree], *(sum(w * near[j + 5 - m] for m, w in enumerate(weights)) for j in range(1, 3))]
+    leave = np.array([face[j + 1] - face[j] for j in range(2)])
+    return inside, enter, leave
+
+
 @njit
 def edge_cells(c, right, edge):
     """The five cells nearest to the left (0) or right (1) end, nearest first; the last one repeated if fewer."""

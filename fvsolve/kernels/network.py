@@ -13,6 +13,7 @@ from fvsolve.kernels.pipes import family_of, pipe_rates
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
+    I_ARMED,
     I_COLUMNS,
     I_LAYOUT,
     I_NODES,
@@ -89,7 +90,7 @@ def net_flows(out, tables):
 @njit(forceinline=True)
 def stored_rates(y, dydt, out, tables):
     """d/dt of stored masses; what reservoirs give, tanks spill, and dry tanks are asked for goes to supply."""
-    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
+    layout, nodes, armed = tables[I_LAYOUT][0], tables[I_NODES], tables[I_ARMED]
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
         if kind == JUNCTION:
@@ -98,8 +99,8 @@ def stored_rates(y, dydt, out, tables):
         if kind == FIXED:
             supply = -net
         elif kind == TANK:
-            stored = nodes[i]["mass"] + y[nodes[i]["y"]]
-            if (stored >= nodes[i]["full"] and net > 0.0) or (stored <= 0.0 and net < 0.0):
+            k = 2 * nodes[i]["row"]  # as `events` numbers them: empty, full
+            if (armed[k] > 0.0 and net < 0.0) or (armed[k + 1] > 0.0 and net > 0.0):
                 supply = -net
         if kind != FIXED:
             dydt[nodes[i]["y"]] = net + supply
@@ -137,14 +138,21 @@ def greatest_rate(t, out, tables):
         i, j = valve["from_node"], valve["to_node"]
         stiff = nodes[i]["stiffness"] + nodes[j]["stiffness"]
         if stiff > 0.0:
+            g = valve_conductance(tables, k, t)
             drop = valve["drop"] + (out[layout["pressure"] + i] - out[layout["pressure"] + j])
-            slope = flow_slope(valve_conductance(tables, k, t), valve["transition"], drop)
+            slope = flow_slope(g, valve["transition"], drop)
             soft = 0.0
             if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
                 soft += 1.0 / nodes[i]["admittance"]
             if nodes[j]["kind"] == JUNCTION and nodes[j]["admittance"] > 0.0:
                 soft += 1.0 / nodes[j]["admittance"]
             rate = max(rate, stiff * slope / (1.0 + soft * slope))
+            if valve["transition"] > 0.0 and g > 0.0:
+                change = nodes[i]["stiffness"] * out[layout["net"] + i]
+                change -= nodes[j]["stiffness"] * out[layout["net"] + j]
+                width = valve["transition"] * valve["transition"] / g
+                if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
+                    rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
     return rate
 
 

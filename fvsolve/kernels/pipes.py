@@ -64,42 +64,72 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 
 
 @njit
-def rates_from_faces(k, flow, loss, base, r, l, fr, fl, dr, dl):
-    """dr, dl from face values; loss |M| M averaged by two Gauss points, fourth order and blind to no kink."""
-    half = 0.25 * loss
-    for i in range(r.size):
-        a = fr[i + 1] - fr[i]
-        b = fl[i + 1] - fl[i]
-        m = flow + (r[i] - l[i])
-        d = GAUSS * (a - b)
-        hi, lo = m + d, m - d
-        s = half * (abs(hi) * hi + abs(lo) * lo) - base
-        dr[i] = -k * a - s
-        dl[i] = k * b + s
-
-
-@njit
-def rates_from_faces_free(k, fr, fl, dr, dl):
-    """dr, dl from face values without friction."""
+def rates_from_faces(k, fr, fl, dr, dl):
+    """dr, dl from face values, without friction."""
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
 
 
 @njit
-def rates_from_faces_any(k, pipe, base, r, l, fr, fl, dr, dl):
-    """dr, dl from face values with a friction law that follows the flow."""
-    kind, loss, rough = pipe["friction"], pipe["loss"], pipe["rough"]
-    e, reynolds, flow = pipe["roughness"], pipe["reynolds"], pipe["flow"]
+def weigh(e0, e1, e2, e3, e4, e5, c, d):
+    """d[i] = sum of e_k c[i+k], in pairs from outside in: the mirror image has the same bits."""
+    c1, c2, c3, c4, c5 = c[1:], c[2:], c[3:], c[4:], c[5:]
+    for i in range(d.size):
+        d[i] = (e0 * c[i] + e5 * c5[i]) + ((e1 * c1[i] + e4 * c4[i]) + (e2 * c2[i] + e3 * c3[i]))
+
+
+@njit
+def rates_linear(settings, k, backward, c, datum, edge, d):
+    """k (F[i] - F[i+1]) along one wave by a linear scheme, from five cells up: weights of cells, no faces."""
+    n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
+    e0, e1, e2, e3, e4, e5 = k * inside[0], k * inside[1], k * inside[2], k * inside[3], k * inside[4], k * inside[5]
+    if backward == 1:
+        weigh(e5, e4, e3, e2, e1, e0, c, d[2 : n - 3])
+    else:
+        weigh(e0, e1, e2, e3, e4, e5, c, d[3 : n - 2])
+    edge_cells(c, backward, edge)
+    for j in range(3):
+        total = enter[j, 0] * datum
+        for m in range(5):
+            total += enter[j, m + 1] * edge[m]
+        d[n - 1 - j if backward == 1 else j] = k * total
+    edge_cells(c, 1 - backward, edge)
+    for j in range(2):
+        total = 0.0
+        for m in range(5):
+            total += leave[j, m] * edge[m]
+        d[j if backward == 1 else n - 1 - j] = k * total
+
+
+@njit
+def rub(k, flow, loss, base, r, l, dr, dl):
+    """Take loss |M| M - drag off rates that hold -k and k times the differences of face values.
+
+    Averaged by two Gauss points of a cell: fourth order and blind to no kink.
+    """
+    half, lean = 0.25 * loss, GAUSS / k
     for i in range(r.size):
-        a = fr[i + 1] - fr[i]
-        b = fl[i + 1] - fl[i]
         m = flow + (r[i] - l[i])
-        d = GAUSS * (a - b)
+        d = lean * (dr[i] + dl[i])
+        hi, lo = m + d, m - d
+        s = half * (abs(hi) * hi + abs(lo) * lo) - base
+        dr[i] -= s
+        dl[i] += s
+
+
+@njit
+def rub_any(k, pipe, base, r, l, dr, dl):
+    """`rub` with a friction law that follows the flow."""
+    kind, loss, rough = pipe["friction"], pipe["loss"], pipe["rough"]
+    e, reynolds, flow, lean = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
+    for i in range(r.size):
+        m = flow + (r[i] - l[i])
+        d = lean * (dr[i] + dl[i])
         both = drag(kind, loss, rough, e, reynolds, m + d) + drag(kind, loss, rough, e, reynolds, m - d)
         s = 0.25 * both - base
-        dr[i] = -k * a - s
-        dl[i] = k * b + s
+        dr[i] -= s
+        dl[i] += s
 
 
 @njit
@@ -133,11 +163,14 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
     if settings["scheme"] == UPWIND and plain:
         rates_upwind(k, pipe["flow"], pipe["loss"], base, r, l, r_in, l_in, dr, dl)
         return
-    fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
-    both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)
-    if not plain:
-        rates_from_faces_any(k, pipe, base, r, l, fr, fl, dr, dl)
-    elif pipe["loss"] == 0.0:
-        rates_from_faces_free(k, fr, fl, dr, dl)
+    if settings["scheme"] == LINEAR and n >= 5:
+        rates_linear(settings, k, 0, r, r_in, scratch[:5], dr)
+        rates_linear(settings, k, 1, l, l_in, scratch[:5], dl)
     else:
-        rates_from_faces(k, pipe["flow"], pipe["loss"], base, r, l, fr, fl, dr, dl)
+        fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
+        both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)
+        rates_from_faces(k, fr, fl, dr, dl)
+    if not plain:
+        rub_any(k, pipe, base, r, l, dr, dl)
+    elif pipe["loss"] != 0.0:
+        rub(k, pipe["flow"], pipe["loss"], base, r, l, dr, dl)

@@ -30,6 +30,9 @@ SETTINGS = np.dtype(
         ("w3", "f8"),
         ("w4", "f8"),
         ("w5", "f8"),
+        ("inside", "f8", (6,)),  # linear schemes: weights of cells i-3 .. i+2 in the difference F[i] - F[i+1], and
+        ("enter", "f8", (3, 6)),  # of the datum and five cells in the three cells next to where a wave enters,
+        ("leave", "f8", (2, 5)),  # of five cells in the two next to where it leaves; nearest first
         ("rho", "f8"),  # reference density [kg/m3]
         ("viscosity", "f8"),  # dynamic [Pa s]
         ("ambient", "f8"),  # ambient pressure [Pa]
@@ -202,7 +205,7 @@ RECORDS = {
     "schedules": SCHEDULE,
     "probes": PROBE,
 }
-ARRAYS = ("integers", "floats", "profile", "scratch", "marks")  # int64[:], then float64[:]
+ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
 TABLES = (*RECORDS, *ARRAYS, *MATRICES)
 (
@@ -220,6 +223,7 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_PROFILE,
     I_SCRATCH,
     I_MARKS,
+    I_ARMED,
     I_PIECES,
     I_ENVELOPE,
     I_EXTREMES,

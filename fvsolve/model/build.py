@@ -41,7 +41,7 @@ class Scene:
         self.node_index = {name: i for i, name in enumerate(case.nodes)}
         self.faults: list[Fault] = []
         self.warnings: list[str] = []
-        self.size = 0
+        self.size = self.tanks = 0
         self.state_names: list[str] = []
         self.scale: list[float] = []
 
@@ -108,6 +108,8 @@ class Scene:
         if node.height is not None:
             row["full"] = rho * contents(node.height)
         row["stiffness"] = self.case.gravity / row["area"]
+        row["row"] = self.tanks
+        self.tanks += 1
         row["y"] = self.states([f"{name}.mass"], 0.1 * rho * row["area"])
 
     def node_chamber(self, name, node, row) -> None:
@@ -297,7 +299,8 @@ class Scene:
         self.tables = (
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float),
-            profile, np.zeros(max(2 * most + 64, system)), marks, pieces, envelope, extremes,
+            profile, np.zeros(max(2 * most + 64, system)), marks, np.zeros(2 * self.tanks), pieces,
+            envelope, extremes,
         )  # fmt: skip
 
     def pack_table(self, s) -> None:

@@ -105,6 +105,9 @@ class Model:
         """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
         self.tables[rec.I_SETTINGS][0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
+        armed = self.tables[rec.I_ARMED]
+        self.functions()[3](float(t), np.ascontiguousarray(y, dtype=np.float64), self.handle, armed)
+        armed[:] = armed <= 0.0
         self.functions()[0](float(t), np.ascontiguousarray(y, dtype=np.float64), dydt, out, self.handle)
         return dydt, out
 

@@ -1,6 +1,7 @@
 """Schemes as data: the family that computes them and, for linear ones, their weights. Knows no fields."""
 
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.ends import difference_rows
 
 # Value at the face after cell u from cells u-2 .. u+2, and the degree of polynomial it is exact for.
 LINEAR = {
@@ -27,5 +28,7 @@ def scheme_settings(settings, scheme: str, limiter: str) -> None:
         settings["scheme"] = rec.LINEAR
         for k, weight in enumerate(weights):
             settings[f"w{k}"] = weight
+        rows = difference_rows(weights, settings["degree"])
+        settings["inside"], settings["enter"], settings["leave"] = rows
     else:
         settings["scheme"], settings["degree"] = FAMILIES[scheme]

@@ -152,6 +152,20 @@ def all_finite(y):
     return bad == 0
 
 
+@njit
+def arm(g, armed):
+    """Note which event functions are at or below zero, where the rhs follows another rule; whether any changed.
+
+    Only accepted states are asked, so no step, not even its stages beyond an event, meets the change of rule.
+    """
+    changed = False
+    for i in range(g.size):
+        now = 1.0 if g[i] <= 0.0 else 0.0
+        changed = changed or now != armed[i]
+        armed[i] = now
+    return changed
+
+
 @njit(forceinline=True)
 def fallen(g, g_new):
     """Whether an event function went from above to zero or below."""
@@ -253,8 +267,8 @@ def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k,
 def run_erk(
     rhs, observe, record, events, handle,
     a, b, c, error, dense, order, last_is_new,
-    orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, y_out,
-    rates, rows,
+    orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
+    y_out, rates, rows,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -266,6 +280,9 @@ def run_erk(
         now, old = flags[NOW], flags[OLD]
         new = 3 - now - old
         if flags[PHASE] == FRESH:
+            events(memory[T], y[now], handle, g)
+            if arm(g, armed):
+                reuse = False
             if reuse:
                 copy(k[s - 1], k[0])
             else:
@@ -274,7 +291,6 @@ def run_erk(
             reuse = False
             flags[PHASE] = EMIT
             record(memory[T], y[now], out, handle, values)
-            events(memory[T], y[now], handle, g)
             if not all_finite(y[now]) or not isfinite(out[RATE]):
                 return BAD_VALUE
             if out[STATUS] != 0.0:
@@ -359,7 +375,7 @@ def compiled():
     f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
     run_erk.compile(
         (*function_types(), types.int64[::1], w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
-         i, v, v, v, v, v, v, v, v, v, w)
+         i, v, v, v, v, v, v, v, v, v, v, w)
     )  # fmt: skip
     run_erk.disable_compile()
     return run_erk

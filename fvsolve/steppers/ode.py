@@ -51,7 +51,7 @@ def integrate(
         code = loop(*functions, work["handle"], method.a, method.b, method.c, method.error, method.dense,
                     method.error_order + 1 if method.adaptive else method.order, method.first_same_as_last, orders,
                     memory, flags, y, work["k"], work["f_old"], work["supply"], 3, work["none"], np.full(n, share),
-                    work["out"], work["out_row"], work["none"], work["none"], work["none"], work["y_out"],
+                    work["out"], work["out_row"], work["none"], work["none"], work["none"], work["none"], work["y_out"],
                     work["rates"], work["rows"])  # fmt: skip
         if code != erk.DONE:
             raise FvsolveError(f"{method.name} stopped at t = {memory[erk.T]:.6g}: the solution is not finite or the "
