@@ -16,7 +16,7 @@ from fvsolve.kernels.density import (
     pressure_of_enthalpy,
     pressure_of_log,
 )
-from fvsolve.kernels.nodes import MOST, chord_slope, inner_row, solve_dense
+from fvsolve.kernels.nodes import BAR, LEAST, MOST, UNSETTLED, chord_slope, inner_row, settled, solve_dense
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
@@ -163,7 +163,7 @@ def valve_move(tables, out, k, g, x):
     else:
         rest = (target - valve["base"]) - (abs(flow + x) * (flow + x) - abs(flow) * flow)
     chord = abs(flow + x) + sqrt(abs(target))
-    chord = max(chord, 1e-6 * sqrt(slope))
+    chord = max(chord, LEAST * sqrt(slope))
     return rest / chord, slope / chord
 
 
@@ -232,22 +232,22 @@ def close_nodes_barotropic(t, y, out, tables):
             out[layout["supply"] + i] = -demand
             given[i] = out[layout["net"] + i] + nodes[i]["inflow"] - (demand - nodes[i]["demand"])
             out[layout["pressure"] + i] = 0.0
-            scale = max(scale, abs(demand))
+            scale = max(scale, abs(demand), BAR * nodes[i]["admittance"])
     for k in range(valves.size):
         g[k], x[k] = max(valve_conductance(tables, k, t), valves[k]["leak"]), 0.0
-        scale = max(scale, abs(valves[k]["flow"]))
+        scale = max(scale, abs(valves[k]["flow"]), sqrt(g[k]))
         if nodes[valves[k]["from_node"]]["kind"] != JUNCTION and nodes[valves[k]["to_node"]]["kind"] != JUNCTION:
             x[k] = valve_move(tables, out, k, g[k], 0.0)[0] if g[k] > 0.0 else -valves[k]["flow"]
-    moved = 0.0
-    for sweep in range(100):
+    moved = 1e300
+    for _ in range(100):
         ends_into_nodes(out, tables, slope)
         for i in range(nodes.size):
             scale = max(scale, abs(out[layout["net"] + i]))
-        moved = newton_sweep(out, tables, g, x, slope, given, work)
-        if moved <= 1e-14 * scale:
+        before, moved = moved, newton_sweep(out, tables, g, x, slope, given, work)
+        if settled(moved, before, scale):
             break
     ends_into_nodes(out, tables, slope)
-    if moved > 1e-8 * scale:
+    if moved > UNSETTLED * scale:
         out[STATUS] = NOT_CONVERGED
     for k in range(valves.size):
         if valves[k]["leak"] > 0.0 and g[k] == valves[k]["leak"]:

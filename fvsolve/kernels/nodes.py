@@ -36,6 +36,9 @@ from fvsolve.kernels.valves import (
     flow_change_laminar,
     valve_conductance,
 )
+LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+BAR = 1e5
+UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has not only met rounding
 MOST = 1e14  # a pressure drop that only a flow nobody can bring would need [Pa]
 
 
@@ -181,8 +184,14 @@ def valve_step(valve, g, x, change):
     else:
         rest = ((g - opened) * valve["drop"] + g * change) - (abs(flow + x) * (flow + x) - abs(flow) * flow)
     chord = abs(flow + x) + sqrt(abs(total))
-    chord = max(chord, 1e-6 * sqrt(g))  # the flow at a drop of 1e-12 Pa
+    chord = max(chord, LEAST * sqrt(g))
     return rest / chord, g / chord
+
+
+@njit(forceinline=True)
+def settled(moved, before, scale):
+    """Whether Newton's last change of flow is rounding: below 1e-14, or small and no longer falling."""
+    return moved <= 1e-14 * scale or (moved <= 1e-9 * scale and moved >= 0.5 * before)
 
 
 @njit(forceinline=True)
@@ -239,17 +248,18 @@ def close_cluster(t, out, tables, which):
     for e in range(m):
         k, x[e] = integers[cluster["first_valve"] + e], 0.0
         g[e] = max(valve_conductance(tables, k, t), valves[k]["leak"])
-        scale = max(scale, abs(valves[k]["flow"]))
+        scale = max(scale, abs(valves[k]["flow"]), sqrt(g[e]))
     for i in range(n):
         p[i] = 0.0
-        scale = max(scale, abs(out[layout["net"] + integers[cluster["first_node"] + i]]))
-    moved = 1.0
+        node = integers[cluster["first_node"] + i]
+        scale = max(scale, abs(out[layout["net"] + node]), BAR * nodes[node]["admittance"])
+    moved = 1e300
     for _ in range(100):
         assemble(cluster, tables, out, g, x, p, a, s, matrix, right)
         if not solve_dense(matrix, right, n):
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
             return
-        moved = 0.0
+        before, moved = moved, 0.0
         for i in range(n):
             p[i] += right[i]
         for e in range(m):
@@ -259,9 +269,9 @@ def close_cluster(t, out, tables, which):
             x[e] += step
             scale = max(scale, abs(x[e]))
             moved = max(moved, abs(step), abs(a[e]))
-        if moved <= 1e-14 * scale:
+        if settled(moved, before, scale):
             break
-    if moved > 1e-9 * scale:
+    if moved > UNSETTLED * scale:
         out[STATUS], out[WHERE] = NOT_CONVERGED, integers[cluster["first_node"]]
     for i in range(n):
         out[layout["pressure"] + integers[cluster["first_node"] + i]] = p[i]
