@@ -6,7 +6,7 @@ solution with the reference wave speed c), less the profile's.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import close_nodes_barotropic, drive
+from fvsolve.kernels.barotropic_nodes import close_nodes_barotropic, drive, waves_inside
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -16,7 +16,7 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import greatest_rate, net_flows, stored_rates, waves_out
+from fvsolve.kernels.network import greatest_rate, net_flows, stored_rates
 from fvsolve.kernels.nodes import column_inflows
 from fvsolve.kernels.observer import record_all
 from fvsolve.kernels.pipes import GAUSS, both_faces
@@ -115,7 +115,7 @@ def rhs_barotropic(t, y, dydt, out, handle):
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
     out[STATUS], out[WHERE] = OK, -1.0
-    waves_out(y, out, tables)
+    waves_inside(y, out, tables)
     net = layout["net"]
     for i in range(tables[I_NODES].size):
         out[net + i] = 0.0

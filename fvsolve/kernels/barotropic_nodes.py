@@ -1,7 +1,7 @@
 """Nodes under the laws log and table: stagnation enthalpy is conserved, flows carry the upstream density.
 
-A pipe end with outgoing wave w and mass per length m carries 2 w - c (m - m0) more into its node than the
-profile did; h(p_end) + v^2 / 2 = h(p_node), but a jet into a tank, chamber or reservoir loses its v^2 / 2.
+From what the cells say of a pipe end a simple wave leads to the end's own state, in which h(p_end) + v^2 / 2 =
+h(p_node); but a jet into a tank, chamber or reservoir loses its v^2 / 2. Knows ends and nodes; knows no cells.
 """
 
 from math import sqrt
@@ -12,10 +12,14 @@ from fvsolve.jit import njit
 from fvsolve.kernels.density import (
     density,
     enthalpy,
+    impedance,
     mass_of_pressure,
     pressure_of_enthalpy,
     pressure_of_log,
+    pressure_of_mass,
+    velocity_change,
 )
+from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.nodes import BAR, LEAST, MOST, UNSETTLED, chord_slope, inner_row, settled, solve_dense
 from fvsolve.kernels.records import (
     CHAMBER,
@@ -37,6 +41,7 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
+from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
 from fvsolve.kernels.valves import flow_at_drop, valve_conductance
@@ -69,57 +74,80 @@ def stored_pressures_barotropic(t, y, out, tables):
 
 
 @njit
-def end_flow(st, floats, pipe, m0, flow, wave, p_node, still):
-    """(flow into the node, its slope over p_node) of a pipe end, by Newton on the pressure at the end.
+def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
+    """(flow into the node, its slope over p_node, mass per length) of a pipe end, by Newton on its pressure.
 
-    flow : the profile's flow into the node [kg/s]; wave : outgoing; still : the node is a vessel at rest.
+    m_inside, into_inside : what the cells say of the end [kg/m, kg/s]; a simple wave leads from there to the
+    end's own state, v + integral of dp / (rho c) constant. still : the node is a vessel at rest.
     """
-    c = pipe["speed"]
+    p_inside = pressure_of_mass(st, floats, pipe, m_inside)
+    v_inside = into_inside / m_inside
     target = enthalpy(st, floats, p_node)
     p = p_node
     m, dm = mass_of_pressure(st, floats, pipe, p)
-    into = flow + 2.0 * wave - c * (m - m0)
-    if still and into >= 0.0:
-        return into, -c * dm
+    v = v_inside - velocity_change(st, floats, pipe, p_inside, p)
+    slope = v * dm - m / impedance(st, floats, pipe, p)
+    if still and v >= 0.0:
+        return m * v, slope, m
     rise = 1.0
     for _ in range(30):
-        v = into / m
-        rise = dm / (m * (dm / m)) / density(st, floats, p) - v * (c * dm + v * dm) / m
+        rise = 1.0 / density(st, floats, p) - v / impedance(st, floats, pipe, p)
         step = (enthalpy(st, floats, p) + 0.5 * v * v - target) / rise
         p -= step
         m, dm = mass_of_pressure(st, floats, pipe, p)
-        into = flow + 2.0 * wave - c * (m - m0)
+        v = v_inside - velocity_change(st, floats, pipe, p_inside, p)
         if abs(step) <= 1e-15 * abs(p) + 1e-12:
             break
-    return into, -c * dm / (rise * density(st, floats, p_node))
+    slope = v * dm - m / impedance(st, floats, pipe, p)
+    return m * v, slope / (rise * density(st, floats, p_node)), m
 
 
 @njit
-def ends_into_nodes(out, tables, slope):
-    """Change of flow from pipes into every node at the present pressures, in out[net], and its slope."""
+def ends_into_nodes(out, tables, slope, final):
+    """Change of flow from pipes into every node at the present pressures, in out[net], and its slope.
+
+    out[ends] holds what the cells say of both waves at each end; `final` puts the ends' own waves in their place.
+    """
     st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
     pipes, profile = tables[I_PIPES], tables[I_PROFILE]
     for i in range(nodes.size):
         out[layout["net"] + i], slope[i] = 0.0, 0.0
     for k in range(pipes.size):
         pipe = pipes[k]
-        at, first = layout["ends"] + 4 * k, pipe["face"]
+        c = pipe["speed"]
         for side in range(2):
+            at = layout["ends"] + 4 * k + 2 * side
             i = pipe["to_node"] if side == 1 else pipe["from_node"]
-            face = first + pipe["cells"] if side == 1 else first
-            sign = 1.0 if side == 1 else -1.0
-            wave = out[at + 2] if side == 1 else out[at + 1]
+            m0 = profile[pipe["face"] + pipe["cells"] * side]
+            sign = 2.0 * side - 1.0
             base = pipe["to_base"] if side == 1 else pipe["from_base"]
+            base_mass = pipe["to_mass"] if side == 1 else pipe["from_mass"]
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            still = nodes[i]["kind"] != JUNCTION
-            into, rise = end_flow(st, floats, pipe, profile[face], sign * pipe["flow"], wave, p, still)
+            inside = m0 + (out[at] + out[at + 1]) / c
+            flow = sign * (pipe["flow"] + (out[at] - out[at + 1]))
+            into, rise, m = end_flow(st, floats, pipe, inside, flow, p, nodes[i]["kind"] != JUNCTION)
             change = into - base
             out[layout["net"] + i] += change
             slope[i] += rise
-            if side == 1:
-                out[at + 3] = wave - change
-            else:
-                out[at] = wave - change
+            if final:
+                dm = c * (m - base_mass)
+                out[at] = 0.5 * (dm + sign * change)
+                out[at + 1] = 0.5 * (dm - sign * change)
+
+
+@njit
+def waves_inside(y, out, tables):
+    """What the cells say of both waves at both ends of every pipe, into out[ends]."""
+    st, layout, pipes, work = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES], tables[I_SCRATCH]
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        n, o = pipe["cells"], pipe["y"]
+        family = family_of(st, n)
+        for side in range(2):
+            for which in range(2):
+                wave = y[o + n * which : o + n * (which + 1)]
+                value = end_value(wave, side, family, st["degree"], st["limiter"], pipe["noise"], work)
+                out[layout["ends"] + 4 * i + 2 * side + which] = value
 
 
 @njit
@@ -240,13 +268,13 @@ def close_nodes_barotropic(t, y, out, tables):
             x[k] = valve_move(tables, out, k, g[k], 0.0)[0] if g[k] > 0.0 else -valves[k]["flow"]
     moved = 1e300
     for _ in range(100):
-        ends_into_nodes(out, tables, slope)
+        ends_into_nodes(out, tables, slope, False)
         for i in range(nodes.size):
             scale = max(scale, abs(out[layout["net"] + i]))
         before, moved = moved, newton_sweep(out, tables, g, x, slope, given, work)
         if settled(moved, before, scale):
             break
-    ends_into_nodes(out, tables, slope)
+    ends_into_nodes(out, tables, slope, True)
     if moved > UNSETTLED * scale:
         out[STATUS] = NOT_CONVERGED
     for k in range(valves.size):

@@ -113,6 +113,23 @@ def thrust(st, pipe, p):
 
 
 @njit
+def impedance(st, floats, pipe, p):
+    """rho c = sqrt(K rho) of a pipe at a pressure [kg/m2/s]."""
+    value, slope = log_density(st, floats, p)
+    return sqrt(st["rho"] * exp(value) / (slope + pipe["compliance"]))
+
+
+@njit
+def velocity_change(st, floats, pipe, p_from, p_to):
+    """Integral of dp / (rho c) [m/s]: what a simple wave takes off the velocity, by three Gauss points."""
+    middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
+    far = 0.7745966692414834 * half  # sqrt(3/5)
+    total = 8.0 / impedance(st, floats, pipe, middle)
+    total += 5.0 / impedance(st, floats, pipe, middle - far) + 5.0 / impedance(st, floats, pipe, middle + far)
+    return half * total / 9.0
+
+
+@njit
 def local_speed(st, floats, pipe, p):
     """Wave speed sqrt(K / rho), 1/K = d ln rho / dp + compliance [m/s]."""
     value, slope = log_density(st, floats, p)

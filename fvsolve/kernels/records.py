@@ -81,6 +81,8 @@ PIPE = np.dtype(
         ("center", "i8"),
         ("from_base", "f8"),  # laws log and table: flow into the node that the profile computes to
         ("to_base", "f8"),
+        ("from_mass", "f8"),  # and the mass per length at the end that it computes to [kg/m]
+        ("to_mass", "f8"),
     ],
     align=True,
 )

@@ -106,10 +106,11 @@ class BarotropicStart(Start):
             profile[row["center"] : row["center"] + n] = centers
             for side, m0, name, sign in ((0, faces[0], "from", -1.0), (1, faces[-1], "to", 1.0)):
                 i = int(row[f"{name}_node"])
-                into, _ = end_flow(self.st, self.floats, row, m0, sign * flow, 0.0,
-                                   float(self.nodes["pressure"][i]), bool(self.still(i)))  # fmt: skip
+                into, _, mass = end_flow(self.st, self.floats, row, m0, sign * flow,
+                                         float(self.nodes["pressure"][i]), bool(self.still(i)))  # fmt: skip
                 near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
                 row[f"{name}_base"] = into if near else sign * flow
+                row[f"{name}_mass"] = mass if near else m0
             row["to_offset"] = 0.0 if near else self.nodes["pressure"][i] - self.pressure_of_mass(row, faces[-1])
             boiling, _ = law.mass_of_pressure(self.st, self.floats, row, self.scene.fluid.vapor_pressure)
             profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
