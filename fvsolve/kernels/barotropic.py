@@ -110,7 +110,10 @@ def column_rates_barotropic(dydt, out, tables):
 
 @njit
 def rhs_barotropic(t, y, dydt, out, handle):
-    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch."""
+    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch.
+
+    An empty dydt asks for `out` alone, without what the pipes add to its rate.
+    """
     tables = open_tables(handle)
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
@@ -123,8 +126,10 @@ def rhs_barotropic(t, y, dydt, out, handle):
     close_nodes_barotropic(t, y, out, tables)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
+    out[RATE] = rate = greatest_rate(t, out, tables)
+    if dydt.size == 0:
+        return
     column_rates_barotropic(dydt, out, tables)
-    rate = greatest_rate(t, out, tables)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         own = pipe_rates_barotropic(

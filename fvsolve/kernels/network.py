@@ -102,7 +102,7 @@ def stored_rates(y, dydt, out, tables):
             k = 2 * nodes[i]["row"]  # as `events` numbers them: empty, full
             if (armed[k] > 0.0 and net < 0.0) or (armed[k + 1] > 0.0 and net > 0.0):
                 supply = -net
-        if kind != FIXED:
+        if kind != FIXED and dydt.size > 0:
             dydt[nodes[i]["y"]] = net + supply
         out[layout["supply"] + i] = supply
 
@@ -158,7 +158,7 @@ def greatest_rate(t, out, tables):
 
 @njit
 def rhs_linear(t, y, dydt, out, handle):
-    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch."""
+    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch. An empty dydt asks for `out` alone."""
     tables = open_tables(handle)
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     out[STATUS], out[WHERE] = OK, -1.0
@@ -167,6 +167,9 @@ def rhs_linear(t, y, dydt, out, handle):
     waves_in(out, tables)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
+    out[RATE] = greatest_rate(t, out, tables)
+    if dydt.size == 0:
+        return
     column_rates(y, dydt, out, tables)
     for i in range(pipes.size):
         pipe = pipes[i]
@@ -184,4 +187,3 @@ def rhs_linear(t, y, dydt, out, handle):
             dydt[o : o + n],
             dydt[o + n : o + 2 * n],
         )
-    out[RATE] = greatest_rate(t, out, tables)

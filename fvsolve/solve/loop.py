@@ -28,7 +28,7 @@ class Loop:
         self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(ledgers)
         self.out, self.out_row, self.values = model.new_out(), model.new_out(), np.zeros(probes)
         self.g, self.g_new = np.zeros(2 * tanks), np.zeros(2 * tanks)
-        self.y_out, self.rates = np.zeros(n), np.zeros(n)
+        self.y_out = np.zeros(n)
         self.rows = np.zeros((ROW_CAPACITY, 1 + probes))
         self.memory, self.orders = np.zeros(erk.MEMORY), np.zeros(erk.ORDERS)
         self.flags = np.array([erk.FRESH, 0, 0, 1, 0], dtype=np.int64)
@@ -68,8 +68,7 @@ class Loop:
             max(m.error_order + 1, 1) if m.adaptive else m.order, m.first_same_as_last, self.orders, self.memory,
             self.flags, self.y, self.k, self.f_old, self.supply, int(self.model.layout["ledger"]), self.ledger,
             self.model.scale, self.out, self.out_row, self.values, self.g, self.g_new,
-            self.model.tables[rec.I_ARMED], self.y_out, self.rates,
-            self.rows,
+            self.model.tables[rec.I_ARMED], self.y_out, self.rows,
         )  # fmt: skip
 
     def take_rows(self) -> np.ndarray:

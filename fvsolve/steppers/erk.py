@@ -240,7 +240,7 @@ def next_due(orders, memory):
 
 
 @njit
-def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k, dense, rates, out, y_out, rows):
+def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k, dense, out, y_out, rows):
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
     while True:
@@ -252,7 +252,7 @@ def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k,
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
         interpolate((due - t_old) / h, h, y_old, f_old, y, k[0], k, dense, y_out)
-        rhs(due, y_out, rates, out, handle)
+        rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
             observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
@@ -268,10 +268,11 @@ def run_erk(
     rhs, observe, record, events, handle,
     a, b, c, error, dense, order, last_is_new,
     orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
-    y_out, rates, rows,
+    y_out, rows,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
+    rhs(t, y, dydt, out, handle) with an empty dydt computes `out` alone, which is all that a row wants;
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[m] advanced with the step's own weights from out[where:]; rows : float64[cap, 1 + probes].
     """
@@ -301,7 +302,7 @@ def run_erk(
             if flags[BEHIND] == 1 and next_due(orders, memory) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, orders, memory, flags, memory[T] - memory[LAST], y[old], f_old, y[now],
-                    k, dense, rates, out_row, y_out, rows,
+                    k, dense, out_row, y_out, rows,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -359,7 +360,8 @@ def run_erk(
         memory[LAST] = memory[T] - t_old
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
-        copy(k[0], f_old)
+        if next_due(orders, memory) <= memory[T]:
+            copy(k[0], f_old)
         reuse = last_is_new and orders[CONTROL] == TOLERANCE and not last
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, FRESH
     return DONE
@@ -375,7 +377,7 @@ def compiled():
     f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
     run_erk.compile(
         (*function_types(), types.int64[::1], w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
-         i, v, v, v, v, v, v, v, v, v, v, w)
+         i, v, v, v, v, v, v, v, v, v, w)
     )  # fmt: skip
     run_erk.disable_compile()
     return run_erk

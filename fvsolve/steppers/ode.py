@@ -52,7 +52,7 @@ def integrate(
                     method.error_order + 1 if method.adaptive else method.order, method.first_same_as_last, orders,
                     memory, flags, y, work["k"], work["f_old"], work["supply"], 3, work["none"], np.full(n, share),
                     work["out"], work["out_row"], work["none"], work["none"], work["none"], work["none"], work["y_out"],
-                    work["rates"], work["rows"])  # fmt: skip
+                    work["rows"])  # fmt: skip
         if code != erk.DONE:
             raise FvsolveError(f"{method.name} stopped at t = {memory[erk.T]:.6g}: the solution is not finite or the "
                                "step shrank to nothing; try a smaller step or a larger rtol")  # fmt: skip
@@ -77,7 +77,7 @@ def _check(method, t, rtol, step) -> None:
 
 
 def _work(method, n, s):
-    sizes = {"f_old": n, "y_out": n, "rates": n, "out": 4, "out_row": 4, "none": 0}
+    sizes = {"f_old": n, "y_out": n, "out": 4, "out_row": 4, "none": 0}
     work = {name: np.zeros(size) for name, size in sizes.items()}
     return work | {"k": np.zeros((s, n)), "supply": np.zeros((s, 0)), "rows": np.zeros((1, 1)),
                    "handle": np.zeros(1, dtype=np.int64)}  # fmt: skip
