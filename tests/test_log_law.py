@@ -140,12 +140,15 @@ def test_a_stopped_stream_rises_by_the_exact_shock(mach):
 
 @pytest.mark.parametrize("mach", [0.02, 0.05])
 def test_the_gate_feels_the_whole_shock_from_the_first_instant_and_no_more(mach):
-    """Row and extremes: a node closes by its own law, not by the linear one (off by 3 v / 4 c)."""
+    """Row and extremes: a node closes by its own law, not by the linear one (off by 3 v / 4 c).
+
+    The first instant is exact; while the shock then forms over ten cells, every scheme swings by 0.22 v / c.
+    """
     result = stopped_run(mach * C, "log", 200, "muscl")
     p, u = result["main.pressure@0.5"][0], result["main.velocity@0.5"][0]
     rise = LogFluid(1000.0, 1e5, 3 * AMBIENT).stopped(p, u) - p
-    assert result["gate.pressure"][0] - p == pytest.approx(rise, rel=0.1 * mach)
-    assert result.extremes["gate.pressure"][2] - p == pytest.approx(rise, rel=0.1 * mach)
+    assert result["gate.pressure"][0] - p == pytest.approx(rise, rel=0.02 * mach)
+    assert result.extremes["gate.pressure"][2] - p == pytest.approx(rise, rel=0.25 * mach)
 
 
 def test_the_distance_of_linear_to_log_is_of_the_order_of_the_mach_number():
@@ -165,6 +168,17 @@ def test_linear_is_classical_water_hammer_at_any_velocity():
     for mach in (0.01, 0.1):
         (p, _), found = stopped(mach * C, "linear")
         assert found.mean() - p == pytest.approx(1000.0 * C * mach * C, rel=1e-6)
+
+
+def test_a_stream_leaves_the_lake_with_the_lake_s_stagnation_enthalpy():
+    """`h = -(beta / rho_0) exp(-(p - p_0) / beta)`, so that dh = dp / rho; nothing is lost on the way in."""
+    result = stopped_run(0.1 * C, "log", 50, "muscl")
+    p, u = result["main.pressure@0.5"][0], result["main.velocity@0.5"][0]
+
+    def enthalpy(q: float) -> float:
+        return -100.0 * np.exp(-(q - 3 * AMBIENT) / 1e5)
+
+    assert enthalpy(p) + u**2 / 2 == pytest.approx(enthalpy(3 * AMBIENT), abs=1e-9 * u**2)
 
 
 def simple_wave_error(cells: int, scheme: str, height: float = 2.0) -> float:

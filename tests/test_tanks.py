@@ -76,8 +76,9 @@ def test_two_tanks_level_in_finite_time_and_rest(levels, numerics, near):
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-@pytest.mark.parametrize("numerics, near", SETTINGS, ids=["tight", "default", "fixed step"])
-def test_levelled_tanks_stay_within_the_laminar_width_and_do_not_chatter(numerics, near):
+@pytest.mark.parametrize("numerics", [CLOSE, {}], ids=["tight", "default"])
+def test_levelled_tanks_stay_within_the_laminar_width_and_do_not_chatter(numerics):
+    """A fixed explicit step cannot promise this: it is longer than that width is stable for."""
     nodes = {"one": tank(2.0, 1.5), "two": tank(3.0, 1.0), "air": reservoir(AMBIENT)}
     links = {"gap": valve("one", "two", 0.02), "shut": valve("two", "air", 0.01, 0.0)}
     end = 2 * math.sqrt(0.5) / (0.02 * math.sqrt(2 * GRAVITY) * (1 / 2.0 + 1 / 3.0)) + 60.0
