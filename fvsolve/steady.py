@@ -121,8 +121,7 @@ def _references(held, demand, edges, parts, free_sets):
     waiting = list(free_sets)
     while waiting:
         for group in waiting:
-            entry = next((e for e, edge in enumerate(edges) if edge.row is None and edge.drop is not None and
-                          ((edge.i in group and edge.j in known) or (edge.j in group and edge.i in known))), None)  # fmt: skip
+            entry = next((e for e, edge in enumerate(edges) if _enters(edge, group, known)), None)
             if entry is not None:
                 kept[entry] = group
                 dropped.add(_dead_end(group, demand, edges))
@@ -132,6 +131,13 @@ def _references(held, demand, edges, parts, free_sets):
         else:
             break
     return dropped, kept
+
+
+def _enters(edge, group, known) -> bool:
+    """Whether an edge with a held flow leads from a known potential into a set."""
+    if edge.row is not None or edge.drop is None:
+        return False
+    return (edge.i in group and edge.j in known) or (edge.j in group and edge.i in known)
 
 
 def _dead_end(group, demand, edges):

@@ -95,7 +95,12 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 @njit
 def column_rates_barotropic(dydt, out, tables):
     """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
-    st, layout, nodes, columns = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS]
+    st, layout, nodes, columns = (
+        tables[I_SETTINGS][0],
+        tables[I_LAYOUT][0],
+        tables[I_NODES],
+        tables[I_COLUMNS],
+    )
     for k in range(columns.size):
         col = columns[k]
         i, j = col["from_node"], col["to_node"]

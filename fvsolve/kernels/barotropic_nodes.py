@@ -21,6 +21,7 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.nodes import BAR, LEAST, MOST, UNSETTLED, chord_slope, inner_row, settled, solve_dense
+from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
@@ -41,7 +42,6 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
-from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
 from fvsolve.kernels.valves import flow_at_drop, valve_conductance

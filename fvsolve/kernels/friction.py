@@ -62,5 +62,3 @@ def drag_slope(kind, loss, rough, roughness, reynolds, flow):
     elif kind == FRICTION_HAZEN:
         slope += 1.852 * rough * size**0.852
     return slope
-
-

@@ -36,6 +36,7 @@ from fvsolve.kernels.valves import (
     flow_change_laminar,
     valve_conductance,
 )
+
 LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
 BAR = 1e5
 UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has not only met rounding
@@ -112,9 +113,7 @@ def close_single(t, out, tables):
         g = valve_conductance(tables, k, t)
         if valve["transition"] > 0.0:
             base = flow_at_drop(valve["open"], valve["transition"], valve["drop"]) - valve["flow"]
-            x = flow_change_laminar(
-                g, valve["transition"], zi + zj, valve["flow"], base, valve["drop"] + (pi - pj)
-            )
+            x = flow_change_laminar(g, valve["transition"], zi + zj, valve["flow"], base, valve["drop"] + (pi - pj))
         else:
             surplus = (g - valve["open"]) * valve["drop"] + g * (pi - pj)
             x = flow_change(g, zi + zj, valve["flow"], surplus, g * (valve["drop"] + (pi - pj)))

@@ -11,7 +11,13 @@ import numpy as np
 # Codes of kinds, as the kernels see them.
 FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
-UPWIND, LINEAR, MUSCL, WENO5, SHORT = 0, 1, 2, 3, 4  # scheme families; LINEAR ones are six weights, SHORT upwind3
+UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
+    0,
+    1,
+    2,
+    3,
+    4,
+)  # scheme families; LINEAR ones are six weights, SHORT upwind3
 MINMOD, VAN_LEER, MONOTONIZED_CENTRAL = 0, 1, 2
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE = 0, 1, 2
@@ -30,8 +36,16 @@ SETTINGS = np.dtype(
         ("w3", "f8"),
         ("w4", "f8"),
         ("w5", "f8"),
-        ("inside", "f8", (6,)),  # linear schemes: weights of cells i-3 .. i+2 in the difference F[i] - F[i+1], and
-        ("enter", "f8", (3, 6)),  # of the datum and five cells in the three cells next to where a wave enters,
+        (
+            "inside",
+            "f8",
+            (6,),
+        ),  # linear schemes: weights of cells i-3 .. i+2 in the difference F[i] - F[i+1], and
+        (
+            "enter",
+            "f8",
+            (3, 6),
+        ),  # of the datum and five cells in the three cells next to where a wave enters,
         ("leave", "f8", (2, 5)),  # of five cells in the two next to where it leaves; nearest first
         ("rho", "f8"),  # reference density [kg/m3]
         ("viscosity", "f8"),  # dynamic [Pa s]
@@ -76,7 +90,10 @@ PIPE = np.dtype(
         ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
         ("slope", "f8"),  # rise per length
-        ("face", "i8"),  # offsets in `profile`: mass per length at faces, momentum flux there, mass at centres
+        (
+            "face",
+            "i8",
+        ),  # offsets in `profile`: mass per length at faces, momentum flux there, mass at centres
         ("flux", "i8"),
         ("center", "i8"),
         ("from_base", "f8"),  # laws log and table: flow into the node that the profile computes to
@@ -103,7 +120,10 @@ NODE = np.dtype(
         ("level", "f8"),  # tank, of the profile [m]
         ("mass", "f8"),  # stored in the profile [kg]
         ("full", "f8"),  # stored mass above which a tank spills [kg]
-        ("shape", "i8"),  # offset of a shaped tank's table in `floats` (levels, areas, volumes); -1 for a prism
+        (
+            "shape",
+            "i8",
+        ),  # offset of a shaped tank's table in `floats` (levels, areas, volumes); -1 for a prism
         ("shapes", "i8"),  # rows of that table
         ("volume", "f8"),  # chamber [m3]
         ("row", "i8"),  # row in its cluster
@@ -123,13 +143,19 @@ VALVE = np.dtype(
         ("table_size", "i8"),
         ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
         ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
-        ("transition", "f8"),  # mass flow below which the law is laminar [kg/s]; 0 where pipes soften the root
+        (
+            "transition",
+            "f8",
+        ),  # mass flow below which the law is laminar [kg/s]; 0 where pipes soften the root
         ("open", "f8"),  # conductance of the profile
         ("flow", "f8"),  # of the profile [kg/s]
         ("drop", "f8"),  # of the profile [Pa]
         ("base", "f8"),  # laws log and table: M |M| or flow that the profile asks for
         ("leak_flow", "f8"),
-        ("leak", "f8"),  # conductance when shut beside a node with no other hold, else 0; its flow counts as 0
+        (
+            "leak",
+            "f8",
+        ),  # conductance when shut beside a node with no other hold, else 0; its flow counts as 0
     ],
     align=True,
 )
@@ -158,9 +184,7 @@ SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
 # Piece: start, kind (0 polynomial in t - origin, 1 power), origin, then a, b, c, d or v0, v1, duration, exponent
 PIECE_COLUMNS = 7
 
-CLUSTER_RECORD = np.dtype(
-    [("first_node", "i8"), ("nodes", "i8"), ("first_valve", "i8"), ("valves", "i8")], align=True
-)
+CLUSTER_RECORD = np.dtype([("first_node", "i8"), ("nodes", "i8"), ("first_valve", "i8"), ("valves", "i8")], align=True)
 
 LAYOUT = np.dtype(
     [
@@ -240,4 +264,3 @@ def tables_type():
     records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
     flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
     return types.Tuple((*records, *flats, *[types.Array(types.float64, 2, "C") for _ in MATRICES]))
-

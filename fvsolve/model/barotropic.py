@@ -7,9 +7,7 @@ import numpy as np
 from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, valve_target
-from fvsolve.kernels.friction import drag
 from fvsolve.kernels.schedules import schedule_value
-from fvsolve.kernels.valves import flow_at_drop
 from fvsolve.model.start import PRESSURE_SCALE, Start
 
 
@@ -104,7 +102,7 @@ class BarotropicStart(Start):
             n = mesh.cells
             profile[row["face"] : row["face"] + n + 1] = faces
             profile[row["center"] : row["center"] + n] = centers
-            for side, m0, name, sign in ((0, faces[0], "from", -1.0), (1, faces[-1], "to", 1.0)):
+            for m0, name, sign in ((faces[0], "from", -1.0), (faces[-1], "to", 1.0)):
                 i = int(row[f"{name}_node"])
                 into, _, mass = end_flow(self.st, self.floats, row, m0, sign * flow,
                                          float(self.nodes["pressure"][i]), bool(self.still(i)))  # fmt: skip
@@ -136,7 +134,10 @@ class BarotropicStart(Start):
         row, mesh = self.pipes[k], self.scene.meshes[k]
         profile, n = self.scene.tables[rec.I_PROFILE], mesh.cells
         both = np.empty(2 * n + 1)
-        both[0::2], both[1::2] = profile[row["face"] : row["face"] + n + 1], profile[row["center"] : row["center"] + n]
+        both[0::2], both[1::2] = (
+            profile[row["face"] : row["face"] + n + 1],
+            profile[row["center"] : row["center"] + n],
+        )
         return float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), both))
 
     def fill_columns(self) -> None:

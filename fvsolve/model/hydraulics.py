@@ -57,7 +57,10 @@ class Hydraulics:
             row["friction"] = rec.FRICTION_FACTOR
             row["loss"] += per_factor * law.factor
         elif not self.fluid.viscosity:
-            fault(f"links.{name}.friction", "roughness needs the fluid's viscosity; give fluid.viscosity, or a factor")
+            fault(
+                f"links.{name}.friction",
+                "roughness needs the fluid's viscosity; give fluid.viscosity, or a factor",
+            )
         else:
             row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
             row["roughness"] = law.roughness / link.diameter

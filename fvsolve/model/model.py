@@ -190,7 +190,10 @@ class Model:
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
-            found["nodes"][name] = {"pressure": pressure, "head": float(self.head(pressure, self.elevation[name]))}
+            found["nodes"][name] = {
+                "pressure": pressure,
+                "head": float(self.head(pressure, self.elevation[name])),
+            }
         return found
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:

@@ -47,7 +47,11 @@ class Start:
         self.t = self.case.numerics.start
         scene.tables[rec.I_SETTINGS][0]["limit"] = self.t
         self.weight = scene.fluid.density * self.case.gravity
-        sizes = [1e-9, *(scene.fluid.density * self.pipes["area"]), *(scene.fluid.density * self.columns["area"])]
+        sizes = [
+            1e-9,
+            *(scene.fluid.density * self.pipes["area"]),
+            *(scene.fluid.density * self.columns["area"]),
+        ]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         self.extra: dict[str, float] = {}  # drop beside the law's [Pa], of laws with a changing density
@@ -148,17 +152,25 @@ class Start:
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
 
     def report_faults(self, held) -> None:
+        """What no steady state can meet, each by its name."""
         names = list(self.case.nodes)
         for i in self.answer.no_solution:
-            self.scene.fault(f"nodes.{names[i]}", f"no steady state: {self.demand[i] / self.scene.fluid.density:.4g} "
-                             "m3/s are drawn here but every way to it is shut; open a valve, or use initial = \"rest\"")  # fmt: skip
+            drawn = self.demand[i] / self.scene.fluid.density
+            self.scene.fault(
+                f"nodes.{names[i]}",
+                f"no steady state: {drawn:.4g} m3/s are drawn here but every way to it is shut; "
+                'open a valve, or use initial = "rest"',
+            )
         for name, row in zip(self.scene.pipe_names, self.pipes, strict=True):
-            i, j = int(row["from_node"]), int(row["to_node"])
+            ends = [int(row["from_node"]), int(row["to_node"])]
             free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
-            if free and not self.rest and abs(held[i] - held[j]) > 1e-6 * PRESSURE_SCALE:
-                heads = [(held[k] - self.case.ambient_pressure) / self.weight for k in (i, j)]
-                self.scene.fault(f"links.{name}", f"no steady state: it has no friction, and heads of {heads[0]:.6g} m and "
-                                 f"{heads[1]:.6g} m at its ends; give it friction or initial_flow, or use initial = \"rest\"")  # fmt: skip
+            if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
+                a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
+                self.scene.fault(
+                    f"links.{name}",
+                    f"no steady state: it has no friction, and heads of {a:.6g} m and {b:.6g} m at its ends; "
+                    'give it friction or initial_flow, or use initial = "rest"',
+                )
         if not self.scene.faults and not self.answer.converged:
             self.scene.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
                              'and frictionless ways between unequal heads, or use "rest"')  # fmt: skip
@@ -231,7 +243,9 @@ class Start:
         for row, flow in zip(self.valves, self.valve_flow, strict=True):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
-            if flow == 0.0 and abs(row["drop"]) <= SNAP * (PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])):
+            if flow == 0.0 and abs(row["drop"]) <= SNAP * (
+                PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
+            ):
                 row["drop"] = 0.0
             law = flow_at_drop(row["open"], row["transition"], row["drop"])
             if abs(law - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):

@@ -49,8 +49,7 @@ class Run:
         self.segment, self.fresh = 0, state.memory.size == 0
         self.loop.now[:] = state.y
         self.loop.memory[erk.T] = state.t
-        for at, value in ((rec.I_EXTREMES, None), (rec.I_ENVELOPE, None)):
-            array = model.tables[at]
+        for array in (model.tables[rec.I_EXTREMES], model.tables[rec.I_ENVELOPE]):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         model.tables[rec.I_MARKS][:] = np.nan
         if not self.fresh:
@@ -203,7 +202,7 @@ class Run:
             return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
         if code == erk.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
-        return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve courant or step"
+        return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"
 
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop

@@ -4,59 +4,99 @@ from fvsolve.steppers.tableau import METHODS, tableau
 
 __all__ = ["METHODS"]
 
-tableau("euler", order=1, source="Euler 1768", text="""
+tableau(
+    "euler",
+    order=1,
+    source="Euler 1768",
+    text="""
     0 |
     --+--
       | 1
-""")
+""",
+)
 
-tableau("improved-euler", order=2, source="Egeland and Gravdahl 2002 (19)", text="""
+tableau(
+    "improved-euler",
+    order=2,
+    source="Egeland and Gravdahl 2002 (19)",
+    text="""
     0 |
     1 | 1
     --+---------
       | 1/2  1/2
-""")
+""",
+)
 
-tableau("modified-euler", order=2, source="Egeland and Gravdahl 2002 (20), explicit midpoint", text="""
+tableau(
+    "modified-euler",
+    order=2,
+    source="Egeland and Gravdahl 2002 (20), explicit midpoint",
+    text="""
     0   |
     1/2 | 1/2
     ----+--------
         | 0    1
-""")
+""",
+)
 
-tableau("heun", order=3, source="Heun 1900", text="""
+tableau(
+    "heun",
+    order=3,
+    source="Heun 1900",
+    text="""
     0   |
     1/3 | 1/3
     2/3 | 0    2/3
     ----+--------------
         | 1/4  0    3/4
-""")
+""",
+)
 
-tableau("rk4", order=4, source="Kutta 1901", text="""
+tableau(
+    "rk4",
+    order=4,
+    source="Kutta 1901",
+    text="""
     0   |
     1/2 | 1/2
     1/2 | 0    1/2
     1   | 0    0    1
     ----+-------------------
         | 1/6  1/3  1/3  1/6
-""")
+""",
+)
 
-tableau("ssp-rk2", order=2, source="Shu and Osher 1988", text="""
+tableau(
+    "ssp-rk2",
+    order=2,
+    source="Shu and Osher 1988",
+    text="""
     0 |
     1 | 1
     --+---------
       | 1/2  1/2
-""")
+""",
+)
 
-tableau("ssp-rk3", order=3, source="Shu and Osher 1988", text="""
+tableau(
+    "ssp-rk3",
+    order=3,
+    source="Shu and Osher 1988",
+    text="""
     0   |
     1   | 1
     1/2 | 1/4  1/4
     ----+--------------
         | 1/6  1/6  2/3
-""")
+""",
+)
 
-tableau("bogacki-shampine", order=3, error_order=2, source="Bogacki and Shampine 1989", text="""
+tableau(
+    "bogacki-shampine",
+    order=3,
+    error_order=2,
+    source="Bogacki and Shampine 1989",
+    text="""
     0   |
     1/2 | 1/2
     3/4 | 0     3/4
@@ -64,7 +104,8 @@ tableau("bogacki-shampine", order=3, error_order=2, source="Bogacki and Shampine
     ----+---------------------
         | 2/9   1/3  4/9  0
         | 7/24  1/4  1/3  1/8
-""")
+""",
+)
 
 tableau("dormand-prince", order=5, error_order=4, source="Dormand and Prince 1980; dense output Shampine 1986",
         text="""
