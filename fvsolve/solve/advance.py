@@ -25,16 +25,16 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop = Loop(held)
     loop.now[:] = state.y
     loop.memory[erk.T] = state.t
-    held_limits = [t for t, _ in model.breaks if state.t < t < until]
-    for end in [*held_limits, until]:
+    adaptive = loop.orders[erk.CONTROL] == erk.TOLERANCE
+    for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
+        first = loop.t == state.t
         loop.begin(end, NO_LIMIT)
-        if state.memory.size == 2 and end == [*held_limits, until][0]:
+        if first and adaptive and state.memory.size == 2:
             loop.memory[[erk.STEP, erk.ERROR_OLD]] = state.memory
-        code = loop.run(NO_LIMIT)
-        if code != erk.DONE:
-            raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s with code {code}; try a smaller step")
+        if loop.run(NO_LIMIT) != erk.DONE:
+            raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
     return State(loop.t, loop.now.copy(), loop.memory[[erk.STEP, erk.ERROR_OLD]].copy())
 
 

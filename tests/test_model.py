@@ -1,0 +1,124 @@
+"""A model shows what it is made of; its rhs is pure; advancing it in pieces is running it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fvsolve
+from fvsolve.errors import FvsolveError
+
+CASES = Path(__file__).parent.parent / "cases"
+WATER = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2000.0}
+
+
+def scene(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:
+    """Lake, pipe, chamber, two valves in series, tank, rigid column: one of each kind of state."""
+    return {
+        "fluid": {**WATER, "law": law},
+        "nodes": {
+            "lake": {"type": "reservoir", "head": 60.0},
+            "gate": {"type": "junction", "demand": 0.002},
+            "pot": {"type": "chamber", "volume": 0.3},
+            "mid": {"type": "junction"},
+            "pond": {"type": "tank", "area": 3.0, "level": 2.0},
+            "sea": {"type": "reservoir", "pressure": 101325.0},
+        },
+        "links": {
+            "main": {"type": "pipe", "from": "lake", "to": "gate", "length": 200.0, "diameter": 0.2, "cells": 9,
+                     "friction": {"model": "quasi-steady", "roughness": 1e-4}},
+            "v1": {"type": "valve", "from": "gate", "to": "pot", "area": 2e-3,
+                   "opening": {"time": [0.1, 0.3], "value": [1.0, 0.2]}},
+            "v2": {"type": "valve", "from": "pot", "to": "mid", "area": 2e-3},
+            "v3": {"type": "orifice", "from": "mid", "to": "pond", "area": 2e-3},
+            "drain": {"type": "rigid-column", "from": "pond", "to": "sea", "length": 20.0, "diameter": 0.1,
+                      "friction": {"model": "steady", "factor": 0.02}},
+        },
+        "numerics": {"end": 0.6, "scheme": scheme, "method": "ssp-rk3", **(numerics or {"courant": 0.8})},
+        "output": {"every": 0.05, "fields": 0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_the_rhs_is_pure(law):
+    model = fvsolve.build(fvsolve.load(scene(law)))
+    rng = np.random.default_rng(0)
+    states = [model.scale * rng.normal(scale=0.1, size=model.y_size) for _ in range(3)]
+    first = [model.rhs(0.2, y) for y in states]
+    again = [model.rhs(0.2, y) for y in reversed(states)][::-1]
+    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+    assert all(np.any(a != 0) for a in first)
+
+
+def test_states_have_names_and_the_jacobian_is_the_slope_of_the_rhs():
+    model = fvsolve.build(fvsolve.load(scene(scheme="upwind5")))  # a limiter has no slope at rest
+    assert len(model.state_names) == model.y_size == 2 * 9 + 3
+    assert {"main.forward[0]", "main.backward[8]", "pot.mass", "pond.mass", "drain.flow"} <= set(model.state_names)
+    y = np.zeros(model.y_size)
+    direction = model.scale * np.random.default_rng(1).normal(size=model.y_size)
+    slope = (model.rhs(0.0, y + 1e-5 * direction) - model.rhs(0.0, y - 1e-5 * direction)) / 2e-5
+    assert model.jacobian(0.0, y) @ direction == pytest.approx(slope, rel=1e-4, abs=1e-6 * np.max(np.abs(slope)))
+
+
+def test_check_tells_what_was_understood():
+    checks = fvsolve.build(fvsolve.load(scene())).checks
+    assert checks["nodes"]["lake"]["head"] == pytest.approx(60.0)
+    assert checks["pipes"]["main"]["cells"] == 9
+    assert 0.015 < checks["pipes"]["main"]["friction_factor"] < 0.03
+    assert checks["step_set_by"]
+    assert any("tank pond" in text for text in checks["moving"])
+    json.dumps(checks)
+
+
+def test_a_loop_of_advances_is_the_run_with_the_schedule():
+    held = scene(step=0.001)
+    held["links"]["v1"]["opening"] = {"time": [0.2], "value": [1.0]}
+    model = fvsolve.build(fvsolve.load(held))
+    state = fvsolve.initial_state(model)
+    for k in range(20):
+        opening = 1.0 if k < 10 else 0.3
+        state = fvsolve.advance(model, state, 0.02 * (k + 1), {"v1.opening": opening})
+    held["links"]["v1"]["opening"] = {"time": [-1.0, 0.2], "value": [1.0, 0.3], "kind": "step"}
+    whole = fvsolve.build(fvsolve.load(held))
+    once = fvsolve.advance(whole, fvsolve.initial_state(whole), 0.4)
+    assert once.t == state.t == 0.4
+    assert state.y == pytest.approx(once.y, rel=1e-9, abs=1e-9 * np.max(np.abs(once.y)))
+
+
+def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
+    model = fvsolve.build(fvsolve.load(scene()))
+    state = fvsolve.initial_state(model)
+    with pytest.raises(FvsolveError, match='no input named "v1.openning"; did you mean "v1.opening"'):
+        fvsolve.advance(model, state, 0.1, {"v1.openning": 0.3})
+    with pytest.raises(FvsolveError, match="lies before"):
+        fvsolve.advance(model, state, -1.0)
+
+
+PLAIN = """
+import json, sys
+import fvsolve
+scene = json.loads(sys.stdin.read())
+result = fvsolve.run(scene)
+print(json.dumps({"reason": result.reason, "t": list(result.t),
+                  "values": {str(p): list(result[str(p)]) for p in result.probes}}))
+"""
+
+
+@pytest.mark.parametrize("law, scheme", [("linear", "muscl"), ("linear", "upwind5"), ("log", "weno5")])
+def test_compiled_and_plain_python_agree(law, scheme):
+    case = scene(law, scheme)
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", PLAIN], input=json.dumps(case), env=environment, capture_output=True,
+                          text=True, check=True)  # fmt: skip
+    plain, compiled = json.loads(done.stdout), fvsolve.run(case)
+    assert plain["reason"] == compiled.reason == "finished"
+    assert plain["t"] == pytest.approx(list(compiled.t), abs=1e-12)
+    for name, values in plain["values"].items():
+        here = compiled[name]
+        assert np.asarray(values) == pytest.approx(here, rel=1e-9, abs=1e-9 * np.max(np.abs(here))), name
