@@ -1,9 +1,10 @@
-"""The four functions that a density law offers to the stepper, compiled on first use."""
+"""The functions that a density law offers to the stepper, compiled on first use."""
 
 import functools
 
-from fvsolve.kernels.observer import events, observe_linear, record_linear
+from fvsolve.jit import njit
 from fvsolve.kernels.network import rhs_linear
+from fvsolve.kernels.observer import events, observe_linear, record_linear
 
 
 @functools.cache
@@ -15,14 +16,34 @@ def functions(law: str) -> tuple:
         from fvsolve.kernels.barotropic import observe_barotropic, record_barotropic, rhs_barotropic
 
         found = rhs_barotropic, observe_barotropic, record_barotropic, events
-    if not hasattr(found[0], "compile"):
-        return found
+    compile_as(found[0], "tvvvh")
+    compile_as(found[1], "tvvhv")
+    compile_as(found[2], "tvvhv")
+    compile_as(found[3], "tvhv")
+    return found
+
+
+@functools.cache
+def leap_function(wanted: bool):
+    """A whole step of upwind and Euler under the linear law; not wanted, something of its type to pass on."""
+    found = stay
+    if wanted:
+        from fvsolve.kernels.leap import leap_linear as found
+    compile_as(found, "ttvvvhv")
+    return found
+
+
+@njit
+def stay(t, h, y, y_new, out, handle, values):
+    """Never called."""
+
+
+def compile_as(function, letters: str) -> None:
+    """Compile for arguments that are times (t), vectors (v) and a handle (h), and for no others."""
+    if not hasattr(function, "compile") or function.overloads:
+        return
     from numba import types
 
-    f, v, handle = types.float64, types.float64[::1], types.int64[::1]
-    rows = ((f, v, v, v, handle), (f, v, v, handle, v), (f, v, v, handle, v), (f, v, handle, v))
-    for function, signature in zip(found, rows, strict=True):
-        if not function.overloads:
-            function.compile(signature)
-            function.disable_compile()
-    return found
+    kinds = {"t": types.float64, "v": types.float64[::1], "h": types.int64[::1]}
+    function.compile(tuple(kinds[letter] for letter in letters))
+    function.disable_compile()

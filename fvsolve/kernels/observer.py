@@ -111,6 +111,16 @@ def count_below(r, l, boiling):
 
 
 @njit
+def note(t, r, l, at, which, envelope, profile, marks):
+    """Widen the envelope from cell `at` on by r + l, and mark the pipe where they are below vapour pressure."""
+    e, b = envelope, at + r.size
+    widen_cells(t, r, l, e[0, at:b], e[1, at:b], e[2, at:b], e[3, at:b])
+    if marks[which] != marks[which]:
+        if count_below(r, l, profile[at:b]) > 0:
+            marks[which] = t
+
+
+@njit
 def record_pipe(t, r, l, pipe, which, envelope, profile, marks):
     """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
     start, at = 0, pipe["cell"]
@@ -118,11 +128,7 @@ def record_pipe(t, r, l, pipe, which, envelope, profile, marks):
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
         if outside(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b]) > 0:
-            e = envelope
-            widen_cells(t, r[start:stop], l[start:stop], e[0, a:b], e[1, a:b], e[2, a:b], e[3, a:b])
-            if marks[which] != marks[which]:
-                if count_below(r[start:stop], l[start:stop], profile[a:b]) > 0:
-                    marks[which] = t
+            note(t, r[start:stop], l[start:stop], a, which, envelope, profile, marks)
         start = stop
 
 
@@ -132,15 +138,22 @@ def record_all(t, y, out, tables, values):
 
     marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
     """
-    pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
-    marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
-    for k in range(values.size):
-        widen(extremes, k, t, values[k])
+    pipes, marks = tables[I_PIPES], tables[I_MARKS]
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
         record_pipe(
             t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables[I_ENVELOPE], tables[I_PROFILE], marks
         )
+    record_nodes(t, out, tables, values)
+
+
+@njit
+def record_nodes(t, out, tables, values):
+    """`record_all` but for the cells."""
+    pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
+    marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
+    for k in range(values.size):
+        widen(extremes, k, t, values[k])
     for i in range(nodes.size):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
 from fvsolve.steppers import erk
 from fvsolve.steppers.tableau import Method, method_named
@@ -21,6 +22,8 @@ class Loop:
         self.model, self.method = model, method or method_named(numerics.method)
         self.rhs, self.observe, self.record, self.events = model.functions()
         self.step = erk.compiled()
+        leaps = leap_allowed(model, self.method)
+        self.leap = leap_function(leaps)
         n, s, probes = model.y_size, self.method.stages, len(model.probes)
         tanks = int(np.sum(model.tables[rec.I_NODES]["kind"] == rec.TANK))
         ledgers = int(model.layout["ledgers"])
@@ -33,7 +36,7 @@ class Loop:
         self.memory, self.orders = np.zeros(erk.MEMORY), np.zeros(erk.ORDERS)
         self.flags = np.array([erk.FRESH, 0, 0, 1, 0], dtype=np.int64)
         self.orders[erk.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
-        self.orders[erk.STOP_AT] = NO_LIMIT
+        self.orders[erk.STOP_AT], self.orders[erk.LEAPS] = NO_LIMIT, leaps
         for control, key in ((erk.COURANT, "courant"), (erk.FIXED_STEP, "step"), (erk.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[erk.CONTROL], self.orders[erk.SIZE] = control, getattr(numerics, key)
@@ -64,7 +67,7 @@ class Loop:
         m = self.method
         self.orders[erk.BUDGET] = budget
         return self.step(
-            self.rhs, self.observe, self.record, self.events, self.model.handle, m.a, m.b, m.c, m.error, m.dense,
+            self.rhs, self.leap, self.observe, self.record, self.events, self.model.handle, m.a, m.b, m.c, m.error, m.dense,
             max(m.error_order + 1, 1) if m.adaptive else m.order, m.first_same_as_last, self.orders, self.memory,
             self.flags, self.y, self.k, self.f_old, self.supply, int(self.model.layout["ledger"]), self.ledger,
             self.model.scale, self.out, self.out_row, self.values, self.g, self.g_new,
@@ -83,3 +86,13 @@ class Loop:
             self.memory[erk.T] -= self.memory[erk.LAST]
             self.flags[erk.NOW], self.flags[erk.OLD] = self.flags[erk.OLD], self.flags[erk.NOW]
             self.flags[erk.BEHIND] = 0
+
+
+def leap_allowed(model: Model, method: Method) -> bool:
+    """Whether steps can be taken whole: upwind and Euler, pipes alone, no friction or a given factor."""
+    settings, numerics = model.tables[rec.I_SETTINGS][0], model.case.numerics
+    plain = np.isin(model.tables[rec.I_PIPES]["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
+    return bool(
+        settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND and method.stages == 1
+        and numerics.rtol is None and model.y_size == 2 * model.cells and plain
+    )  # fmt: skip

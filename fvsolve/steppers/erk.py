@@ -12,30 +12,32 @@ from fvsolve.jit import njit
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST = range(11)
 MEMORY = 11
 # What a call is told.
-START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT = range(10)
-ORDERS = 10
+START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
+ORDERS = 11
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
 # Why a call came back.
 DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED = range(8)
 # What passes between calls while rows are still to be written: phase, whether a step lies behind, buffers.
 PHASE, BEHIND, NOW, OLD, ROWS = range(5)
-FRESH, EMIT, READY = 0, 1, 2
+FRESH, LEAPT, EMIT, READY = range(4)
 
 EVENT_TOLERANCE = 1e-13
 RATE, STATUS, WHERE = 0, 1, 2  # the entries of `out` that the loop reads
+NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 
 
 @functools.cache
 def function_types():
-    """Numba types of (rhs, observe, record, events): declared, so that the loop is cached."""
+    """Numba types of (rhs, leap, observe, record, events): declared, so that the loop is cached."""
     from numba import types
 
     f, v, handle = types.float64, types.float64[::1], types.int64[::1]
     rhs = types.FunctionType(types.void(f, v, v, v, handle))
+    leap = types.FunctionType(types.void(f, f, v, v, v, handle, v))
     observe = types.FunctionType(types.void(f, v, v, handle, v))
     events = types.FunctionType(types.void(f, v, handle, v))
-    return rhs, observe, observe, events
+    return rhs, leap, observe, observe, events
 
 
 @njit(forceinline=True)
@@ -239,6 +241,20 @@ def next_due(orders, memory):
     return min(row, output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT]))
 
 
+@njit(forceinline=True)
+def too_short(orders, memory, h):
+    """Whether a step would not move the time."""
+    return not h > 4e-16 * max(abs(memory[T]), abs(orders[END]))
+
+
+@njit(forceinline=True)
+def may_leap(orders, memory, h):
+    """Whether a step of h ends before the segment does, and before anything is due to be written."""
+    if orders[LEAPS] == 0.0 or too_short(orders, memory, h) or h >= (orders[END] - memory[T]) * (1.0 - 1e-9):
+        return False
+    return next_due(orders, memory) > memory[T_MARK] + (memory[N_MARK] + 1.0) * h
+
+
 @njit
 def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k, dense, out, y_out, rows):
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
@@ -265,7 +281,7 @@ def emit(rhs, observe, handle, orders, memory, flags, t_old, y_old, f_old, y, k,
 
 @njit
 def run_erk(
-    rhs, observe, record, events, handle,
+    rhs, leap, observe, record, events, handle,
     a, b, c, error, dense, order, last_is_new,
     orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
     y_out, rows,
@@ -273,6 +289,8 @@ def run_erk(
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
     rhs(t, y, dydt, out, handle) with an empty dydt computes `out` alone, which is all that a row wants;
+    leap(t, h, y, y_new, out, handle, values), where orders[LEAPS] allows it, is a whole step to t of a method of one
+    stage, with the `out` and the record of its end: taken wherever no row is due;
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[m] advanced with the step's own weights from out[where:]; rows : float64[cap, 1 + probes].
     """
@@ -292,7 +310,10 @@ def run_erk(
             reuse = False
             flags[PHASE] = EMIT
             record(memory[T], y[now], out, handle, values)
-            if not all_finite(y[now]) or not isfinite(out[RATE]):
+            if not all_finite(y[now]):
+                out[STATUS] = NOT_FINITE
+        if flags[PHASE] <= EMIT:
+            if out[STATUS] == NOT_FINITE or not isfinite(out[RATE]):
                 return BAD_VALUE
             if out[STATUS] != 0.0:
                 return BAD_STATUS
@@ -314,12 +335,20 @@ def run_erk(
         if orders[BUDGET] <= 0.0:
             return CHUNK
         h = next_step(orders, memory, out[RATE], k, scale, order)
-        while True:
+        leaping, last = may_leap(orders, memory, h), False
+        if leaping:
+            memory[CALLS] += 1.0
+            leap(memory[T_MARK] + (memory[N_MARK] + 1.0) * h, h, y[now], y[new], out, handle, values)
+        elif flags[PHASE] == LEAPT:  # now the rates are wanted too
+            flags[PHASE] = FRESH
+            memory[CALLS] -= 1.0
+            continue
+        while not leaping:
             rest = orders[END] - memory[T]
             last = h >= rest * (1.0 - 1e-9)
             if last:
                 h = rest
-            if not h > 4e-16 * max(abs(memory[T]), abs(orders[END])) and not last:
+            if too_short(orders, memory, h) and not last:
                 return TINY_STEP
             stages(rhs, handle, a, b, c, last_is_new, memory[T], h, y[now], k, supply, where, out, y[3], y[new])
             memory[CALLS] += s - 1.0
@@ -363,7 +392,7 @@ def run_erk(
         if next_due(orders, memory) <= memory[T]:
             copy(k[0], f_old)
         reuse = last_is_new and orders[CONTROL] == TOLERANCE and not last
-        flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, FRESH
+        flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
 
 

@@ -95,24 +95,29 @@ def _nothing(t, y, out, handle, values):
     pass
 
 
+def _no_leap(t, h, y, y_new, out, handle, values):
+    pass
+
+
 def _no_events(t, y, handle, g):
     pass
 
 
 def _functions(f, t0, y0):
-    """(rhs, observe, record, events) around f, and the loop that takes them; f compiled where numba can."""
+    """(rhs, leap, observe, record, events) around f, and the loop that takes them; f compiled where numba can."""
     if not hasattr(erk.run_erk, "compile"):
 
         def plain(t, y, dydt, out, handle):
             out[:] = (0.0, 0.0, -1.0, 0.0)
             dydt[:] = f(t, y)
 
-        return (plain, _nothing, _nothing, _no_events), erk.run_erk
+        return (plain, _no_leap, _nothing, _nothing, _no_events), erk.run_erk
     from numba import types
 
     v, handle = types.float64[::1], types.int64[::1]
     functions = (
         (_rhs(f, t0, y0), (types.float64, v, v, v, handle)),
+        (_no_leap, (types.float64, types.float64, v, v, v, handle, v)),
         (_nothing, (types.float64, v, v, handle, v)),
         (_nothing, (types.float64, v, v, handle, v)),
         (_no_events, (types.float64, v, handle, v)),

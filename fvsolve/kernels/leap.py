@@ -1,0 +1,80 @@
+"""A step of upwind and Euler at once, under the linear density law. Knows both: that is what makes it fast.
+
+The loop of `steppers.erk` passes over all cells again for the rates, the sum, the envelope and the search for
+NaN. Here a block of cells moves and is compared with the envelope while it lies in the cache. The operations
+are the same in the same order, so the bits are too.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.network import rhs_linear
+from fvsolve.kernels.observer import note, observe_linear, record_nodes
+from fvsolve.kernels.records import (
+    I_ENVELOPE,
+    I_LAYOUT,
+    I_MARKS,
+    I_PIPES,
+    I_PROFILE,
+    I_SCRATCH,
+    NOT_FINITE,
+    STATUS,
+)
+
+BLOCK = 512
+
+
+@njit
+def leap_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
+    """Move cells by h; r starts one cell before them and l ends one behind. Returns how many left their envelope.
+
+    A value that is not a number lies in no envelope, so it is found for nothing.
+    """
+    here, beyond, count = r[1:], l[1:], 0
+    for i in range(r_new.size):
+        m = flow + (here[i] - l[i])
+        s = half * (abs(m) * m) - base
+        a = here[i] + h * (-k * (here[i] - r[i]) - s)
+        b = l[i] + h * (k * (beyond[i] - l[i]) + s)
+        r_new[i], l_new[i] = a, b
+        count += not (least[i] <= a + b <= greatest[i])
+    return count
+
+
+@njit
+def leap_block(t, h, pipe, which, at, r, l, r_new, l_new, tables):
+    """`leap_cells` from cell `at` of a pipe, and its envelope at t; returns how many cells are not finite."""
+    e, a, b, bad = tables[I_ENVELOPE], pipe["cell"] + at, pipe["cell"] + at + r_new.size, 0
+    k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
+    if leap_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b]) > 0:
+        note(t, r_new, l_new, a, which, e, tables[I_PROFILE], tables[I_MARKS])
+        for i in range(r_new.size):
+            s = r_new[i] + l_new[i]
+            bad += s - s != 0.0
+    return bad
+
+
+@njit
+def leap_linear(t, h, y, y_new, out, handle, values):
+    """y_new at t from y a step h earlier and its closed nodes in `out`; then `out` of y_new, and all that is recorded.
+
+    For scenes whose states are pipes alone, without friction or with a given factor. STATUS tells what is not finite.
+    """
+    tables = open_tables(handle)
+    pipes, pad, bad = tables[I_PIPES], tables[I_SCRATCH][:4], 0
+    for which in range(pipes.size):
+        pipe = pipes[which]
+        n, o, ends = pipe["cells"], pipe["y"], tables[I_LAYOUT][0]["ends"] + 4 * which
+        r, l, r_new, l_new = y[o : o + n], y[o + n : o + 2 * n], y_new[o : o + n], y_new[o + n : o + 2 * n]
+        for side in range(2):  # the cells at the ends, whose neighbours are nodes
+            i = side * (n - 1)
+            pad[0], pad[1] = out[ends] if i == 0 else r[i - 1], r[i]
+            pad[2], pad[3] = l[i], out[ends + 3] if i == n - 1 else l[i + 1]
+            bad += leap_block(t, h, pipe, which, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], tables)
+        for i in range(1, n - 1, BLOCK):
+            j = min(i + BLOCK, n - 1)
+            bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
+    rhs_linear(t, y_new, y_new[:0], out, handle)
+    observe_linear(t, y_new, out, handle, values)
+    record_nodes(t, out, tables, values)
+    if bad > 0:
+        out[STATUS] = NOT_FINITE
