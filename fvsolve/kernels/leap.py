@@ -25,32 +25,29 @@ BLOCK = 512
 
 @njit
 def leap_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
-    """Move cells by h; r starts one cell before them and l ends one behind. Returns how many left their envelope.
+    """Move cells by h; r starts one cell before them and l ends one behind. Returns how many leave their envelope.
 
-    A value that is not a number lies in no envelope, so it is found for nothing.
+    They are counted below and above; what is not a number lies on both sides, so it is found for nothing.
     """
-    here, beyond, count = r[1:], l[1:], 0
+    here, beyond, low, high = r[1:], l[1:], 0, 0
     for i in range(r_new.size):
         m = flow + (here[i] - l[i])
         s = half * (abs(m) * m) - base
         a = here[i] + h * (-k * (here[i] - r[i]) - s)
         b = l[i] + h * (k * (beyond[i] - l[i]) + s)
         r_new[i], l_new[i] = a, b
-        count += not (least[i] <= a + b <= greatest[i])
-    return count
+        low += not a + b >= least[i]
+        high += not a + b <= greatest[i]
+    return low, high
 
 
 @njit
-def leap_block(t, h, pipe, which, at, r, l, r_new, l_new, tables):
-    """`leap_cells` from cell `at` of a pipe, and its envelope at t; returns how many cells are not finite."""
-    e, a, b, bad = tables[I_ENVELOPE], pipe["cell"] + at, pipe["cell"] + at + r_new.size, 0
+def leap_block(t, h, pipe, which, at, r, l, r_new, l_new, e, profile, marks):
+    """`leap_cells` from cell `at` of a pipe, and its envelope e at t; returns zero where all cells are finite."""
+    a, b = pipe["cell"] + at, pipe["cell"] + at + r_new.size
     k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
-    if leap_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b]) > 0:
-        note(t, r_new, l_new, a, which, e, tables[I_PROFILE], tables[I_MARKS])
-        for i in range(r_new.size):
-            s = r_new[i] + l_new[i]
-            bad += s - s != 0.0
-    return bad
+    low, high = leap_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b])
+    return note(t, r_new, l_new, a, low, high, which, e, profile, marks) if low + high > 0 else 0
 
 
 @njit
@@ -61,6 +58,7 @@ def leap_linear(t, h, y, y_new, out, handle, values):
     """
     tables = open_tables(handle)
     pipes, pad, bad = tables[I_PIPES], tables[I_SCRATCH][:4], 0
+    seen = tables[I_ENVELOPE], tables[I_PROFILE], tables[I_MARKS]
     for which in range(pipes.size):
         pipe = pipes[which]
         n, o, ends = pipe["cells"], pipe["y"], tables[I_LAYOUT][0]["ends"] + 4 * which
@@ -69,10 +67,10 @@ def leap_linear(t, h, y, y_new, out, handle, values):
             i = side * (n - 1)
             pad[0], pad[1] = out[ends] if i == 0 else r[i - 1], r[i]
             pad[2], pad[3] = l[i], out[ends + 3] if i == n - 1 else l[i + 1]
-            bad += leap_block(t, h, pipe, which, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], tables)
+            bad += leap_block(t, h, pipe, which, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], *seen)
         for i in range(1, n - 1, BLOCK):
             j = min(i + BLOCK, n - 1)
-            bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
+            bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], *seen)
     rhs_linear(t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)
     record_nodes(t, out, tables, values)

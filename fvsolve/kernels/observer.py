@@ -81,24 +81,39 @@ def widen(envelope, c, t, value):
 
 @njit(forceinline=True)
 def outside(r, l, least, greatest):
-    """How many of the cells lie outside of what was seen before."""
-    count = 0
+    """How many of the cells lie below and above what was seen before; what is not a number lies on both sides."""
+    low, high = 0, 0
     for i in range(r.size):
         s = r[i] + l[i]
-        count += (s < least[i]) + (s > greatest[i])
-    return count
+        low += not s >= least[i]
+        high += not s <= greatest[i]
+    return low, high
 
 
 @njit
-def widen_cells(t, r, l, least, t_least, greatest, t_greatest):
-    """`widen` for many cells, without a branch."""
+def widen_low(t, r, l, least, t_least):
+    """`widen` for many cells, downwards and without a branch; returns how many are not finite."""
+    bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
-        low, high = s < least[i], s > greatest[i]
+        low = s < least[i]
         least[i] = s if low else least[i]
         t_least[i] = t if low else t_least[i]
+        bad += s - s != 0.0
+    return bad
+
+
+@njit
+def widen_high(t, r, l, greatest, t_greatest):
+    """`widen_low`, upwards."""
+    bad = 0
+    for i in range(r.size):
+        s = r[i] + l[i]
+        high = s > greatest[i]
         greatest[i] = s if high else greatest[i]
         t_greatest[i] = t if high else t_greatest[i]
+        bad += s - s != 0.0
+    return bad
 
 
 @njit
@@ -111,13 +126,20 @@ def count_below(r, l, boiling):
 
 
 @njit
-def note(t, r, l, at, which, envelope, profile, marks):
-    """Widen the envelope from cell `at` on by r + l, and mark the pipe where they are below vapour pressure."""
-    e, b = envelope, at + r.size
-    widen_cells(t, r, l, e[0, at:b], e[1, at:b], e[2, at:b], e[3, at:b])
-    if marks[which] != marks[which]:
-        if count_below(r, l, profile[at:b]) > 0:
-            marks[which] = t
+def note(t, r, l, at, low, high, which, e, profile, marks):
+    """Widen the envelope e from cell `at` on by r + l, `low` and `high` of which lie outside; marks a pipe that boils.
+
+    Returns zero where all values are finite.
+    """
+    b, bad = at + r.size, 0
+    if low > 0:
+        bad += widen_low(t, r, l, e[0, at:b], e[1, at:b])
+        if marks[which] != marks[which]:
+            if count_below(r, l, profile[at:b]) > 0:
+                marks[which] = t
+    if high > 0:
+        bad += widen_high(t, r, l, e[2, at:b], e[3, at:b])
+    return bad
 
 
 @njit
@@ -127,8 +149,9 @@ def record_pipe(t, r, l, pipe, which, envelope, profile, marks):
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
-        if outside(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b]) > 0:
-            note(t, r[start:stop], l[start:stop], a, which, envelope, profile, marks)
+        low, high = outside(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b])
+        if low + high > 0:
+            note(t, r[start:stop], l[start:stop], a, low, high, which, envelope, profile, marks)
         start = stop
 
 
