@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+DENSE = 300  # unknowns up to which a dense solver is quicker
 SMALL_DROP = 1e-12  # relative difference of potentials that is rounding
 SMALL = 1e-9  # relative residual below which a node counts as balanced
 
@@ -147,67 +148,71 @@ def _dead_end(group, demand, edges):
 
 
 def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors):
-    at_node = {i: k for k, i in enumerate(nodes)}
-    at_edge = {e: k for k, e in enumerate(active)}
-    n, m = len(nodes), len(active)
-    if n + m == 0:
+    """Newton on flows of `active` edges and potentials of `nodes`; one row an edge, a balance, an anchored set."""
+    column = {("flow", e): k for k, e in enumerate(active)}
+    column |= {("node", i): len(active) + k for k, i in enumerate(nodes)}
+    if not column:
         return
     p_scale, f_scale = scale
+    change, at = np.zeros(0), {i: k for k, i in enumerate(balances, start=len(rows))}
     for sweep in range(200):
-        matrix = np.zeros((len(rows) + len(balances) + len(anchors), m + n))
-        right = np.zeros(matrix.shape[0])
+        entries, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
         for k, e in enumerate(rows):
-            edge = edges[e]
-            drop = result.potential[edge.i] - result.potential[edge.j]
-            if e in at_edge:
-                alpha, beta, gamma = edge.row(result.flow[e], drop)
-                matrix[k, at_edge[e]] = alpha * f_scale / p_scale
-            else:
-                alpha, beta, gamma = 0.0, 1.0, drop - edge.drop(result.flow[e])
-            for node, sign in ((edge.i, -1.0), (edge.j, 1.0)):
-                if node in at_node:
-                    matrix[k, m + at_node[node]] += sign * beta
-            right[k] = gamma / p_scale
-        for k, i in enumerate(balances, start=len(rows)):
-            net = -demand[i]
-            for e, edge in enumerate(edges):
-                sign = (edge.j == i) - (edge.i == i)
-                if sign and not edge.shut:
-                    net += sign * result.flow[e]
-                    if e in at_edge:
-                        matrix[k, at_edge[e]] += sign
-            right[k] = -net / f_scale
+            right[k] = _edge_row(entries, column, k, e, edges[e], result, scale)
+        right[len(rows) : len(rows) + len(balances)] = demand[balances] / f_scale
+        for e, edge in enumerate(edges):
+            for i, sign in ((edge.i, -1.0), (edge.j, 1.0)):
+                if i in at and not edge.shut:
+                    right[at[i]] -= sign * result.flow[e] / f_scale
+                    if ("flow", e) in column:
+                        entries.append((at[i], column["flow", e], sign))
         for k, i in enumerate(anchors, start=len(rows) + len(balances)):
-            matrix[k, m + at_node[i]] = 1.0
-        change = _solve(matrix, right, result)
-        result.flow[active] += change[:m] * f_scale
-        result.potential[nodes] += change[m:] * p_scale
-        if np.max(np.abs(change), initial=0.0) <= 1e-15 * (
-            1.0 + max(np.max(np.abs(result.flow), initial=0.0) / f_scale, 0.0)
-        ):
+            entries.append((k, column["node", i], 1.0))
+        change = _solve(entries, right, len(column), result)
+        result.flow[active] += change[: len(active)] * f_scale
+        result.potential[nodes] += change[len(active) :] * p_scale
+        most = np.max(np.abs(change), initial=0.0)
+        if most <= 1e-15 * (1.0 + np.max(np.abs(result.flow), initial=0.0) / f_scale) or (sweep > 20 and most < 1e-12):
             return
-        if sweep > 20 and np.max(np.abs(change)) < 1e-12:
-            return
-    result.converged = bool(np.max(np.abs(change)) < 1e-9)
+    result.converged = bool(np.max(np.abs(change), initial=0.0) < 1e-9)
 
 
-def _solve(matrix, right, result):
+def _edge_row(entries, column, k, e, edge, result, scale) -> float:
+    """Write row k, alpha dM - beta d(drop) = gamma of one edge, in scaled unknowns; returns its right-hand side."""
+    drop = result.potential[edge.i] - result.potential[edge.j]
+    if ("flow", e) in column:
+        alpha, beta, gamma = edge.row(result.flow[e], drop)
+        entries.append((k, column["flow", e], alpha * scale[1] / scale[0]))
+    else:
+        beta, gamma = 1.0, drop - edge.drop(result.flow[e])
+    for node, sign in ((edge.i, -1.0), (edge.j, 1.0)):
+        if ("node", node) in column:
+            entries.append((k, column["node", node], sign * beta))
+    return gamma / scale[0]
+
+
+def _solve(entries, right, size, result):
     """Least-norm solution of the Newton system; remembers whether it had to choose."""
-    if matrix.shape[0] == matrix.shape[1]:
-        try:
-            if matrix.shape[0] > 400:
-                from scipy.sparse import csc_matrix
-                from scipy.sparse.linalg import spsolve
+    i, j, values = (np.array(part) for part in zip(*entries, strict=True))
+    if len(right) == size > DENSE:
+        from scipy.sparse import csc_matrix
+        from scipy.sparse.linalg import splu
 
-                found = spsolve(csc_matrix(matrix), right)
-            else:
-                found = np.linalg.solve(matrix, right)
+        try:
+            return splu(csc_matrix((values, (i, j)), shape=(size, size))).solve(right)
+        except RuntimeError:  # singular
+            pass
+    matrix = np.zeros((len(right), size))
+    np.add.at(matrix, (i, j), values)
+    if len(right) == size:
+        try:
+            found = np.linalg.solve(matrix, right)
             if np.all(np.isfinite(found)) and np.max(np.abs(matrix @ found - right)) < 1e-6:
                 return found
         except np.linalg.LinAlgError:
             pass
     found, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
-    result.split = result.split or rank < matrix.shape[1]
+    result.split = result.split or rank < size
     return found
 
 

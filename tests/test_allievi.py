@@ -75,9 +75,7 @@ def test_valve_pressure_and_flow_are_exact_at_every_step(name):
     schedule, velocity = SCHEDULES[name], 1.0
     result = fvsolve.run(closure(velocity, schedule, STEP))
     area = flow_area(velocity, schedule)
-    main = rays.Pipe(
-        "lake", "gate", LENGTH, DIAMETER, SPEED, velocity * scenes.area(DIAMETER), AMBIENT + DROP
-    )
+    main = rays.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, velocity * scenes.area(DIAMETER), AMBIENT + DROP)
     exact = rays.Rays(
         RHO,
         {"main": main},

@@ -97,9 +97,7 @@ def test_a_chamber_turned_round_by_its_supply_agrees_with_scipy():
     pump = {"time": times, "value": pressures, "kind": "linear"}
     nodes = {"pump": reservoir(pump), "pot": chamber(VOLUME, 2.1e6)}
     numerics = {"method": "dormand-prince", "rtol": 1e-10}
-    result = fvsolve.run(
-        scene(nodes, {"hole": valve("pump", "pot", HOLE)}, 10.0, numerics, ["pot.pressure"], 0.5)
-    )
+    result = fvsolve.run(scene(nodes, {"hole": valve("pump", "pot", HOLE)}, 10.0, numerics, ["pot.pressure"], 0.5))
 
     def rate(t, p):
         return BETA / VOLUME * orifice(HOLE, np.interp(t, times, pressures) - p)
@@ -186,9 +184,7 @@ def test_a_valve_passes_what_its_size_says_both_ways(name, kind):
         "down": {"type": kind, "from": "a", "to": "b", **size},
         "up": {"type": kind, "from": "b", "to": "c", **size},
     }
-    result = fvsolve.run(
-        scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["down.flow", "up.flow"], 0.1)
-    )
+    result = fvsolve.run(scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["down.flow", "up.flow"], 0.1))
     assert result["down.flow"] == pytest.approx(flow_area * math.sqrt(2 * 1e5 / RHO), rel=1e-4)
     assert result["up.flow"] == pytest.approx(-flow_area * math.sqrt(2 * 2.5e5 / RHO), rel=1e-4)
 

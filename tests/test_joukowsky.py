@@ -17,9 +17,7 @@ STEP = LENGTH / CELLS / SPEED
 PLACES = {"gate.pressure": 1.0, "main.pressure@0.5": 0.5, "main.pressure@0.21": 0.21}
 
 
-def shut_pipe(
-    velocity: float, how: str, every: float = 0.01, turned: bool = False, **numerics
-) -> tuple[dict, float]:
+def shut_pipe(velocity: float, how: str, every: float = 0.01, turned: bool = False, **numerics) -> tuple[dict, float]:
     """The case, the jump `rho a v` and the time it starts."""
     jump = RHO * SPEED * velocity
     supply = 2 * AMBIENT + 2 * jump

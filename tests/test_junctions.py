@@ -104,14 +104,9 @@ def smooth_error(cells_factor: float, q: float = 0.1) -> float:
     pipes = {n: (*row[:5], round(row[5] * cells_factor)) for n, row in ODD.items()}
     probes = ["gate.pressure", "tee.pressure", "blind.pressure"]
     result = fvsolve.run(network(pipes, {"gate": schedule}, 2.5, SMOOTH, probes, 0.025))
-    exact = traced(
-        pipes, {"main": q, "left": q}, {"gate": lambda t: q * (1 - scenes.smooth_step(t, 0.0, 0.3))}
-    )
+    exact = traced(pipes, {"main": q, "left": q}, {"gate": lambda t: q * (1 - scenes.smooth_step(t, 0.0, 0.3))})
     jump = RHO * 1111.0 * q / scenes.area(0.4)
-    errors = [
-        np.max(np.abs(result[p] - [exact.pressure(p.split(".")[0], float(s)) for s in result.t]))
-        for p in probes
-    ]
+    errors = [np.max(np.abs(result[p] - [exact.pressure(p.split(".")[0], float(s)) for s in result.t])) for p in probes]
     return max(errors) / jump
 
 
@@ -134,9 +129,7 @@ def scatter(cells: int, scheme: str, numerics: dict) -> float:
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.initial_state(model)
     width, centre, end = 9.0, 55.0, 0.09
-    state.y[:cells] = gaussian_averages(
-        np.linspace(0, 100.0, cells + 1), centre, width
-    )  # r in the first pipe
+    state.y[:cells] = gaussian_averages(np.linspace(0, 100.0, cells + 1), centre, width)  # r in the first pipe
     state = fvsolve.advance(model, state, end)
     back, passed = scattered([row[4] / scenes.area(row[3]) for row in rows])
     exact = np.zeros(6 * cells)

@@ -197,9 +197,7 @@ def simple_wave_error(cells: int, scheme: str, height: float = 2.0) -> float:
     state = fvsolve.advance(model, state, end)
     rho, flux = wave.averages(edges, end)
     found = read(state, cells)
-    return float(
-        np.mean(np.abs(found[0] - rho)) / np.ptp(rho) + np.mean(np.abs(found[1] - flux)) / np.ptp(flux)
-    )
+    return float(np.mean(np.abs(found[0] - rho)) / np.ptp(rho) + np.mean(np.abs(found[1] - flux)) / np.ptp(flux))
 
 
 @pytest.mark.parametrize(

@@ -115,9 +115,7 @@ def with_friction(cells: int, scheme: str, through: float, reversing: bool) -> n
 def friction_order(scheme: str, cells: int, through: float, reversing: bool) -> float:
     """Order from the distances of three nested grids, each averaged onto the coarser."""
     grids = [with_friction(cells * 2**k, scheme, through, reversing) for k in range(3)]
-    gaps = [
-        np.mean(np.abs(c - f.reshape(-1, 2).mean(axis=1))) for c, f in zip(grids, grids[1:], strict=False)
-    ]
+    gaps = [np.mean(np.abs(c - f.reshape(-1, 2).mean(axis=1))) for c, f in zip(grids, grids[1:], strict=False)]
     return math.log2(gaps[0] / gaps[1])
 
 

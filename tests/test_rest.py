@@ -135,9 +135,7 @@ def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
         "b.head",
         "c.head",
     ]
-    return scene(
-        nodes, links, 20.0, numerics, [*probes, "pool.level"], 1.0, fluid={**scenes.WATER, "law": law}
-    )
+    return scene(nodes, links, 20.0, numerics, [*probes, "pool.level"], 1.0, fluid={**scenes.WATER, "law": law})
 
 
 FRICTIONS = [

@@ -40,9 +40,7 @@ def test_a_prism_drains_in_finite_time_and_stays_empty(numerics, near):
     assert result["basin.level"] == pytest.approx(vessels.prism(section, OUTLET, level, result.t), abs=near)
 
 
-@pytest.mark.parametrize(
-    "foot, growth", [(0.5, 1.5), (3.0, -1.0), (0.01, 2.0)], ids=["funnel", "dome", "near a point"]
-)
+@pytest.mark.parametrize("foot, growth", [(0.5, 1.5), (3.0, -1.0), (0.01, 2.0)], ids=["funnel", "dome", "near a point"])
 def test_a_shaped_tank_drains_as_its_closed_form(foot, growth):
     level = 2.0
     section = {"level": [0.0, 2.5], "area": [foot, foot + 2.5 * growth]}
@@ -105,9 +103,7 @@ def test_a_tank_whose_outfall_rises_and_falls_turns_the_flow_round():
     t = np.linspace(0.0, 600.0, 12001)
     head = {"time": t.tolist(), "value": outfall(t).tolist(), "kind": "smooth"}
     nodes = {"basin": tank(section, level), "sea": lake(head)}
-    case = scene(
-        nodes, {"hole": valve("basin", "sea", OUTLET)}, 600.0, CLOSE, ["basin.level", "hole.flow"], 1.0
-    )
+    case = scene(nodes, {"hole": valve("basin", "sea", OUTLET)}, 600.0, CLOSE, ["basin.level", "hole.flow"], 1.0)
     result = fvsolve.run(case)
     now = np.asarray(result.t)
     assert result["hole.flow"].min() < 0 < result["hole.flow"].max()
@@ -173,9 +169,7 @@ def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():
     column = {"type": "rigid-column", "from": "lake", "to": "surge", "length": length, "diameter": diameter}
     links = {"main": {**column, "friction": scenes.NO_FRICTION, "initial_flow": 0.0}}
     w = math.sqrt(GRAVITY * scenes.area(diameter) / (length * section))
-    case = scene(
-        nodes, links, 2.5 * 2 * math.pi / w, {**CLOSE, "rtol": 1e-10}, ["surge.level", "main.flow"], 0.5
-    )
+    case = scene(nodes, links, 2.5 * 2 * math.pi / w, {**CLOSE, "rtol": 1e-10}, ["surge.level", "main.flow"], 0.5)
     result = fvsolve.run(case)
     t = np.asarray(result.t)
     assert result["surge.level"] == pytest.approx(10 + 0.5 * np.cos(w * t), abs=1e-6)
@@ -201,6 +195,39 @@ def test_a_rigid_column_behind_a_valve_that_opens_at_once_starts_as_a_hyperbolic
     assert result["main.flow"] == pytest.approx(flow, abs=1e-8 * most)
     assert result["valve.flow"] == pytest.approx(flow, abs=1e-8 * most)
     opened = np.where(after, 1.0, 0.2)
-    assert result["gate.head"] == pytest.approx(
-        (flow / (opened * OUTLET)) ** 2 / (2 * GRAVITY), abs=1e-6 * head
-    )
+    assert result["gate.head"] == pytest.approx((flow / (opened * OUTLET)) ** 2 / (2 * GRAVITY), abs=1e-6 * head)
+
+
+@pytest.mark.parametrize(
+    "numerics, near",
+    [(CLOSE, 1e-5), ({"method": "rk4", "step": 0.008}, 1e-5), ({"method": "ssp-rk3", "step": 0.02}, 1e-4)],
+    ids=["tight", "rk4", "ssp"],
+)
+def test_a_valve_that_shuts_brings_a_rigid_column_to_rest_and_the_run_goes_on(numerics, near):
+    """With q = tau s, tau the opening: `tau s' = tau_s + g A / L (H - (f L / D / A^2 + 1 / K^2 tau^2) q^2 / 2 g)`,
+    so the flow falls to nothing together with the opening, at a head that stays finite."""
+    length, diameter, head, factor, start, shut = 100.0, 0.2, 60.0, 0.02, 2.0, 3.0
+    nodes = {"lake": lake(head), "gate": scenes.junction(), "air": reservoir(AMBIENT)}
+    column = {"type": "rigid-column", "from": "lake", "to": "gate", "length": length, "diameter": diameter}
+    links = {
+        "main": {**column, "friction": {"model": "steady", "factor": factor}},
+        "tap": valve("gate", "air", OUTLET, scenes.ramp(start, shut - start, 1.0, 0.0)),
+    }
+    result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["main.flow", "tap.flow", "gate.head"], 0.1))
+    assert result.ok, result.reason
+    area = scenes.area(diameter)
+    wall = factor * length / diameter / area**2 / (2 * GRAVITY)
+    steady = math.sqrt(head / (wall + 1 / (2 * GRAVITY * OUTLET**2)))
+
+    def rate(t, s):
+        tau = shut - t
+        lost = wall * (tau * s) ** 2 + s**2 / (2 * GRAVITY * OUTLET**2)
+        return (s + GRAVITY * area / length * (head - lost)) / tau
+
+    times = np.linspace(2.0, 2.9, 10)
+    run = solve_ivp(rate, (2.0, 2.9), [steady], "DOP853", rtol=1e-11, atol=1e-13, t_eval=times)
+    at = np.interp(times, result.t, result["main.flow"])
+    assert at == pytest.approx((shut - times) * run.y[0], abs=near * steady)
+    after = result.t > shut + 1e-9
+    assert np.all(result["main.flow"][after] == 0.0)
+    assert result["gate.head"][after] == pytest.approx(head, rel=1e-12)

@@ -6,7 +6,8 @@ solution with the reference wave speed c), less the profile's.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import close_nodes_barotropic, drive, waves_inside
+from fvsolve.kernels.barotropic_nodes import close_nodes_barotropic, drive, hold_columns_barotropic, waves_inside
+from fvsolve.kernels.columns import column_drag, column_inflows, shut_end
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -17,7 +18,6 @@ from fvsolve.kernels.density import (
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import greatest_rate, net_flows, stored_rates
-from fvsolve.kernels.nodes import column_inflows
 from fvsolve.kernels.observer import record_all
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
@@ -93,7 +93,7 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 
 @njit
-def column_rates_barotropic(dydt, out, tables):
+def column_rates_barotropic(t, dydt, out, tables):
     """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
     st, layout, nodes, columns = (
         tables[I_SETTINGS][0],
@@ -102,15 +102,16 @@ def column_rates_barotropic(dydt, out, tables):
         tables[I_COLUMNS],
     )
     for k in range(columns.size):
-        col = columns[k]
-        i, j = col["from_node"], col["to_node"]
-        p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
-        p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
-        now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
-        change = now - col["base"] + col["offset"]
-        flow = out[layout["column"] + k]
-        pull = drag(col["friction"], col["loss"], col["rough"], col["roughness"], col["reynolds"], flow)
-        dydt[col["y"]] = col["area"] / col["length"] * change - (pull - col["drag"])
+        column = columns[k]
+        dydt[column["y"]] = 0.0
+        if shut_end(t, tables, k) == 0:
+            i, j = column["from_node"], column["to_node"]
+            p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
+            p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
+            now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+            change = now - column["base"] + column["offset"]
+            pull = column_drag(column, out[layout["column"] + k])
+            dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
 
 
 @njit
@@ -127,14 +128,15 @@ def rhs_barotropic(t, y, dydt, out, handle):
     net = layout["net"]
     for i in range(tables[I_NODES].size):
         out[net + i] = 0.0
-    column_inflows(y, out, tables)
+    column_inflows(t, y, out, tables)
     close_nodes_barotropic(t, y, out, tables)
+    hold_columns_barotropic(t, out, tables)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
     out[RATE] = rate = greatest_rate(t, out, tables)
     if dydt.size == 0:
         return
-    column_rates_barotropic(dydt, out, tables)
+    column_rates_barotropic(t, dydt, out, tables)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         own = pipe_rates_barotropic(

@@ -9,6 +9,7 @@ from math import sqrt
 import numpy as np
 
 from fvsolve.jit import njit
+from fvsolve.kernels.columns import shut_end
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -20,12 +21,13 @@ from fvsolve.kernels.density import (
     velocity_change,
 )
 from fvsolve.kernels.ends import end_value
-from fvsolve.kernels.nodes import BAR, LEAST, MOST, UNSETTLED, chord_slope, inner_row, settled, solve_dense
+from fvsolve.kernels.nodes import BAR, LEAST, MOST, UNSETTLED, asked_at, chord_slope, inner_row, settled, solve_dense
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
     I_CLUSTERS,
+    I_COLUMNS,
     I_FLOATS,
     I_INTEGERS,
     I_LAYOUT,
@@ -280,6 +282,22 @@ def close_nodes_barotropic(t, y, out, tables):
     for k in range(valves.size):
         if valves[k]["leak"] > 0.0 and g[k] == valves[k]["leak"]:
             if (valves[k]["flow"] + x[k]) ** 2 > MOST * valves[k]["leak"]:
-                out[STATUS], out[WHERE] = NO_SOLUTION, valves[k]["from_node"]
+                out[STATUS], out[WHERE] = NO_SOLUTION, asked_at(nodes, valves[k])
             x[k] = -valves[k]["flow"]
         out[layout["valve"] + k] = valves[k]["flow"] + x[k]
+
+
+@njit
+def hold_columns_barotropic(t, out, tables):
+    """Give the node at the shut end of a standing column the enthalpy of its other end, less the height."""
+    st, nodes, floats = tables[I_SETTINGS][0], tables[I_NODES], tables[I_FLOATS]
+    pressure = tables[I_LAYOUT][0]["pressure"]
+    for k in range(tables[I_COLUMNS].size):
+        column, end = tables[I_COLUMNS][k], shut_end(t, tables, k)
+        if end != 0:
+            i, j = column["from_node"], column["to_node"]
+            if end == -1:
+                i, j = j, i
+            rise = st["gravity"] * (nodes[j]["elevation"] - nodes[i]["elevation"])
+            h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
+            out[pressure + j] = pressure_of_enthalpy(st, floats, h - rise) - nodes[j]["pressure"]

@@ -1,18 +1,29 @@
 """The tables of a model behind one small array of addresses. Knows numba's array layout; knows no law.
 
-Seventeen arrays in a call cost half a microsecond of copying. A handle costs nothing: compiled functions open
-it and load only what they touch. Whoever makes a handle keeps its tables alive.
+Passing twenty arrays from function to function costs half a microsecond of copying a step and seconds of compiling.
+A handle costs nothing: compiled code loads a table only where it asks for it. Whoever makes a handle keeps its
+tables alive, and their places and sizes as they are.
 """
 
 import os
 
 import numpy as np
 
-from fvsolve.kernels.records import tables_type
+from fvsolve.kernels.records import table_types
 
 if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
     from numba.core import cgutils, types
-    from numba.extending import intrinsic
+    from numba.core.imputils import lower_builtin
+    from numba.core.typing.templates import AbstractTemplate, infer, signature
+    from numba.extending import intrinsic, models, register_model
+
+    class Tables(types.Opaque):
+        """What `open_tables` gives: a bare address, whose items are the tables."""
+
+        def __init__(self) -> None:
+            super().__init__("Tables")
+
+    register_model(Tables)(models.OpaqueModel)
 
     def make_handle(tables: tuple) -> np.ndarray:
         """int64[3 n]: address, rows and columns of each table."""
@@ -20,37 +31,51 @@ if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
 
     @intrinsic
     def open_tables(typingctx, handle):
-        """The tuple of tables behind a handle, uncounted."""
-        kind = tables_type()
+        """The tables behind a handle, uncounted; `tables[I_NODES]` loads one."""
+        from numba.np.arrayobj import make_array
 
-        def generate(context, builder, signature, args):
-            from numba.np.arrayobj import make_array, populate_array
+        def generate(context, builder, kind, args):
+            base = make_array(kind.args[0])(context, builder, args[0]).data
+            return builder.bitcast(base, context.get_value_type(kind.return_type))
 
-            base = make_array(signature.args[0])(context, builder, args[0]).data
-            word = context.get_value_type(types.intp)
+        return Tables()(handle), generate
 
-            def entry(i):
-                return builder.load(cgutils.gep_inbounds(builder, base, i))
+    @infer
+    class TableItem(AbstractTemplate):
+        """The type of `tables[constant]`."""
 
-            arrays = []
-            for i, member in enumerate(kind.types):
-                array = make_array(member)(context, builder)
-                size = context.get_abi_sizeof(context.get_data_type(member.dtype))
-                rows, columns = entry(3 * i + 1), entry(3 * i + 2)
-                shape = [rows] if member.ndim == 1 else [rows, columns]
-                strides = [word(size)] if member.ndim == 1 else [builder.mul(columns, word(size)), word(size)]
-                populate_array(
-                    array,
-                    data=builder.inttoptr(entry(3 * i), array.data.type),
-                    shape=shape,
-                    strides=strides,
-                    itemsize=word(size),
-                    meminfo=None,
-                )
-                arrays.append(array._getvalue())
-            return context.make_tuple(builder, kind, arrays)
+        key = "static_getitem"
 
-        return kind(handle), generate
+        def generic(self, args, kws):
+            if isinstance(args[0], Tables):
+                return signature(table_types()[args[1]], *args)
+            return None
+
+    @lower_builtin("static_getitem", Tables, types.IntegerLiteral)
+    def load_table(context, builder, kind, args):
+        """The array whose address, rows and columns are three words of the handle; they never change."""
+        from numba.np.arrayobj import make_array, populate_array
+
+        member, word = kind.return_type, context.get_value_type(types.intp)
+        base = builder.bitcast(args[0], word.as_pointer())
+
+        def entry(i):
+            loaded = builder.load(cgutils.gep_inbounds(builder, base, 3 * args[1] + i))
+            loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+            return loaded
+
+        array = make_array(member)(context, builder)
+        size = word(context.get_abi_sizeof(context.get_data_type(member.dtype)))
+        address, rows, columns = entry(0), entry(1), entry(2)
+        populate_array(
+            array,
+            data=builder.inttoptr(address, array.data.type),
+            shape=[rows] if member.ndim == 1 else [rows, columns],
+            strides=[size] if member.ndim == 1 else [builder.mul(columns, size), size],
+            itemsize=size,
+            meminfo=None,
+        )
+        return array._getvalue()
 else:
 
     def make_handle(tables: tuple) -> tuple:

@@ -5,6 +5,7 @@ out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.columns import column_rates, quickest_column
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
@@ -108,28 +109,10 @@ def stored_rates(y, dydt, out, tables):
 
 
 @njit(forceinline=True)
-def column_rates(y, dydt, out, tables):
-    """d/dt of the flow in rigid columns: (A / L) (drop') - drag'."""
-    layout, columns, pressure = tables[I_LAYOUT][0], tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
-    for k in range(columns.size):
-        column = columns[k]
-        change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]] + column["offset"]
-        pull = drag(
-            column["friction"],
-            column["loss"],
-            column["rough"],
-            column["roughness"],
-            column["reynolds"],
-            out[layout["column"] + k],
-        )
-        dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
-
-
-@njit(forceinline=True)
 def greatest_rate(t, out, tables):
     """Greatest rate of the scene [1/s]: waves over cells, and stored masses against what touches them."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    rate = tables[I_SETTINGS][0]["rate"]
+    rate = max(tables[I_SETTINGS][0]["rate"], quickest_column(t, out, tables))
     for i in range(nodes.size):
         if nodes[i]["kind"] == CHAMBER or nodes[i]["kind"] == TANK:
             rate = max(rate, nodes[i]["stiffness"] * nodes[i]["admittance"])
@@ -170,7 +153,7 @@ def rhs_linear(t, y, dydt, out, handle):
     out[RATE] = greatest_rate(t, out, tables)
     if dydt.size == 0:
         return
-    column_rates(y, dydt, out, tables)
+    column_rates(t, dydt, out, tables)
     for i in range(pipes.size):
         pipe = pipes[i]
         n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i

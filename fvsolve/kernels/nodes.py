@@ -7,13 +7,13 @@ Y = area / speed. A node without storage makes these and the flows of its other 
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.columns import column_inflows, hold_columns
 from fvsolve.kernels.records import (
     ALONE,
     CHAMBER,
     CLUSTER,
     FIXED,
     I_CLUSTERS,
-    I_COLUMNS,
     I_FLOATS,
     I_INTEGERS,
     I_LAYOUT,
@@ -68,18 +68,7 @@ def junction_flows(t, y, out, tables):
             demand = schedule_value(tables, nodes[i]["schedule"], t)
             out[layout["supply"] + i] = -demand
             out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
-    column_inflows(y, out, tables)
-
-
-@njit(forceinline=True)
-def column_inflows(y, out, tables):
-    """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
-    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
-    for k in range(columns.size):
-        change = y[columns[k]["y"]]
-        out[layout["column"] + k] = columns[k]["flow"] + change
-        out[layout["net"] + columns[k]["from_node"]] -= change
-        out[layout["net"] + columns[k]["to_node"]] += change
+    column_inflows(t, y, out, tables)
 
 
 @njit(forceinline=True)
@@ -188,6 +177,13 @@ def valve_step(valve, g, x, change):
 
 
 @njit(forceinline=True)
+def asked_at(nodes, valve):
+    """The end of a shut valve that cannot be served: the one that nothing else holds."""
+    i, j = valve["from_node"], valve["to_node"]
+    return i if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] == 0.0 else j
+
+
+@njit(forceinline=True)
 def settled(moved, before, scale):
     """Whether Newton's last change of flow is rounding: below 1e-14, or small and no longer falling."""
     return moved <= 1e-14 * scale or (moved <= 1e-9 * scale and moved >= 0.5 * before)
@@ -278,7 +274,7 @@ def close_cluster(t, out, tables, which):
         k = integers[cluster["first_valve"] + e]
         if g[e] == valves[k]["leak"]:
             if (valves[k]["flow"] + x[e]) ** 2 > MOST * valves[k]["leak"]:
-                out[STATUS], out[WHERE] = NO_SOLUTION, valves[k]["from_node"]
+                out[STATUS], out[WHERE] = NO_SOLUTION, asked_at(nodes, valves[k])
             x[e] = -valves[k]["flow"]
         out[layout["valve"] + k] = valves[k]["flow"] + x[e]
 
@@ -292,3 +288,4 @@ def close_nodes(t, y, out, tables):
     close_single(t, out, tables)
     for which in range(tables[I_CLUSTERS].size):
         close_cluster(t, out, tables, which)
+    hold_columns(t, out, tables)

@@ -126,7 +126,9 @@ NODE = np.dtype(
         ),  # offset of a shaped tank's table in `floats` (levels, areas, volumes); -1 for a prism
         ("shapes", "i8"),  # rows of that table
         ("volume", "f8"),  # chamber [m3]
-        ("row", "i8"),  # row in its cluster
+        ("row", "i8"),  # row in its cluster; of a tank, its number
+        ("gates", "i8"),  # where only valves hold one rigid column: offset of these in `integers`, else -1
+        ("gate_count", "i8"),
         ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
         ("density", "f8"),  # of what a tank holds [kg/m3]
     ],
@@ -257,10 +259,10 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
 
 
 @functools.cache
-def tables_type():
-    """Numba's type of `tables`."""
+def table_types() -> tuple:
+    """Numba's types of the members of `tables`."""
     from numba import from_dtype, types
 
     records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
     flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
-    return types.Tuple((*records, *flats, *[types.Array(types.float64, 2, "C") for _ in MATRICES]))
+    return (*records, *flats, *[types.Array(types.float64, 2, "C") for _ in MATRICES])

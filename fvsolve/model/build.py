@@ -199,7 +199,7 @@ class Scene:
                     touched.setdefault(group[i], [])
                     if k not in touched[group[i]]:
                         touched[group[i]].append(k)
-        integers: list[int] = []
+        integers = self.integers = []
         clusters = []
         members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
         nodes["solve"] = rec.ALONE
@@ -209,7 +209,7 @@ class Scene:
             single = len(ks) == 1 and soft and self.case.fluid.law == "linear"
             nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
             valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
-            if not np.any(nodes["admittance"][members[root]] > 0.0):
+            if not np.any(nodes["admittance"][members[root]] > 0.0) and not self.carries_its_column(members[root], ks):
                 self.soften(ks)
             if single:
                 continue
@@ -225,15 +225,36 @@ class Scene:
                 nodes["row"][i] = 0
                 clusters.append((len(integers), 1, len(integers) + 1, 0))
                 integers.append(int(i))
+        self.gates()
         stiff = [k for k, v in enumerate(valves) if not inner[v["from_node"]] and not inner[v["to_node"]]]
         self.soften(stiff)
         self.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
-        self.integers = integers
         for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
             if nodes["solve"][i] == rec.ALONE:
                 name = list(self.case.nodes)[i]
                 self.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                            "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+    def gates(self) -> None:
+        """Note the valves of every node that they and one rigid column join, and nothing else."""
+        nodes, valves, columns = self.node_table, self.valve_table, self.column_table
+        nodes["gates"] = -1
+        bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
+        for i in np.flatnonzero(bare):
+            held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
+            if sum(i in (c["from_node"], c["to_node"]) for c in columns) == 1 and held and self.asks_nothing(i):
+                nodes["gates"][i], nodes["gate_count"][i] = len(self.integers), len(held)
+                self.integers += held
+
+    def asks_nothing(self, i: int) -> bool:
+        node = list(self.case.nodes.values())[i]
+        schedule = node.demand if node.kind == "junction" else node.flow
+        return not np.any(schedule.value)
+
+    def carries_its_column(self, members, ks) -> bool:
+        """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
+        ends = np.concatenate((self.column_table["from_node"], self.column_table["to_node"]))
+        return len(ks) == 1 and len(members) == 1 and members[0] in ends
 
     def soften(self, ks) -> None:
         """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10."""
@@ -292,7 +313,7 @@ class Scene:
         ):  # fmt: skip
             layout[name], at = at, at + size
         layout["size"], layout["ledger"], layout["ledgers"] = at, layout["supply"], len(self.node_table)
-        marks = np.full(len(pipes) + 3 * len(self.node_table), np.nan)
+        marks = np.full(len(pipes) + 3 * len(self.node_table) + len(self.column_table), np.nan)
         envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
         for array in (envelope, extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan

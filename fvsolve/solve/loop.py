@@ -84,6 +84,7 @@ class Loop:
         """Return to the state before the last step."""
         if self.flags[erk.BEHIND] == 1:
             self.memory[erk.T] -= self.memory[erk.LAST]
+            self.memory[erk.UNBOOKED] = 0.0
             self.flags[erk.NOW], self.flags[erk.OLD] = self.flags[erk.OLD], self.flags[erk.NOW]
             self.flags[erk.BEHIND] = 0
 

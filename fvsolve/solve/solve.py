@@ -123,8 +123,21 @@ class Run:
         self.loop.memory[erk.NEXT_OUTPUT] = self.loop.memory[erk.NEXT_FIELD] = 1.0
         self.begin_segment(self.starts_with_jump)
 
+    def stop_columns(self, end: float) -> None:
+        """Take the flow out of rigid columns that stand from now on; a mark where there was some."""
+        model, t = self.model, self.loop.t
+        out = model.evaluate(t, self.loop.now, end)[1]
+        for k, row in enumerate(model.tables[rec.I_COLUMNS]):
+            flow = row["flow"] + self.loop.now[row["y"]]
+            if flow != 0.0 and out[model.layout["column"] + k] == 0.0:
+                self.loop.now[row["y"]] = -row["flow"]
+                at = len(model.pipes) + 3 * len(model.node_names) + k
+                if abs(flow) > 1e-3 * model.scale[row["y"]] and np.isnan(model.tables[rec.I_MARKS][at]):
+                    model.tables[rec.I_MARKS][at] = t
+
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
+        self.stop_columns(end)
         if jumped:
             self.row(self.loop.t, end)
         self.loop.begin(end, end if jump else NO_LIMIT)

@@ -50,7 +50,9 @@ def find_marks(model: Model) -> list[Mark]:
     marks, pipes, nodes = model.tables[rec.I_MARKS], model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
+    kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     texts = {
+        "stopped dead": "its last way out shut while it flowed; a rigid column has no surge, a pipe would",
         "below vapor pressure": "pressure falls below vapour pressure; the liquid column would part",
         "dry": "the tank is dry but outflow is asked for; it goes on at level 0",
         "spilling": "the tank is full to its height and spills",

@@ -9,8 +9,8 @@ from math import isfinite, sqrt
 from fvsolve.jit import njit
 
 # What the loop remembers, in one flat array of floats that a restart stores.
-T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST = range(11)
-MEMORY = 11
+T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
+MEMORY = 12
 # What a call is told.
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
 ORDERS = 11
@@ -155,6 +155,16 @@ def all_finite(y):
 
 
 @njit
+def book(h, b, supply, ledger):
+    """Add a step of length h to the ledger, by the step's own weights; only once its end is known to be sound."""
+    for m in range(ledger.size):
+        total = 0.0
+        for i in range(b.size):
+            total += b[i] * supply[i, m]
+        ledger[m] += h * total
+
+
+@njit
 def arm(g, armed):
     """Note which event functions are at or below zero, where the rhs follows another rule; whether any changed.
 
@@ -211,16 +221,23 @@ def locate(rhs, events, handle, a, b, c, last_is_new, t, h, y, k, supply, where,
 
 
 @njit(forceinline=True)
+def shortest(orders, memory):
+    """A step that no rate shortens further: a column behind a valve that shuts gets infinitely quick [s]."""
+    return 1e-13 * max(abs(memory[T]), abs(orders[END]))
+
+
+@njit(forceinline=True)
 def next_step(orders, memory, out_rate, k, scale, order):
     """Length of the step to try, before the end of the segment is looked at [s]."""
     if orders[CONTROL] == TOLERANCE:
         if memory[STEP] <= 0.0:
             memory[STEP] = first_step(k, scale, order, orders[SIZE], orders[END] - memory[T])
         stable = 2.0 / out_rate if out_rate > 0.0 else orders[STEP_MAX]  # error control alone would chatter there
-        return min(memory[STEP], orders[STEP_MAX], stable)
+        return min(memory[STEP], orders[STEP_MAX], max(stable, shortest(orders, memory)))
     h = orders[SIZE]
     if orders[CONTROL] == COURANT:
         h = min(orders[SIZE] / out_rate, orders[STEP_MAX]) if out_rate > 0.0 else orders[STEP_MAX]
+        h = max(h, shortest(orders, memory))
     if h != memory[STEP]:
         memory[STEP], memory[T_MARK], memory[N_MARK] = h, memory[T], 0.0
     return h
@@ -317,6 +334,9 @@ def run_erk(
                 return BAD_VALUE
             if out[STATUS] != 0.0:
                 return BAD_STATUS
+            if memory[UNBOOKED] > 0.0:
+                book(memory[UNBOOKED], b, supply, ledger)
+                memory[UNBOOKED] = 0.0
             for m in range(ledger.size):
                 supply[0, m] = out[where + m]
         if flags[PHASE] == EMIT:
@@ -355,7 +375,7 @@ def run_erk(
             if orders[CONTROL] != TOLERANCE:
                 break
             e = error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])
-            if e <= 1.0:
+            if e <= 1.0 or (e == e and rest <= 1e3 * shortest(orders, memory)):  # round-off rules before a kink
                 grow = 0.9 * max(e, 1e-10) ** (-0.7 / order) * max(memory[ERROR_OLD], 1e-4) ** (0.4 / order)
                 if not last or grow < 1.0:
                     memory[STEP] = h * min(5.0, max(0.2, grow))
@@ -373,11 +393,7 @@ def run_erk(
             last = last and memory[T] + h >= orders[END]
             if orders[CONTROL] != TOLERANCE:
                 memory[STEP] = 0.0
-        for m in range(ledger.size):
-            total = 0.0
-            for i in range(s):
-                total += b[i] * supply[i, m]
-            ledger[m] += h * total
+        memory[UNBOOKED] = h
         t_old = memory[T]
         memory[N_MARK] += 1.0
         if last:

@@ -63,9 +63,7 @@ def chamber(volume: float, pressure: float | None = None, **more: Any) -> dict:
     return {"type": "chamber", "volume": volume, **given, **more}
 
 
-def pipe(
-    start: str, end: str, length: float, diameter: float, wave_speed: float, cells: int, **more: Any
-) -> dict:
+def pipe(start: str, end: str, length: float, diameter: float, wave_speed: float, cells: int, **more: Any) -> dict:
     return {
         "type": "pipe",
         "from": start,

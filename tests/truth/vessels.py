@@ -53,9 +53,7 @@ def filling(volume: float, modulus: float, flow_area: float, density: float, dro
     return falling_root(drop, modulus / volume * flow_area * math.sqrt(2 / density), t)
 
 
-def chambers_levelling(
-    volumes, modulus: float, flow_area: float, density: float, drop: float, t: Array
-) -> Array:
+def chambers_levelling(volumes, modulus: float, flow_area: float, density: float, drop: float, t: Array) -> Array:
     """Difference of pressure of two chambers joined by an orifice [Pa]."""
     compliance = modulus * (1 / volumes[0] + 1 / volumes[1])
     return falling_root(drop, compliance * flow_area * math.sqrt(2 / density), t)
