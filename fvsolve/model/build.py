@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import CaseError, Fault
 from fvsolve.kernels import records as rec
+from fvsolve.model.clusters import sort_nodes
+from fvsolve.model.density import add_density_table
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
@@ -184,90 +185,10 @@ class Scene:
         if link.laminar_reynolds is not None:
             row["transition"] = self.law.transition_flow(name, link, link.laminar_reynolds, self.fault)
 
-    # how nodes without storage are solved -------------------------------------------------------------------
-
-    def clusters(self) -> None:
-        """Sort nodes and valves into those with closed roots and those that Newton solves together."""
-        nodes, valves = self.node_table, self.valve_table
-        inner = nodes["kind"] == rec.JUNCTION
-        group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in valves
-                                   if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
-        touched: dict[int, list[int]] = {}
-        for k, v in enumerate(valves):
-            for i in {int(v["from_node"]), int(v["to_node"])}:
-                if inner[i]:
-                    touched.setdefault(group[i], [])
-                    if k not in touched[group[i]]:
-                        touched[group[i]].append(k)
-        integers = self.integers = []
-        clusters = []
-        members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
-        nodes["solve"] = rec.ALONE
-        leak = 1e-30 * max(valves["conductance"], default=0.0)
-        for root, ks in touched.items():
-            soft = np.all(nodes["admittance"][members[root]] > 0.0)
-            single = len(ks) == 1 and soft and self.case.fluid.law == "linear"
-            nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
-            valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
-            if not np.any(nodes["admittance"][members[root]] > 0.0) and not self.carries_its_column(members[root], ks):
-                self.soften(ks)
-            if single:
-                continue
-            for k in ks:
-                at = [valves[k]["from_node"], valves[k]["to_node"]]
-                if any(inner[i] and nodes["admittance"][i] == 0.0 for i in at):
-                    valves["leak"][k] = leak
-            nodes["row"][members[root]] = np.arange(len(members[root]))
-            clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
-            integers += members[root] + ks
-        if self.case.fluid.law != "linear":
-            for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
-                nodes["row"][i] = 0
-                clusters.append((len(integers), 1, len(integers) + 1, 0))
-                integers.append(int(i))
-        self.gates()
-        stiff = [k for k, v in enumerate(valves) if not inner[v["from_node"]] and not inner[v["to_node"]]]
-        self.soften(stiff)
-        self.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
-        for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
-            if nodes["solve"][i] == rec.ALONE:
-                name = list(self.case.nodes)[i]
-                self.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
-                           "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
-
-    def gates(self) -> None:
-        """Note the valves of every node that they and one rigid column join, and nothing else."""
-        nodes, valves, columns = self.node_table, self.valve_table, self.column_table
-        nodes["gates"] = -1
-        bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
-        for i in np.flatnonzero(bare):
-            held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
-            if sum(i in (c["from_node"], c["to_node"]) for c in columns) == 1 and held and self.asks_nothing(i):
-                nodes["gates"][i], nodes["gate_count"][i] = len(self.integers), len(held)
-                self.integers += held
-
-    def asks_nothing(self, i: int) -> bool:
-        node = list(self.case.nodes.values())[i]
-        schedule = node.demand if node.kind == "junction" else node.flow
-        return not np.any(schedule.value)
-
-    def carries_its_column(self, members, ks) -> bool:
-        """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
-        ends = np.concatenate((self.column_table["from_node"], self.column_table["to_node"]))
-        return len(ks) == 1 and len(members) == 1 and members[0] in ends
-
-    def soften(self, ks) -> None:
-        """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10."""
-        for k in ks:
-            if self.valve_table["transition"][k] == 0.0:
-                name = self.valve_names[k]
-                flow = self.law.transition_flow(name, self.case.links[name], 10.0, self.fault)
-                self.valve_table["transition"][k] = flow
-
     # the profile and the rest -------------------------------------------------------------------------------
 
     def settle(self) -> None:
-        self.clusters()
+        sort_nodes(self)
         self.check()
         self.profiles: dict[int, np.ndarray] = {}  # pipe -> pressure of the profile at centres [Pa]
         self.pack(np.zeros(self.profile_size()))
@@ -298,7 +219,7 @@ class Scene:
         s["stop_below"] = case.numerics.below_vapor == "stop"
         s["law"] = {"linear": rec.LAW_LINEAR, "log": rec.LAW_LOG, "table": rec.LAW_TABLE}[case.fluid.law]
         if self.fluid.table is not None:
-            self.pack_table(s)
+            add_density_table(self.fluid, s, self.floats)
         s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
@@ -323,24 +244,6 @@ class Scene:
             profile, np.zeros(max(2 * most + 64, system)), marks, np.zeros(2 * self.tanks), pieces,
             envelope, extremes,
         )  # fmt: skip
-
-    def pack_table(self, s) -> None:
-        """The density table: ln(rho / rho_ref), its slope, enthalpy and its slope, on a uniform grid."""
-        table, n = self.fluid.table, len(self.fluid.table.pressure)
-        p, k = np.asarray(table.pressure), np.asarray(table.compressibility)
-        step = (p[-1] - p[0]) / (n - 1)
-        s["table"], s["table_size"], s["table_start"], s["table_step"] = len(self.floats), n, p[0], step
-        value = hermite_at(p, np.asarray(table.log_density), k, self.fluid.pressure)
-        log_density = np.asarray(table.log_density) - value
-        nodes, weights = np.polynomial.legendre.leggauss(6)
-        h = np.zeros(n)
-        for x, w in zip(nodes, weights, strict=True):
-            at = p[:-1] + 0.5 * (1.0 + x) * step
-            h[1:] += 0.5 * w * step / (self.fluid.density * np.exp(hermite_at(p, log_density, k, at)))
-        h = np.cumsum(h)
-        slope = 1.0 / (self.fluid.density * np.exp(log_density))
-        h -= hermite_at(p, h, slope, self.fluid.pressure)
-        self.floats += [*log_density, *k, *h, *slope]
 
     def column_rates(self):
         stiff = self.node_table["stiffness"]
@@ -368,31 +271,3 @@ def shaped_volume(level, area, volume, z: float) -> float:
     k = int(np.searchsorted(level, z, side="right")) - 1
     s = z - level[k]
     return float(volume[k] + s * (area[k] + 0.5 * s * (area[k + 1] - area[k]) / (level[k + 1] - level[k])))
-
-
-def hermite_at(grid, values, slopes, at):
-    """Cubic Hermite interpolant of a uniform table at given places."""
-    step = grid[1] - grid[0]
-    k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
-                len(grid) - 2)  # fmt: skip
-    s = (at - grid[k]) / step
-    r = 1.0 - s
-    rise = values[k + 1] - values[k]
-    return values[k] + s * s * (3 - 2 * s) * rise + s * r * step * (r * slopes[k] - s * slopes[k + 1])
-
-
-def union(n: int, pairs) -> list[int]:
-    """Label of the set that each of n things belongs to when pairs are joined."""
-    label = list(range(n))
-
-    def root(i: int) -> int:
-        while label[i] != i:
-            i = label[i]
-        return i
-
-    for i, j in pairs:
-        label[root(int(i))] = root(int(j))
-    return [root(i) for i in range(n)]
-
-
-__all__ = ["Any", "build"]

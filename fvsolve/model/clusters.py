@@ -1,0 +1,104 @@
+"""How each node without storage is solved: alone, by a closed root, or by Newton with others. Knows indices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+
+def sort_nodes(scene) -> None:
+    """Sort nodes and valves into those with closed roots and those that Newton solves together."""
+    nodes, valves = scene.node_table, scene.valve_table
+    inner = nodes["kind"] == rec.JUNCTION
+    group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in valves
+                               if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
+    touched: dict[int, list[int]] = {}
+    for k, v in enumerate(valves):
+        for i in {int(v["from_node"]), int(v["to_node"])}:
+            if inner[i]:
+                touched.setdefault(group[i], [])
+                if k not in touched[group[i]]:
+                    touched[group[i]].append(k)
+    integers = scene.integers = []
+    clusters = []
+    members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
+    nodes["solve"] = rec.ALONE
+    leak = 1e-30 * max(valves["conductance"], default=0.0)
+    for root, ks in touched.items():
+        soft = np.all(nodes["admittance"][members[root]] > 0.0)
+        single = len(ks) == 1 and soft and scene.case.fluid.law == "linear"
+        nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
+        valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
+        if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(scene, members[root], ks):
+            soften(scene, ks)
+        if single:
+            continue
+        for k in ks:
+            at = [valves[k]["from_node"], valves[k]["to_node"]]
+            if any(inner[i] and nodes["admittance"][i] == 0.0 for i in at):
+                valves["leak"][k] = leak
+        nodes["row"][members[root]] = np.arange(len(members[root]))
+        clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
+        integers += members[root] + ks
+    if scene.case.fluid.law != "linear":
+        for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
+            nodes["row"][i] = 0
+            clusters.append((len(integers), 1, len(integers) + 1, 0))
+            integers.append(int(i))
+    gates(scene)
+    stiff = [k for k, v in enumerate(valves) if not inner[v["from_node"]] and not inner[v["to_node"]]]
+    soften(scene, stiff)
+    scene.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
+    for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
+        if nodes["solve"][i] == rec.ALONE:
+            name = list(scene.case.nodes)[i]
+            scene.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
+                       "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+
+def gates(scene) -> None:
+    """Note the valves of every node that they and one rigid column join, and nothing else."""
+    nodes, valves, columns = scene.node_table, scene.valve_table, scene.column_table
+    nodes["gates"] = -1
+    bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
+    for i in np.flatnonzero(bare):
+        held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
+        if sum(i in (c["from_node"], c["to_node"]) for c in columns) == 1 and held and asks_nothing(scene, i):
+            nodes["gates"][i], nodes["gate_count"][i] = len(scene.integers), len(held)
+            scene.integers += held
+
+
+def asks_nothing(scene, i: int) -> bool:
+    node = list(scene.case.nodes.values())[i]
+    schedule = node.demand if node.kind == "junction" else node.flow
+    return not np.any(schedule.value)
+
+
+def carries_its_column(scene, members, ks) -> bool:
+    """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
+    ends = np.concatenate((scene.column_table["from_node"], scene.column_table["to_node"]))
+    return len(ks) == 1 and len(members) == 1 and members[0] in ends
+
+
+def soften(scene, ks) -> None:
+    """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10."""
+    for k in ks:
+        if scene.valve_table["transition"][k] == 0.0:
+            name = scene.valve_names[k]
+            flow = scene.law.transition_flow(name, scene.case.links[name], 10.0, scene.fault)
+            scene.valve_table["transition"][k] = flow
+
+
+def union(n: int, pairs) -> list[int]:
+    """Label of the set that each of n things belongs to when pairs are joined."""
+    label = list(range(n))
+
+    def root(i: int) -> int:
+        while label[i] != i:
+            i = label[i]
+        return i
+
+    for i, j in pairs:
+        label[root(int(i))] = root(int(j))
+    return [root(i) for i in range(n)]
