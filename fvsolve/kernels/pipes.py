@@ -164,8 +164,9 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
         rates_upwind(k, pipe["flow"], pipe["loss"], base, r, l, r_in, l_in, dr, dl)
         return
     if settings["scheme"] == LINEAR and n >= 5:
-        rates_linear(settings, k, 0, r, r_in, scratch[:5], dr)
-        rates_linear(settings, k, 1, l, l_in, scratch[:5], dl)
+        for backward in range(2):
+            c, datum, d = (l, l_in, dl) if backward == 1 else (r, r_in, dr)
+            rates_linear(settings, k, backward, c, datum, scratch[:5], d)
     else:
         fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
         both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)

@@ -47,7 +47,7 @@ def copy(source, target):
         target[i] = source[i]
 
 
-@njit(forceinline=True)
+@njit
 def combine(y, h, weights, count, k, out):
     """out = y + h sum of weights[j] k[j] over j < count; up to three terms a pass."""
     terms, c, which = 0, (0.0, 0.0, 0.0), (0, 0, 0)
@@ -86,7 +86,7 @@ def add(y, c, which, terms, k, out):
             out[i] = y[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
 
 
-@njit(forceinline=True)
+@njit
 def stages(rhs, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new):
     """Stages 2 .. s from k[0], then y_new; supply[i] keeps the ledger rates of stage i."""
     s = b.size
