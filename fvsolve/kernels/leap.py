@@ -12,9 +12,7 @@ from fvsolve.kernels.observer import note, observe_linear, record_nodes
 from fvsolve.kernels.records import (
     I_ENVELOPE,
     I_LAYOUT,
-    I_MARKS,
     I_PIPES,
-    I_PROFILE,
     I_SCRATCH,
     NOT_FINITE,
     STATUS,
@@ -42,12 +40,12 @@ def leap_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
 
 
 @njit
-def leap_block(t, h, pipe, which, at, r, l, r_new, l_new, e, profile, marks):
-    """`leap_cells` from cell `at` of a pipe, and its envelope e at t; returns zero where all cells are finite."""
-    a, b = pipe["cell"] + at, pipe["cell"] + at + r_new.size
+def leap_block(t, h, pipe, which, at, r, l, r_new, l_new, tables):
+    """`leap_cells` from cell `at` of a pipe, and its envelope at t; returns zero where all cells are finite."""
+    e, a, b = tables[I_ENVELOPE], pipe["cell"] + at, pipe["cell"] + at + r_new.size
     k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
     low, high = leap_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b])
-    return note(t, r_new, l_new, a, low, high, which, e, profile, marks) if low + high > 0 else 0
+    return note(t, r_new, l_new, a, low, high, which, tables) if low + high > 0 else 0
 
 
 @njit
@@ -58,7 +56,6 @@ def leap_linear(t, h, y, y_new, out, handle, values):
     """
     tables = open_tables(handle)
     pipes, pad, bad = tables[I_PIPES], tables[I_SCRATCH][:4], 0
-    seen = tables[I_ENVELOPE], tables[I_PROFILE], tables[I_MARKS]
     for which in range(pipes.size):
         pipe = pipes[which]
         n, o, ends = pipe["cells"], pipe["y"], tables[I_LAYOUT][0]["ends"] + 4 * which
@@ -67,10 +64,10 @@ def leap_linear(t, h, y, y_new, out, handle, values):
             i = side * (n - 1)
             pad[0], pad[1] = out[ends] if i == 0 else r[i - 1], r[i]
             pad[2], pad[3] = l[i], out[ends + 3] if i == n - 1 else l[i + 1]
-            bad += leap_block(t, h, pipe, which, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], *seen)
+            bad += leap_block(t, h, pipe, which, i, pad[:2], pad[2:], r_new[i : i + 1], l_new[i : i + 1], tables)
         for i in range(1, n - 1, BLOCK):
             j = min(i + BLOCK, n - 1)
-            bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], *seen)
+            bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
     rhs_linear(t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)
     record_nodes(t, out, tables, values)

@@ -126,11 +126,12 @@ def count_below(r, l, boiling):
 
 
 @njit
-def note(t, r, l, at, low, high, which, e, profile, marks):
-    """Widen the envelope e from cell `at` on by r + l, `low` and `high` of which lie outside; marks a pipe that boils.
+def note(t, r, l, at, low, high, which, tables):
+    """Widen the envelope from cell `at` on by r + l, `low` and `high` of which lie outside; marks a pipe that boils.
 
     Returns zero where all values are finite.
     """
+    e, profile, marks = tables[I_ENVELOPE], tables[I_PROFILE], tables[I_MARKS]
     b, bad = at + r.size, 0
     if low > 0:
         bad += widen_low(t, r, l, e[0, at:b], e[1, at:b])
@@ -143,15 +144,15 @@ def note(t, r, l, at, low, high, which, e, profile, marks):
 
 
 @njit
-def record_pipe(t, r, l, pipe, which, envelope, profile, marks):
+def record_pipe(t, r, l, pipe, which, tables):
     """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
-    start, at = 0, pipe["cell"]
+    start, at, envelope = 0, pipe["cell"], tables[I_ENVELOPE]
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
         low, high = outside(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b])
         if low + high > 0:
-            note(t, r[start:stop], l[start:stop], a, low, high, which, envelope, profile, marks)
+            note(t, r[start:stop], l[start:stop], a, low, high, which, tables)
         start = stop
 
 
@@ -161,12 +162,10 @@ def record_all(t, y, out, tables, values):
 
     marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
     """
-    pipes, marks = tables[I_PIPES], tables[I_MARKS]
+    pipes = tables[I_PIPES]
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
-        record_pipe(
-            t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables[I_ENVELOPE], tables[I_PROFILE], marks
-        )
+        record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
     record_nodes(t, out, tables, values)
 
 
