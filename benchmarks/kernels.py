@@ -1,8 +1,10 @@
 """Cell-steps per second of one acoustic pipe, beside a triad: `python benchmarks/kernels.py [cells ...]`.
 
-A cell-step is one cell over one whole step of the method. The STREAM triad has arrays of twice as many
-elements as there are cells: as many bytes in play as two fields with three buffers each. `of triad` is the
-share of its bandwidth for the bytes that a cell-step cannot do without. One thread.
+A cell-step is one cell over one whole step of the method, by the stepping loop of fvsolve.run: a pipe between a
+reservoir and a gate that shuts, without friction, with the envelope kept and NaN looked for; no rows in between.
+The STREAM triad has arrays of twice as many elements as there are cells: as many bytes in play as two fields
+with three buffers each. `of triad` is the share of its bandwidth for the bytes that a cell-step cannot do without:
+for SSP-RK2 80: each stage in one pass over both fields (the loop makes several). One thread.
 """
 
 from __future__ import annotations
@@ -12,8 +14,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import networks
 import numba
 import numpy as np
+
+from fvsolve.case import load
+from fvsolve.model import build
+from fvsolve.solve import initial_state
+from fvsolve.solve.loop import NO_LIMIT, Loop
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
 TRIAD_BYTES = 24  # per element: two read, one written (the line fetched before writing is not counted)
@@ -32,9 +40,43 @@ class Subject:
     prepare: Callable[[int], Callable[[int], None]]
 
 
+SCHEMES = (  # scheme, limiter, Courant number
+    ("upwind", "", 0.9),
+    ("upwind3", "", 0.8),
+    ("upwind5", "", 0.5),
+    ("muscl", "minmod", 0.8),
+    ("muscl", "van-leer", 0.8),
+    ("muscl", "monotonized-central", 0.8),
+    ("weno5", "", 0.5),
+)
+# Two stages, each in one pass: read y, write the stage; read y and the stage, write y; two fields.
+STEP_BYTES = 16 * (2 + 3)
+
+
 def schemes() -> list[Subject]:
-    """fvsolve's schemes with SSP-RK2 and two fields."""
-    return []
+    """fvsolve's schemes with SSP-RK2 and two fields, and upwind with Euler, which leaps."""
+    subjects = [Subject("upwind, Euler", 32, stepping("upwind", "", "euler", 1.0))]
+    for scheme, limiter, courant in SCHEMES:
+        title = f"{scheme} {limiter}".strip() + ", SSP-RK2"
+        subjects.append(Subject(title, STEP_BYTES, stepping(scheme, limiter, "ssp-rk2", courant)))
+    return subjects
+
+
+def stepping(scheme: str, limiter: str, method: str, courant: float) -> Callable[[int], Callable[[int], None]]:
+    """fvsolve's loop on one pipe."""
+
+    def prepare(cells: int) -> Callable[[int], None]:
+        case = networks.uniform_case(networks.UNIFORM, cells, 10**9, rows=1)
+        case["links"]["main"]["friction"] = {"model": "none"}
+        case["numerics"] |= {"scheme": scheme, "method": method, "courant": courant}
+        case["numerics"] |= {"limiter": limiter} if limiter else {}
+        model = build(load(case))
+        loop = Loop(model)
+        loop.now[:] = initial_state(model).y
+        loop.begin(case["numerics"]["end"], NO_LIMIT)
+        return lambda steps: loop.run(steps)
+
+    return prepare
 
 
 def pyclaw() -> list[Subject]:

@@ -42,9 +42,7 @@ def value_muscl(limiter, b, c, d):
 def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
     """F[j] = sum of w_k P[j+k]."""
     for j in range(f.size):
-        f[j] = (
-            (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3]) + (w4 * p[j + 4] + w5 * p[j + 5])
-        )
+        f[j] = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3]) + (w4 * p[j + 4] + w5 * p[j + 5])
 
 
 @njit

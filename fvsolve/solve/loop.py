@@ -67,7 +67,8 @@ class Loop:
         m = self.method
         self.orders[erk.BUDGET] = budget
         return self.step(
-            self.rhs, self.leap, self.observe, self.record, self.events, self.model.handle, m.a, m.b, m.c, m.error, m.dense,
+            self.rhs, self.leap, self.observe, self.record, self.events,
+            self.model.handle, m.a, m.b, m.c, m.error, m.dense,
             max(m.error_order + 1, 1) if m.adaptive else m.order, m.first_same_as_last, self.orders, self.memory,
             self.flags, self.y, self.k, self.f_old, self.supply, int(self.model.layout["ledger"]), self.ledger,
             self.model.scale, self.out, self.out_row, self.values, self.g, self.g_new,

@@ -419,7 +419,7 @@ def compiled():
         return run_erk
     from numba import types
 
-    f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
+    i, v, w = types.int64, types.float64[::1], types.float64[:, ::1]
     run_erk.compile(
         (*function_types(), types.int64[::1], w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
          i, v, v, v, v, v, v, v, v, v, w)
