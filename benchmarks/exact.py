@@ -45,9 +45,7 @@ class Network:
 
     def admittance(self, node):
         """Sum of g A/a of the pipe ends at a node [m2/s]."""
-        return sum(
-            self.gravity * p.area / p.wave_speed for p in self.pipes for end in (p.from_, p.to) if end == node
-        )
+        return sum(self.gravity * p.area / p.wave_speed for p in self.pipes for end in (p.from_, p.to) if end == node)
 
     @property
     def jump(self):

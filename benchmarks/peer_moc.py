@@ -89,8 +89,7 @@ def heads(network, closure, dt, repeats=1):
     solver = network_solver(faint, closure, dt, steady_flows(faint))
     cpu, results = timed(solver, network.end, dt, repeats)
     found = {
-        p: network.head + (np.asarray(results["node_head"][p]) * FOOT - network.head) / FAINT
-        for p in network.probes
+        p: network.head + (np.asarray(results["node_head"][p]) * FOOT - network.head) / FAINT for p in network.probes
     }
     return cpu, np.asarray(results["time"]), found
 

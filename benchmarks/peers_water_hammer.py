@@ -82,9 +82,7 @@ def by_characteristics(network, closure, response, dt):
     cpu, times, heads = peer_moc.heads(network, closure, dt, repeats=5 if dt > 4e-4 else 1)
     stride = max(1, round(EVERY / dt))
     exact = exact_heads(network, closure, times[stride - 1 :: stride], response)
-    found = (
-        np.array([np.abs(heads[p][stride - 1 :: stride] - exact[p]) for p in network.probes]) / network.jump
-    )
+    found = np.array([np.abs(heads[p][stride - 1 :: stride] - exact[p]) for p in network.probes]) / network.jump
     cells = sum(max(1, round(p.travel / dt)) for p in network.pipes)
     return Run(dt, cells, cpu, found.max(), found.mean())
 
@@ -122,9 +120,7 @@ def table(title, runs, unit):
     print(f"    {unit:>11} {'cells':>7} {'CPU ms':>10} {'greatest':>9} {'mean':>9} {'whole ms':>9}")
     for r in runs:
         whole = f"{r.whole * 1e3:9.1f}" if np.isfinite(r.whole) else " " * 9
-        row = (
-            f"{r.size * 1e3:8.4f} ms {r.cells:7d} {r.cpu * 1e3:10.2f} {r.greatest:9.1e} {r.mean:9.1e} {whole}"
-        )
+        row = f"{r.size * 1e3:8.4f} ms {r.cells:7d} {r.cpu * 1e3:10.2f} {r.greatest:9.1e} {r.mean:9.1e} {whole}"
         print(f"    {row}")
 
 
@@ -171,9 +167,7 @@ def agreement(network, dt=1e-3):
         by_characteristics(whole, networks.CLOSURES[name], impulse_response(whole), dt).greatest
         for name in ("smooth", "ramp")
     )
-    print(
-        f"  where every length is a whole number of steps, rthym-moc and exact.py differ by {worst:.1e} jumps"
-    )
+    print(f"  where every length is a whole number of steps, rthym-moc and exact.py differ by {worst:.1e} jumps")
 
 
 def rate_table(sizes=((100, 500_000), (1_000, 100_000), (10_000, 40_000))):

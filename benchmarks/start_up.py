@@ -49,13 +49,7 @@ def main() -> None:
     print("| start | best [s] | worst [s] | runs | goal [s] | |\n|---|---|---|---|---|---|")
     for start, walls in measure(arguments.case, arguments.times).items():
         goal = GOALS.get(start)
-        verdict = (
-            ""
-            if goal is None
-            else "met"
-            if min(walls) <= goal
-            else f"missed by {min(walls) / goal:.2f} times"
-        )
+        verdict = "" if goal is None else "met" if min(walls) <= goal else f"missed by {min(walls) / goal:.2f} times"
         stated = "" if goal is None else f"{goal:g}"
         print(f"| {start} | {min(walls):.2f} | {max(walls):.2f} | {len(walls)} | {stated} | {verdict} |")
 

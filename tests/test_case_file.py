@@ -216,9 +216,7 @@ def test_every_form_is_understood(tmp_path):
     assert case.nodes["tower"].area.area.tolist() == [1, 2, 4]
     assert case.fluid.viscosity == approx(32e-6 * 870)
     hole = case.links["hole"]
-    assert (
-        hole.kind == "orifice" and hole.opening.exponent == 1.5 and hole.characteristic == "equal-percentage"
-    )
+    assert hole.kind == "orifice" and hole.opening.exponent == 1.5 and hole.characteristic == "equal-percentage"
     assert hole.flow_area() == approx(np.pi / 4 * 0.01**2 / np.sqrt(2.4))
     assert case.elevations_stated and case.elevation("tower") == 3
     assert case.elevation("lake") == 1  # given by head: level with the far end of its first link
@@ -379,9 +377,7 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
 
 def test_a_parts_key_is_documented_with_its_unit():
     made = schema()
-    pipe = next(
-        one for one in made["properties"]["links"]["additionalProperties"]["anyOf"] if one["title"] == "Pipe"
-    )
+    pipe = next(one for one in made["properties"]["links"]["additionalProperties"]["anyOf"] if one["title"] == "Pipe")
     assert pipe["required"] == ["type", "from", "to", "length", "diameter"]
     assert pipe["properties"]["length"]["description"] == "along its axis [m]"
     assert made["required"] == ["fluid", "nodes", "links", "numerics"]
@@ -398,9 +394,7 @@ def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
 
 def test_shipped_cases_point_editors_to_the_schema():
     folder = Path(__file__).parents[1] / "cases"
-    assert (
-        json.loads((folder / "schema.json").read_text()) == schema()
-    )  # else: fvsolve schema > cases/schema.json
+    assert json.loads((folder / "schema.json").read_text()) == schema()  # else: fvsolve schema > cases/schema.json
     for path in folder.glob("*.toml"):
         assert path.read_text(encoding="utf-8").startswith("#:schema schema.json\n"), path.name
 

@@ -143,10 +143,7 @@ def test_any_setting_is_a_case_or_faults(seed, key, value):
 
 
 @SETTINGS
-@given(
-    data=st.binary(max_size=80)
-    | st.text(max_size=80).map(lambda text: f"t,s\n{text}".encode("utf-8", "replace"))
-)
+@given(data=st.binary(max_size=80) | st.text(max_size=80).map(lambda text: f"t,s\n{text}".encode("utf-8", "replace")))
 def test_any_schedule_file_is_a_schedule_or_faults(tmp_path, data):
     (tmp_path / "x.csv").write_bytes(data)
     (tmp_path / "case.toml").write_text(SCENE)

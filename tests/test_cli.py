@@ -92,10 +92,7 @@ def test_json_is_one_object_with_unrounded_numbers(case, fvs):
     said = json.loads(out)
     assert code == 0 and err == ""
     assert said["reason"] == "finished" and Path(said["directory"]) == Path("there")
-    assert (
-        said["extremes"]["gate.pressure"]["greatest"]
-        == fvsolve.open_run("there").extremes["gate.pressure"][2]
-    )
+    assert said["extremes"]["gate.pressure"]["greatest"] == fvsolve.open_run("there").extremes["gate.pressure"][2]
 
 
 def test_several_cases_go_to_directories_of_their_own(case, fvs):

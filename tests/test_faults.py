@@ -72,8 +72,7 @@ def test_the_example_of_the_design(tmp_path):
     )
     assert faults(text, tmp_path).splitlines() == [
         "scene.toml: 3 faults",
-        '  line 25: links.main.to: no place named "gat"; places are gate, lake, outfall; '
-        'did you mean "gate"?',
+        '  line 25: links.main.to: no place named "gat"; places are gate, lake, outfall; did you mean "gate"?',
         '  line 27: links.main.diameter: "304.8 kg" is a mass; wanted a length, for example "300 mm"',
         '  line 38: links.valve.openning: unknown key; did you mean "opening"?',
     ]
@@ -129,9 +128,7 @@ from = "t"
 to = "gate"
 Kv = 1
 """
-CHAMBER = TANK.replace("tank", "chamber").replace(
-    "area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"'
-)
+CHAMBER = TANK.replace("tank", "chamber").replace("area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"')
 
 
 def tank(old, new):
@@ -206,9 +203,7 @@ BAD = {
     ),
     "disconnected": (SCENE + ISLAND, "links: disconnected network of 2 pieces: gate, lake, outfall | c, d"),
     "nothing fixes the pressure": (
-        swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace(
-            '"reservoir"\npressure = "0 barg"', '"junction"'
-        ),
+        swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace('"reservoir"\npressure = "0 barg"', '"junction"'),
         "nodes: nothing fixes the pressure; wanted a reservoir, tank or chamber",
     ),
     "only rigid columns": (
@@ -540,8 +535,7 @@ BAD = {
     ),
     "probe of no quantity": (
         swap("gate.pressure", "gate.presure"),
-        'gate is a junction, without "presure"; it has pressure, gauge_pressure, head; '
-        'did you mean "pressure"?',
+        'gate is a junction, without "presure"; it has pressure, gauge_pressure, head; did you mean "pressure"?',
     ),
     "probe of a level that is not there": (
         swap("gate.pressure", "lake.level"),
@@ -672,12 +666,7 @@ def test_the_scene_itself_has_no_fault(tmp_path):
 
 
 def test_all_faults_come_at_once(tmp_path):
-    text = (
-        swap('"914.4 m"', "-1")
-        .replace('"304.8 mm"', '"3 kg"')
-        .replace("0.6", "7")
-        .replace('"10 s"', '"10 m"')
-    )
+    text = swap('"914.4 m"', "-1").replace('"304.8 mm"', '"3 kg"').replace("0.6", "7").replace('"10 s"', '"10 m"')
     text = text.replace("gate.pressure", "gat.pressure").replace('to = "outfall"', 'to = "outfal"')
     found = faults(text, tmp_path)
     for key in (

@@ -44,9 +44,7 @@ def isentropic_density(name, temperature, pressure, reached) -> float:
     """rho at `reached`: from the temperature of equal entropy (CoolProp's own flash errs by up to 1e-9)."""
     entropy = PropsSI("S", "T", temperature, "P", pressure, name)
     span = (temperature - 5.0, temperature + 60.0)
-    found = brentq(
-        lambda t: PropsSI("S", "T", t, "P", reached, name) - entropy, *span, xtol=1e-11, rtol=1e-14
-    )
+    found = brentq(lambda t: PropsSI("S", "T", t, "P", reached, name) - entropy, *span, xtol=1e-11, rtol=1e-14)
     return PropsSI("D", "T", found, "P", reached, name)
 
 
@@ -126,9 +124,7 @@ def test_constant_modulus_is_more_than_5_kg_too_dense_at_1000_bar():
 
 
 def test_given_keys_stand_in_place_of_coolprops():
-    water = properties(
-        "Water", ROOM, ATM, density=1000.0, bulk_modulus=2e9, viscosity=1e-3, vapor_pressure=0.0
-    )
+    water = properties("Water", ROOM, ATM, density=1000.0, bulk_modulus=2e9, viscosity=1e-3, vapor_pressure=0.0)
     values = (water.density, water.bulk_modulus, water.viscosity, water.vapor_pressure)
     assert values == (1000.0, 2e9, 1e-3, 0.0)
 
@@ -210,9 +206,7 @@ print(json.dumps([numbers, "CoolProp" in sys.modules, "scipy" in sys.modules]))
 """
 
     def ask():
-        return json.loads(
-            subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout
-        )
+        return json.loads(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout)
 
     cold, warm = ask(), ask()
     assert cold[1] is True

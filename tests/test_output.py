@@ -132,9 +132,7 @@ def test_the_series_is_whole_after_every_frame(tmp_path):
     model = fvsolve.build(fvsolve.load(branched()))
     series = FieldSeries(tmp_path, model)
     series.start()
-    zero = dict.fromkeys(
-        ("pressure", "head", "velocity", "flow", "least_pressure", "greatest_pressure"), np.zeros(30)
-    )
+    zero = dict.fromkeys(("pressure", "head", "velocity", "flow", "least_pressure", "greatest_pressure"), np.zeros(30))
     frame = {pipe.name: {name: one[: pipe.cells] for name, one in zero.items()} for pipe in model.pipes}
     assert read_series(tmp_path / "fields.pvd") == []
     for count in range(1, 4):
@@ -220,9 +218,7 @@ def test_a_comparison_finds_a_shifted_copy_of_the_run(folder, tmp_path):
     measured = {"file": str(tmp_path / "rig.csv"), "time": "clock [ms]", "value": "p [barg]", "shift": 0.05}
     found = fvsolve.run(branched(compare={"gate.pressure": measured}), out=tmp_path / "run")
     (one,) = found.comparisons
-    assert one.rms == pytest.approx(0.5e5, rel=1e-3) and one.greatest_difference == pytest.approx(
-        -0.5e5, rel=1e-3
-    )
+    assert one.rms == pytest.approx(0.5e5, rel=1e-3) and one.greatest_difference == pytest.approx(-0.5e5, rel=1e-3)
     assert one.computed_peak == pytest.approx(one.measured_peak - 0.5e5)
     assert one.t_computed_peak == pytest.approx(one.t_measured_peak)
     assert (tmp_path / "run" / "rig.csv").is_file()

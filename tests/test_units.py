@@ -91,11 +91,7 @@ def test_spelling_agrees_with_pint(spelling, registry):
     factor, name = (float(words[0]), words[1]) if len(words) == 2 else (1.0, words[0])
     wanted = PINT_SI[DIMENSIONS[unit.dimension].si]
     for number in (1.0, 36.6):
-        si = (
-            registry.Quantity(number * factor, registry.parse_expression(name).units)
-            if "/" not in name
-            else None
-        )
+        si = registry.Quantity(number * factor, registry.parse_expression(name).units) if "/" not in name else None
         if si is None:
             si = number * factor * registry.parse_expression(name)
         assert unit.si(number) == approx(si.to(wanted).magnitude, rel=1e-12)
@@ -215,7 +211,5 @@ def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
 
 
 def test_the_table_needs_no_pint():
-    code = (
-        "import sys; from fvsolve.units import parse; parse('1 l', 'volume'); sys.exit('pint' in sys.modules)"
-    )
+    code = "import sys; from fvsolve.units import parse; parse('1 l', 'volume'); sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

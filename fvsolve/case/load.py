@@ -93,9 +93,7 @@ class _Reader:
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.raw.table))
         self.add(
-            check.parts(
-                parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw
-            )
+            check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
         )
         if numerics is not None:
             has_cells = any(kind is Pipe for kind in kinds["links"].values())
@@ -171,9 +169,7 @@ class _Reader:
         try:
             ambient, gauge = units.parse(given, "pressure")
             if gauge:
-                raise ValueError(
-                    f'{show(given)} is a gauge pressure; wanted an absolute one, for example "1 atm"'
-                )
+                raise ValueError(f'{show(given)} is a gauge pressure; wanted an absolute one, for example "1 atm"')
             if ambient <= 0:
                 raise ValueError(f'{show(given)} is absolute, a vacuum; wanted for example "1 atm"')
             self.setting.ambient = ambient

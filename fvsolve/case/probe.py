@@ -43,9 +43,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if not parts:
         names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
         what = {"nodes": "node", "links": "link"}.get(part or "", "part")
-        raise ValueError(
-            f"no {what} named {show(name)}; {what}s are {listing(names)}{did_you_mean(name, names)}"
-        )
+        raise ValueError(f"no {what} named {show(name)}; {what}s are {listing(names)}{did_you_mean(name, names)}")
     if any(kinds[part][name] is None for part in parts):
         return None
     found, problems = [], []
@@ -75,9 +73,7 @@ def default_probes(kinds: Kinds) -> list[Probe]:
     return found
 
 
-def _quantity(
-    kind: type[Node] | type[Link], name: str, quantity: str, place: str | None
-) -> tuple[float | None, str]:
+def _quantity(kind: type[Node] | type[Link], name: str, quantity: str, place: str | None) -> tuple[float | None, str]:
     along = getattr(kind, "along", {})
     known = {**along, **kind.quantities}
     article = "an" if kind.kind[0] in "aeiou" else "a"
@@ -89,9 +85,7 @@ def _quantity(
             raise ValueError(f'{name} is a {kind.kind}: say where, for example "{name}.{quantity}@0.5"')
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:
-        raise ValueError(
-            f"{name} is {article} {kind.kind}: {quantity} has no place along it; leave @{place} out"
-        )
+        raise ValueError(f"{name} is {article} {kind.kind}: {quantity} has no place along it; leave @{place} out")
     try:
         fraction = float(place)
     except ValueError:

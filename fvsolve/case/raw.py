@@ -106,9 +106,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
             part = raw.get((group, name))
             if not isinstance(part, dict) or "type" not in part:
                 hint = did_you_mean(name, before[group])
-                faults.append(
-                    Fault(".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True)
-                )
+                faults.append(Fault(".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True))
                 raw.table[group].pop(name, None)
     return faults
 
@@ -118,9 +116,7 @@ def _read_text(path: Path) -> str:
         return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError:
         near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-        raise CaseError(
-            [Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)
-        ) from None
+        raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
     except IsADirectoryError:
         raise CaseError([Fault("", "is a directory; wanted a TOML file")], str(path)) from None
     except UnicodeDecodeError as error:

@@ -39,9 +39,7 @@ class FluidSpec(Table):
     """`[fluid]`: which fluid, at which state, under which density law; numbers here override CoolProp's."""
 
     name: Annotated[str, Text('a CoolProp fluid, "INCOMP::..." or "user"')]
-    temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = (
-        293.15
-    )
+    temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = 293.15
     pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]")] = 101325.0
     law: Annotated[str, Choice("density law", LAWS, "one for the case")] = "linear"
     density: Annotated[float | None, Quantity("density", positive, "[kg/m3]")] = None
@@ -67,9 +65,7 @@ class Numerics(Table):
     step: Annotated[float | None, Quantity("time", positive, "fixed step [s]")] = None
     rtol: Annotated[float | None, Number(between(0, 1, open=True), "error per step, relative")] = None
     cell_time: Annotated[float | None, Quantity("time", positive, "of pipes that state no cells [s]")] = None
-    below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = (
-        "continue"
-    )
+    below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
     def filled(self, has_cells: bool) -> Numerics:
         """The same with the step control and method that are the default, cells present or not."""
@@ -95,9 +91,7 @@ class OutputUnits(Value):
         for quantity, unit in given.items():
             if quantity not in self.quantities:
                 near = did_you_mean(str(quantity), self.quantities)
-                faults.append(
-                    ((quantity,), f"unknown quantity{near}; quantities are {', '.join(self.quantities)}")
-                )
+                faults.append(((quantity,), f"unknown quantity{near}; quantities are {', '.join(self.quantities)}"))
                 continue
             try:
                 if not isinstance(unit, str):
@@ -138,9 +132,7 @@ class Output(Table):
     """`[output]`: when and what is recorded, and in which units it is shown."""
 
     every: Annotated[float | None, Quantity("time", positive, "between rows of the history [s]")] = None
-    fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none")] = (
-        DEFAULT_FRAMES
-    )
+    fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none")] = DEFAULT_FRAMES
     probes: Annotated[Any, Names()] = None
     units: Annotated[dict[str, str], OutputUnits()] = {}
 

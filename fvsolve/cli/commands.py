@@ -20,13 +20,9 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Cases = Annotated[
-    list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")
-]
+Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 One = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-Set = Annotated[
-    list[str], typer.Option("--set", metavar="KEY=VALUE", help="override a key: links.main.cells=400")
-]
+Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override a key: links.main.cells=400")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
 
 

@@ -26,9 +26,7 @@ def result(one) -> None:
         console.print(said["title"], style="bold", highlight=False)
     _extremes(console, one)
     for mark in said["marks"]:
-        _line(
-            console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow"
-        )
+        _line(console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow")
     for name, ledger in said["ledgers"].items():
         _line(console, f"{name} ledger: {_ledger(ledger)}")
     for claim in said["expectations"]:
@@ -37,9 +35,7 @@ def result(one) -> None:
         _line(console, _comparison(measured))
     for warning in said["warnings"]:
         _line(console, f"note: {warning}")
-    _line(
-        console, f"{said['reason']} at t = {said['t']:.6g} s; {_cost(said)}", None if one.ok else "bold red"
-    )
+    _line(console, f"{said['reason']} at t = {said['t']:.6g} s; {_cost(said)}", None if one.ok else "bold red")
     if one.directory:
         _line(console, f"{one.directory}: {', '.join(said['files'])}")
     if said["reason"].startswith("interrupted"):

@@ -49,16 +49,12 @@ def copy(name: str, to: Path) -> list[Path]:
     from fvsolve.case import load
 
     if name not in names():
-        raise FvsolveError(
-            f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}"
-        )
+        raise FvsolveError(f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}")
     if to.is_dir():
         to = to / f"{name}.toml"
     source = folder() / f"{name}.toml"
     pairs = [(source, to)]
-    pairs += [
-        (Path(path), to.parent / Path(path).absolute().relative_to(folder())) for path in load(source).files
-    ]
+    pairs += [(Path(path), to.parent / Path(path).absolute().relative_to(folder())) for path in load(source).files]
     described = to.parent / SCHEMA
     for _, target in pairs:
         if target.exists():

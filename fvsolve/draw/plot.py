@@ -57,13 +57,9 @@ def envelope_figure(envelope, units, title=""):
         axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)
     figure.supxlabel(f"distance from its start [{units['distance']}]", fontsize=8.5, color=style.INK)
     handles = {
-        label: handle
-        for axes in grid.flat
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    figure.legend(
-        handles.values(), handles.keys(), loc="outside upper right", ncols=4, frameon=False, fontsize=8
-    )
+    figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=4, frameon=False, fontsize=8)
     more = len(envelope) - len(names)
     style.title(figure, title + (f"\n(the {len(names)} longest of {len(envelope)} pipes)" if more else ""))
     return figure

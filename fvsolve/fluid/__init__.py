@@ -56,9 +56,7 @@ def properties(
     Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] stand in place of
     CoolProp's; "user" has nothing else. Raises FluidError with the key that is to blame.
     """
-    given = dict(
-        density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure
-    )
+    given = dict(density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure)
     given = {key: float(value) for key, value in given.items() if value is not None}
     state = dict(temperature=float(temperature), pressure=float(pressure))
     _check_numbers(given | state, law)

@@ -47,9 +47,7 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 
 def _write(path: Path, key: str, found: dict[str, Any]) -> None:
     """Write a cache file whole or not at all; a folder that cannot be written costs only time."""
-    body = json.dumps(
-        [key, found], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item)
-    )
+    body = json.dumps([key, found], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item))
     text = hashlib.sha256(body.encode()).hexdigest() + "\n" + body
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -44,9 +44,7 @@ class FluidTable:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FluidTable):
             return NotImplemented
-        return all(
-            np.array_equal(a, b) for a, b in zip(vars(self).values(), vars(other).values(), strict=True)
-        )
+        return all(np.array_equal(a, b) for a, b in zip(vars(self).values(), vars(other).values(), strict=True))
 
     def __hash__(self) -> int:
         return hash((self.error, self.pressure.size))
@@ -86,9 +84,7 @@ def _reach(state: Any, temperature: float, pressure: float) -> float:
     return min(limits)
 
 
-def _tabulate(
-    state: Any, span: tuple[float, float], intervals: int, temperature: float, entropy: float
-) -> FluidTable:
+def _tabulate(state: Any, span: tuple[float, float], intervals: int, temperature: float, entropy: float) -> FluidTable:
     grid = np.linspace(*span, 2 * intervals + 1)
     log_density, compressibility = _march(state, grid, temperature, entropy)
     f, d = log_density[::2], compressibility[::2]

@@ -7,7 +7,6 @@ out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s
 from fvsolve.jit import njit
 from fvsolve.kernels.columns import column_rates, quickest_column
 from fvsolve.kernels.ends import end_value
-from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.pipes import family_of, pipe_rates

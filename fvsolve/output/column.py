@@ -50,9 +50,7 @@ def column(name: str, dimension: str, case) -> Column:
     """The column of a quantity in the unit that `case.output.units` asks for, SI where it is silent."""
     known = units.DIMENSIONS[dimension]
     asked = case.output.units
-    return Column(
-        name, dimension, asked.get(dimension) or asked.get(known.base) or known.si, case.ambient_pressure
-    )
+    return Column(name, dimension, asked.get(dimension) or asked.get(known.base) or known.si, case.ambient_pressure)
 
 
 def time_column(case) -> Column:

@@ -29,9 +29,7 @@ class HistoryFile:
     def continue_from(self, rows: int, size: int) -> None:
         """Open the file that a checkpoint left, cut to `size` bytes; RunError where it is shorter."""
         if not self.path.is_file() or self.path.stat().st_size < size:
-            raise RunError(
-                f"{self.path} is shorter than its checkpoint says; start the run again with --force"
-            )
+            raise RunError(f"{self.path} is shorter than its checkpoint says; start the run again with --force")
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)

@@ -21,12 +21,8 @@ class Node(Table):
     }  # fmt: skip
     fixes_pressure: ClassVar[bool] = False
 
-    elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = (
-        None
-    )
-    position: Annotated[
-        tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")
-    ] = None
+    elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = None
+    position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)

@@ -56,7 +56,5 @@ class Pipe(Link, kind="pipe"):
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     friction: Friction = NONE
     cells: Annotated[int | None, Whole(between(1, MOST_CELLS), "finite volumes along it")] = None
-    minor_loss: Annotated[float, Number(nonnegative, "loss coefficient on its velocity, spread along it")] = (
-        0.0
-    )
+    minor_loss: Annotated[float, Number(nonnegative, "loss coefficient on its velocity, spread along it")] = 0.0
     initial_flow: Annotated[float | None, Quantity("flow", about="at the start [m3/s]")] = None

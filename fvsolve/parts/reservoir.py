@@ -20,9 +20,7 @@ class Reservoir(Node, kind="reservoir"):
     fixes_pressure: ClassVar[bool] = True
 
     pressure: Annotated[Schedule | None, Scheduled("pressure", about="at its elevation [Pa]")] = None
-    head: Annotated[
-        Schedule | None, Scheduled("head", about="of the fluid above datum, from ambient [m]")
-    ] = None
+    head: Annotated[Schedule | None, Scheduled("head", about="of the fluid above datum, from ambient [m]")] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

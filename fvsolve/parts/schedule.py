@@ -58,11 +58,7 @@ class Schedule:
         if not isinstance(other, Schedule):
             return NotImplemented
         mine, theirs = (self.kind, self.exponent), (other.kind, other.exponent)
-        return (
-            mine == theirs
-            and np.array_equal(self.time, other.time)
-            and np.array_equal(self.value, other.value)
-        )
+        return mine == theirs and np.array_equal(self.time, other.time) and np.array_equal(self.value, other.value)
 
     def __hash__(self) -> int:
         return hash((self.kind, self.exponent, self.time.tobytes(), self.value.tobytes()))

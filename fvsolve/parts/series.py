@@ -97,9 +97,7 @@ def _column(header: list[str], name: str | None, default: int, path: Path) -> in
     if bare.count(name) == 1:
         return bare.index(name)
     hint = did_you_mean(name, header)
-    raise ValueError(
-        f"{path.name} has no column {show(name)}{hint}; columns are {', '.join(map(show, header))}"
-    )
+    raise ValueError(f"{path.name} has no column {show(name)}{hint}; columns are {', '.join(map(show, header))}")
 
 
 def _split(header: str) -> tuple[str, str]:
@@ -124,9 +122,7 @@ def _numbers(
     for index, (line, row) in enumerate(rows):
         text = row[column].strip() if column < len(row) else ""
         if not _is_number(text) or not np.isfinite(float(text)):
-            raise ValueError(
-                f"{path.name}, line {line}: {show(text)} is no number in column {show(header[column])}"
-            )
+            raise ValueError(f"{path.name}, line {line}: {show(text)} is no number in column {show(header[column])}")
         values[index] = float(text)
     if found is not None:
         values = found.si(values)

@@ -88,9 +88,7 @@ class Value:
         return {}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(
-            lambda given, info: self.read(given, setting_of(info))
-        )
+        return core_schema.with_info_plain_validator_function(lambda given, info: self.read(given, setting_of(info)))
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         return {**self.json(), **({"description": self.about} if self.about else {})}

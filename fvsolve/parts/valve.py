@@ -100,23 +100,17 @@ class Valve(Link, kind="valve"):
         ("area", "diameter"),
     )
 
-    discharge_coefficient: Annotated[
-        float | None, Number(between(0, 1, open=True), "Cd, with area or diameter")
-    ] = None
-    loss_coefficient: Annotated[float | None, Number(positive, "K on the velocity in area or diameter")] = (
-        None
-    )
+    discharge_coefficient: Annotated[float | None, Number(between(0, 1, open=True), "Cd, with area or diameter")] = None
+    loss_coefficient: Annotated[float | None, Number(positive, "K on the velocity in area or diameter")] = None
     Kv: Annotated[float | None, Number(positive, "m3/h of water at 1 bar")] = None
     Cv: Annotated[float | None, Number(positive, "US gpm of water at 1 psi")] = None
     area: Annotated[float | None, Quantity("area", positive, "of the opening [m2]")] = None
     diameter: Annotated[float | None, Quantity("length", positive, "of the opening [m]")] = None
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = (
-        Field(default_factory=lambda: constant(1.0))
+    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = Field(
+        default_factory=lambda: constant(1.0)
     )
     characteristic: Annotated[Any, Trim()] = "linear"
-    laminar_reynolds: Annotated[
-        float | None, Number(positive, "Reynolds number below which it is laminar")
-    ] = None
+    laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which it is laminar")] = None
 
     def model_post_init(self, _: Any) -> None:
         if self.Kv is self.Cv is self.loss_coefficient is self.discharge_coefficient is None:

@@ -17,9 +17,7 @@ def claims(model, extremes: dict, result) -> dict:
             expectation(text, expect, columns[expect.probe.text], extremes, result)
             for text, expect in case.expect.items()
         ],
-        "comparisons": [
-            comparison(compare, columns[compare.probe.text], result) for compare in case.compare.values()
-        ],
+        "comparisons": [comparison(compare, columns[compare.probe.text], result) for compare in case.compare.values()],
     }
 
 

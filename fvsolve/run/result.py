@@ -105,8 +105,7 @@ class Result:
     def extremes(self) -> dict[str, Extremes]:
         """Least and greatest of each probe, and when."""
         return {
-            name: Extremes(*(one[key] for key in Extremes._fields))
-            for name, one in self.summary["extremes"].items()
+            name: Extremes(*(one[key] for key in Extremes._fields)) for name, one in self.summary["extremes"].items()
         }
 
     @property
@@ -203,9 +202,7 @@ class Result:
         from fvsolve.draw.view import view
 
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
-            raise RunError(
-                "no frames to draw: the case has no pipes, [output] fields is 0, or nothing was written"
-            )
+            raise RunError("no frames to draw: the case has no pipes, [output] fields is 0, or nothing was written")
         frames = read_series(self.directory / "fields.pvd")
         if not frames:
             raise RunError(f"{self.directory / 'fields.pvd'} lists no frames")

@@ -52,9 +52,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
         folded = _plain(spelling).casefold().replace(" ", "")
         for other in _spellings(dimension):
             if other.casefold().replace(" ", "") == folded:
-                raise ValueError(
-                    f"no unit {show(spelling)}; did you mean {show((number + ' ' + other).strip())}?"
-                )
+                raise ValueError(f"no unit {show(spelling)}; did you mean {show((number + ' ' + other).strip())}?")
         unit = ask_pint(spelling) if _plain(spelling) not in MEANT else None
     text = show(f"{number} {spelling}".strip())
     meant = MEANT.get(_plain(spelling), "")
@@ -67,9 +65,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     if unit.dimension != base and not (dimension == "viscosity" and unit.dimension == "kinematic viscosity"):
         hint = wanted(dimension)
         if meant and UNITS[meant].dimension == base:
-            hint = (
-                f"wanted {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + meant).strip())}?"
-            )
+            hint = f"wanted {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + meant).strip())}?"
         words = DIMENSIONS[unit.dimension].words if unit.dimension in DIMENSIONS else f"a {unit.dimension}"
         raise ValueError(f"{text} is {words}; {hint}")
     if dimension == "gauge_pressure" and unit.absolute:
@@ -114,9 +110,7 @@ def show(given: Any) -> str:
 
 def _parse_number(given: Any, dimension: str) -> float:
     if isinstance(given, bool) or not isinstance(given, (int, float)):
-        kind = {bool: "true or false", dict: "a table", list: "a list"}.get(
-            type(given), f"a {type(given).__name__}"
-        )
+        kind = {bool: "true or false", dict: "a table", list: "a list"}.get(type(given), f"a {type(given).__name__}")
         raise ValueError(f"{show(given)} is {kind}; {wanted(dimension)}")
     try:
         return float(given)
@@ -132,9 +126,7 @@ def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
     if not spelling:
         if dimension != "number":
             si = DIMENSIONS[dimension].si
-            raise ValueError(
-                f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?'
-            )
+            raise ValueError(f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?')
         return float(number), None
     if re.match(r",\d", spelling):
         raise ValueError(f"{show(text)} has a decimal comma; did you mean {show(text.replace(',', '.', 1))}?")

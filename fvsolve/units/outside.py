@@ -7,9 +7,7 @@ import re
 
 from fvsolve.units.spellings import DIMENSIONS, Unit
 
-_ASKABLE = re.compile(
-    r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}"
-)
+_ASKABLE = re.compile(r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}")
 
 
 def ask_pint(spelling: str) -> Unit | None:
