@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -98,6 +99,50 @@ def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
         fvsolve.advance(model, state, 0.1, {"v1.openning": 0.3})
     with pytest.raises(FvsolveError, match="lies before"):
         fvsolve.advance(model, state, -1.0)
+    with pytest.raises(FvsolveError, match="until = inf is no time"):
+        fvsolve.advance(model, state, np.inf)
+
+
+@pytest.mark.parametrize(
+    "name, value, said",
+    [
+        ("v1.opening", 2, "v1.opening = 2 is out of range; wanted a number from 0, shut, to 1, open"),
+        ("v1.opening", -1, "v1.opening = -1 is out of range"),
+        ("v1.opening", np.nan, "v1.opening = nan is not finite; wanted a number from 0"),
+        ("v1.opening", "50 %", 'v1.opening = "50 %" is no number; wanted a number from 0'),
+        ("sea.pressure", -5e5, "sea.pressure = -500000 is a vacuum; wanted an absolute pressure above 0"),
+        ("lake.head", -20.0, "lake.head = -20 is -9.481e+04 Pa absolute; wanted a head"),
+        ("gate.demand", np.inf, "gate.demand = inf is not finite; wanted a finite number"),
+        ("gate.demand", None, "gate.demand = None is no number"),
+    ],
+)
+def test_advance_refuses_inputs_out_of_range(name, value, said):
+    model = fvsolve.build(fvsolve.load(scene()))
+    with pytest.raises(FvsolveError, match=re.escape(said)):
+        fvsolve.advance(model, fvsolve.initial_state(model), 0.1, {name: value})
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_a_reservoir_held_by_head_or_by_pressure_is_one_that_says_so(law):
+    """The head of the lake under `log` is not proportional to its pressure; either way it may be held by both."""
+    given = scene(law)
+    held = fvsolve.build(fvsolve.load(given))
+    start = fvsolve.initial_state(held)
+    by_head = fvsolve.advance(held, start, 0.1, {"lake.head": np.float64(70.0), "sea.head": 0.0})
+    given["nodes"]["lake"]["head"] = {"time": [-1.0, 0.0], "value": [60.0, 70.0], "kind": "step"}
+    stepped = fvsolve.build(fvsolve.load(given))
+    whole = fvsolve.advance(stepped, fvsolve.initial_state(stepped), 0.1)
+    assert by_head.y == pytest.approx(whole.y, rel=1e-9, abs=1e-9 * np.max(np.abs(whole.y)))
+    same = fvsolve.advance(held, start, 0.1, {"lake.pressure": lake_pressure(law, 70.0)})
+    assert same.y == pytest.approx(whole.y, rel=1e-6, abs=1e-6 * np.max(np.abs(whole.y)))
+
+
+def lake_pressure(law: str, head: float) -> float:
+    """Pressure at datum of a reservoir of that head [Pa]."""
+    beta, ambient, weight = 2.2e9, 101325.0, 1000.0 * 9.80665
+    if law == "linear":
+        return ambient + weight * head
+    return -beta * np.log(1.0 - weight * head / beta) + ambient  # g head = h(p) - h(ambient)
 
 
 PLAIN = """

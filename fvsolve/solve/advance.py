@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from numbers import Real
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,14 +14,17 @@ from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import erk
+from fvsolve.units import show
 
 
 def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
     """The state at `until` [s]; `inputs` hold named schedules at a value meanwhile.
 
     inputs : {"valve.opening": 0.3, "lake.head": 12.0, "gate.demand": 0.1}, SI. Raises FvsolveError for an
-    input that names nothing, a time before the state's, and a run that cannot go on.
+    input that names nothing or is out of range, a time before the state's, and a run that cannot go on.
     """
+    if not math.isfinite(until):
+        raise FvsolveError(f"until = {until} is no time; wanted a finite number of seconds")
     if not until >= state.t:
         raise FvsolveError(f"until = {until:g} s lies before the state's time, {state.t:g} s")
     held = hold(model, inputs or {})
@@ -38,40 +44,84 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     return State(loop.t, loop.now.copy(), loop.memory[[erk.STEP, erk.ERROR_OLD]].copy())
 
 
+class Input(NamedTuple):
+    """A schedule that can be held: what kernels read is scale * value + offset, of the kind that is named."""
+
+    kind: str  # "opening" | "pressure" | "head" | "flow"
+    schedule: int
+    scale: float = 1.0
+    offset: float = 0.0
+    node: int = -1  # of a reservoir
+
+
 def hold(model: Model, inputs: dict[str, float]) -> Model:
     """The same model with schedules held at constant values."""
     if not inputs:
         return model
     tables = list(model.tables)
-    schedules, pieces = tables[rec.I_SCHEDULES].copy(), tables[rec.I_PIECES]
+    schedules, pieces, nodes = tables[rec.I_SCHEDULES].copy(), tables[rec.I_PIECES], tables[rec.I_NODES].copy()
     known = input_schedules(model)
+    linear = model.case.fluid.law == "linear"
     rows = []
     for name, value in inputs.items():
         if name not in known:
             near = nearest(name, known)
             hint = f'; did you mean "{near}"?' if near else f"; inputs are {', '.join(known)}"
             raise FvsolveError(f'no input named "{name}"{hint}')
-        index, scale, offset = known[name]
-        schedules[index] = (len(pieces) + len(rows), 1)
-        rows.append([-np.inf, 0.0, 0.0, scale * float(value) + offset, 0.0, 0.0, 0.0])
-    tables[rec.I_SCHEDULES] = schedules
+        one = known[name]
+        found = checked(name, value, one)
+        if one.node >= 0 and not linear:  # `log` and `table` read a head as it is
+            nodes["head_given"][one.node] = one.kind == "head"
+        else:
+            found = one.scale * found + one.offset
+        schedules[one.schedule] = (len(pieces) + len(rows), 1)
+        rows.append([-np.inf, 0.0, 0.0, found, 0.0, 0.0, 0.0])
+    tables[rec.I_SCHEDULES], tables[rec.I_NODES] = schedules, nodes
     tables[rec.I_PIECES] = np.vstack([pieces, rows])
     return replace(model, tables=tuple(tables))
 
 
-def input_schedules(model: Model) -> dict[str, tuple[int, float, float]]:
-    """Input name -> (schedule, scale, offset) from its SI value to what kernels read."""
+def checked(name: str, value: float, one: Input) -> float:
+    """The value of an input [SI]; FvsolveError where it is no number or none that the part can have."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
+        raise FvsolveError(f"{name} = {show(value)} is no number; wanted {WANTED[one.kind]}")
+    found = float(value)
+    if not math.isfinite(found):
+        raise FvsolveError(f"{name} = {found} is not finite; wanted {WANTED[one.kind]}")
+    if one.kind == "opening" and not 0.0 <= found <= 1.0:
+        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
+    pressure = one.scale * found + one.offset
+    if one.node >= 0 and not pressure > 0.0:
+        said = f"{name} = {found:g}" + (f" is {pressure:.4g} Pa absolute" if one.kind == "head" else " is a vacuum")
+        raise FvsolveError(f"{said}; wanted {WANTED[one.kind]}")
+    return found
+
+
+WANTED = {
+    "opening": "a number from 0, shut, to 1, open",
+    "pressure": "an absolute pressure above 0 [Pa]",
+    "head": "a head whose pressure is above 0 Pa absolute [m]",
+    "flow": "a finite number [m3/s]",
+}
+
+
+def input_schedules(model: Model) -> dict[str, Input]:
+    """Input name -> what it holds."""
     rho, weight = model.case.properties.density, model.case.properties.density * model.case.gravity
     found = {}
-    for name, node, row in zip(model.node_names, model.case.nodes.values(), model.tables[rec.I_NODES], strict=True):
+    nodes = zip(model.node_names, model.case.nodes.values(), model.tables[rec.I_NODES], strict=True)
+    for i, (name, node, row) in enumerate(nodes):
         index = int(row["schedule"])
         if node.kind == "reservoir":
-            found[f"{name}.pressure"] = index, 1.0, 0.0
-            found[f"{name}.head"] = index, weight, model.case.ambient_pressure - weight * row["elevation"]
+            ground = model.case.ambient_pressure - weight * float(row["elevation"])
+            found[f"{name}.pressure"] = Input("pressure", index, node=i)
+            found[f"{name}.head"] = Input("head", index, weight, ground, node=i)
         elif node.kind == "junction":
-            found[f"{name}.demand"] = index, rho, 0.0
+            found[f"{name}.demand"] = Input("flow", index, rho)
         elif node.kind == "inflow":
-            found[f"{name}.flow"] = index, -rho, 0.0
+            found[f"{name}.flow"] = Input("flow", index, -rho)
     for name, row in zip(model.valve_names, model.tables[rec.I_VALVES], strict=True):
-        found[f"{name}.opening"] = int(row["schedule"]), 1.0, 0.0
+        found[f"{name}.opening"] = Input("opening", int(row["schedule"]))
     return found
