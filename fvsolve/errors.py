@@ -70,7 +70,7 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """The names in one line, sorted, cut where there are many."""
-    names = sorted(names)
+    """The names in one line, sorted, each once, cut where there are many."""
+    names = sorted({*names})
     more = f", ... ({len(names)} in all)" if len(names) > limit else ""
     return ", ".join(names[:limit]) + more

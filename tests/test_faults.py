@@ -5,6 +5,7 @@ import tomllib
 
 import pytest
 
+from fvsolve import run
 from fvsolve.case import load
 from fvsolve.errors import CaseError, FvsolveError, nearest
 
@@ -705,6 +706,65 @@ SET = {
 def test_an_override_at_fault_is_named(name, tmp_path):
     settings, message = SET[name]
     assert message in faults(SCENE, tmp_path, set=settings)
+
+
+SHUT = SCENE.replace('type = "junction"', 'type = "junction"\ndemand = 0.1').replace("[links.main]", "[links.sluice]")
+SHUT = SHUT.replace('type = "pipe"', 'type = "valve"\nopening = 0\narea = 0.1').replace(
+    "value = [1.0, 0.0]", "value = [0, 1]"
+)
+for key in ("length", "diameter", "wave_speed", "friction", "cells", "courant"):
+    SHUT = re.sub(rf"^{key} = .*\n", "", SHUT, flags=re.MULTILINE)
+CANNOT_START = {
+    "a demand behind shut valves": (SHUT, {}, "line 15: nodes.gate: no steady state: 0.1 m3/s are drawn here but"),
+    "unequal heads and no friction": (
+        SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace('"junction"', '"reservoir"\nhead = 3'),
+        {},
+        "line 23: links.main: no steady state: it has no friction",
+    ),
+    "what moves": (
+        SCENE.replace("courant = 0.9", 'initial = "equilibrium"').replace('"junction"', '"tank"\nlevel = 1\narea = 1'),
+        {},
+        'line 44: numerics.initial: "equilibrium" wants nothing to move',
+    ),
+    "what moves, set": (
+        SCENE.replace('"junction"', '"tank"\nlevel = 1\narea = 1'),
+        {"numerics.initial": "equilibrium"},
+        '--set numerics.initial: "equilibrium" wants nothing to move',
+    ),
+    "no viscosity": (
+        SCENE.replace("viscosity = 1e-3\n", ""),
+        {},
+        "line 28: links.main.friction: roughness needs the fluid's viscosity",
+    ),
+    "no viscosity for a part that is set": (
+        SCENE.replace("viscosity = 1e-3\n", ""),
+        {"links.main.friction": {"model": "none"}, "links.valve.laminar_reynolds": 20},
+        "--set links.valve.laminar_reynolds: needs the fluid's viscosity",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CANNOT_START)
+def test_a_case_that_cannot_start_has_its_lines_too(name, tmp_path):
+    text, settings, message = CANNOT_START[name]
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    for case in (path, load(path)):
+        with pytest.raises(CaseError) as caught:
+            run(case, set=settings)
+        assert re.match(r"scene.toml: \d faults?\n", str(caught.value)) and f"  {message}" in str(caught.value)
+
+
+def test_a_dict_that_cannot_start_has_faults_without_lines():
+    with pytest.raises(CaseError, match=r"^case: 1 fault\n  nodes.gate: no steady state"):
+        run(tomllib.loads(SHUT))
+
+
+def test_a_list_of_parts_names_each_once():
+    table = tomllib.loads(SCENE.replace("[links.main]", "[links.gate]"))
+    table["output"]["probes"] = ["door.pressure"]
+    with pytest.raises(CaseError, match="; parts are gate, lake, outfall, valve$"):
+        load(table)
 
 
 def test_a_dict_has_faults_without_lines():

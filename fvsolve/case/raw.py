@@ -6,7 +6,7 @@ import functools
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +109,26 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
                 faults.append(Fault(".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True))
                 raw.table[group].pop(name, None)
     return faults
+
+
+def located(error: CaseError, case: Any) -> CaseError:
+    """The same faults of a case that was read before, each with its line or as an override, under the file's name."""
+    if case.path is None:
+        return CaseError(error.faults, case.name)
+    try:
+        said = read_raw(case.path)
+    except CaseError:  # the file has gone since
+        return error
+    now = Raw(case.raw)
+    faults = []
+    for fault in error.faults:
+        keys = tuple(fault.place.split("."))
+        found, before = now.get(keys), said.get(keys)
+        if found is not None and (before is None or (found != before and not isinstance(found, dict))):
+            faults.append(replace(fault, override=True))
+        else:
+            faults.append(replace(fault, line=fault.line or said.line(keys)))
+    return CaseError(faults, said.file)
 
 
 def _read_text(path: Path) -> str:

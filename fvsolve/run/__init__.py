@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from fvsolve.errors import RunError
+from fvsolve.errors import CaseError, RunError
 from fvsolve.output.directory import RunDirectory, read_directory
 from fvsolve.output.memory import MemorySink
 from fvsolve.output.restart import identity
@@ -35,7 +35,7 @@ def run(
     Raises CaseError, FluidError, RunError.
     """
     begun = time.perf_counter()
-    model = _model(case, set)
+    model = model_of(case, set)
     if out is None:
         if resume:
             raise RunError("a run goes on in its directory: state it with out=")
@@ -56,12 +56,17 @@ def open_run(directory: str | Path) -> Result:
     return Result(*read_directory(Path(directory)))
 
 
-def _model(case, set: Mapping | None):
-    from fvsolve.case import load
+def model_of(case, set: Mapping | None = None):
+    """The model of what `run` takes; what cannot start is a fault with its line, as what cannot be read is."""
+    from fvsolve.case import load, located
     from fvsolve.model import Model, build
 
     if not isinstance(case, Model):
-        return build(load(case, dict(set or {})))
+        case = load(case, dict(set or {}))
+        try:
+            return build(case)
+        except CaseError as error:
+            raise located(error, case) from None
     if set:
         raise RunError("a Model is made and cannot be overridden; give set= together with the case")
     return case
