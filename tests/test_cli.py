@@ -102,6 +102,21 @@ def test_several_cases_go_to_directories_of_their_own(case, fvs):
     assert {path.name for path in Path("both").iterdir()} == {"shut", "other"}
 
 
+@pytest.mark.parametrize("options", [("--out", "both"), ("--out", "both", "--force"), ()])
+def test_cases_that_would_write_one_directory_are_refused_before_any_runs(case, fvs, options):
+    for folder in ("n1", "n2"):
+        Path(folder).mkdir()
+        Path(folder, "main.toml").write_text(CASE)
+    one, two = str(Path("n1", "main.toml")), str(Path("n2", "main.toml"))
+    code, out, err = fvs("run", case, one, two, *options)
+    place = Path("both" if options else "runs", "main")
+    assert code == 2 and out == ""
+    assert f"{one} and {two} would both write {place}" in err and "--out DIR" in err
+    assert not Path("both").exists() and not Path("runs").exists()
+    code, _, err = fvs("run", case, case, *options)
+    assert code == 2 and "shut.toml is named twice" in err
+
+
 def test_set_overrides_any_key(case, fvs):
     settings = ["links.main.cells=7", "links.main.length=500 m", 'links.main.friction={ model = "none" }']
     code, out, _ = fvs("run", case, "--json", *(f"--set={one}" for one in settings))
@@ -113,6 +128,26 @@ def test_set_overrides_any_key(case, fvs):
 def test_set_without_a_value_says_what_was_wanted(case, fvs):
     code, out, err = fvs("run", case, "--set", "links.main.cells")
     assert code == 2 and out == "" and "wanted KEY=VALUE" in err
+
+
+def test_all_bad_settings_are_said_at_once(case, fvs):
+    settings = ["nope", "links.mian.cells=4", "=3", "numeric.end=4", "links.main.cells=many"]
+    code, out, err = fvs("check", case, *(f"--set={one}" for one in settings))
+    assert code == 2 and out == "" and "shut.toml: 5 faults" in err
+    assert err.count("wanted KEY=VALUE") == 2
+    for key in ("--set nope", "--set =3", "--set links.mian.cells", "--set numeric", "--set links.main.cells"):
+        assert f"  {key}: " in err
+    code, _, err = fvs("check", case, "--set", "nope")
+    assert code == 2 and "shut.toml: 1 fault\n  --set nope: wanted KEY=VALUE" in err
+
+
+def test_a_case_that_cannot_start_says_where(case, fvs):
+    line = CASE.splitlines().index("[links.main]") + 1
+    for command in ("run", "check"):
+        code, out, err = fvs(command, case, "--set", "nodes.gate.type=reservoir", "--set", "nodes.gate.head=1 m")
+        assert code == 2 and out == ""
+        assert f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: it has no friction" in err
+    assert not Path("runs").exists()
 
 
 def test_a_bad_case_is_a_message_and_exit_code_2(case, fvs):

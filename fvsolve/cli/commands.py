@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import CaseError, Fault, FvsolveError
 from fvsolve.output.summary import plain
 
 app = typer.Typer(
@@ -41,9 +42,8 @@ def run(
     from fvsolve.run import run as solve
 
     results = []
-    for name in cases:
+    for name, place in _places(cases, out).items():
         case = _load(name, set)
-        place = (out or Path("runs") / case.name) if len(cases) == 1 else (out or Path("runs")) / case.name
         with watched(case) as progress:
             results.append(solve(case, out=place, force=force, resume=resume, progress=progress))
         if not as_json:
@@ -60,9 +60,9 @@ def run(
 def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B006
     """What was understood of a case, how it starts, what it will cost."""
     from fvsolve.cli import report
-    from fvsolve.model import build
+    from fvsolve.run import model_of
 
-    model = build(_load(case, set))
+    model = model_of(_load(case, set))
     if as_json:
         _json(model.checks)
     else:
@@ -137,21 +137,47 @@ def view(
     print(open_run(directory).view(when, field, out))
 
 
+def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
+    """Case -> its run directory; FvsolveError where two would have the same one."""
+    from fvsolve.cli import shipped
+
+    found, taken = {}, {}
+    for name in cases:
+        stem = shipped.find(name).stem
+        place = out if out and len(cases) == 1 else (out or Path("runs")) / stem
+        other = taken.setdefault(os.path.normcase(place), name)
+        if name in found or other != name:
+            twice = f"{name} is named twice" if other == name else f"{other} and {name} would both write {place}"
+            raise FvsolveError(f"{twice}; run one at a time, each with an --out DIR of its own, or rename one")
+        found[name] = place
+    return found
+
+
 def _load(name: str, overrides: list[str]):
+    """The case, overridden; an override that is none is one more fault of it."""
     from fvsolve.case import load
     from fvsolve.cli import shipped
 
-    return load(shipped.find(name), _overrides(overrides))
+    path = shipped.find(name)
+    settings, faults = _overrides(overrides)
+    try:
+        case = load(path, settings)
+    except CaseError as error:
+        raise CaseError([*error.faults, *faults], error.file) if faults else error from None
+    if faults:
+        raise CaseError(faults, path.name)
+    return case
 
 
-def _overrides(texts: list[str]) -> dict:
-    found = {}
+def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
+    found, faults = {}, []
     for text in texts:
         key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise FvsolveError(f"--set {text}: wanted KEY=VALUE, for example links.main.cells=400")
-        found[key.strip()] = _value(value)
-    return found
+        if equals and key.strip():
+            found[key.strip()] = _value(value)
+        else:
+            faults.append(Fault(text, "wanted KEY=VALUE, for example links.main.cells=400", override=True))
+    return found, faults
 
 
 def _value(text: str):
