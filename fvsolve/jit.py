@@ -7,10 +7,12 @@ by the hash of every source that compiled code can depend on, and site-packages 
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 import warnings
@@ -18,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["cache_folder", "njit", "source_hash"]
+__all__ = ["beside", "cache_folder", "njit", "source_hash"]
 
 KEPT = 3  # generations of compiled code kept beside the present one
 
@@ -70,6 +72,26 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         return numba.njit(**options)(function)
     finally:
         numba.config.CACHE_DIR = before
+
+
+@contextlib.contextmanager
+def beside(code: str, cached: str):
+    """While the body compiles, a second process runs `code` to compile something else, so a cold start takes half.
+
+    cached : name of a cache file, with wildcards; where one lies in the code folder nothing is left to do.
+    Whatever the second process fails to leave there, the caller compiles itself.
+    """
+    if _disabled() or (os.cpu_count() or 1) < 2 or any(_code_folder().rglob(cached)):
+        yield
+        return
+    path = os.pathsep.join([str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+    quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    second = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, **quiet)
+    try:
+        yield
+        second.wait()
+    finally:
+        second.kill()
 
 
 @functools.cache

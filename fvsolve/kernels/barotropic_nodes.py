@@ -9,6 +9,17 @@ from math import sqrt
 import numpy as np
 
 from fvsolve.jit import njit
+from fvsolve.kernels.clusters import (
+    LEAST,
+    finish,
+    move,
+    prepare,
+    put_valve,
+    settled,
+    shut_out,
+    solve_dense,
+    whole_inflows,
+)
 from fvsolve.kernels.columns import shut_end
 from fvsolve.kernels.density import (
     density,
@@ -21,7 +32,7 @@ from fvsolve.kernels.density import (
     velocity_change,
 )
 from fvsolve.kernels.ends import end_value
-from fvsolve.kernels.nodes import BAR, LEAST, MOST, UNSETTLED, asked_at, chord_slope, inner_row, settled, solve_dense
+from fvsolve.kernels.isolated import find_held, inner_row
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import (
     CHAMBER,
@@ -39,7 +50,6 @@ from fvsolve.kernels.records import (
     I_VALVES,
     JUNCTION,
     NO_SOLUTION,
-    NOT_CONVERGED,
     STATUS,
     TANK,
     WHERE,
@@ -179,112 +189,114 @@ def valve_target(tables, out, k, g):
 
 
 @njit
-def valve_move(tables, out, k, g, x):
-    """a, s with dx = a + s d(p_i - p_j) for the next Newton step of a valve; base values are subtracted."""
-    valve = tables[I_VALVES][k]
+def valve_move(tables, out, k, g, m):
+    """a, s with dM = a + s d(p_i - p_j) for the next Newton step of valve k, which carries m [kg/s]."""
+    transition = tables[I_VALVES][k]["transition"]
     target, slope = valve_target(tables, out, k, g)
-    if valve["transition"] > 0.0:
-        return target - valve["base"] - x, chord_slope(slope, valve["transition"], target, valve["flow"] + x)
-    flow = valve["flow"]
-    if valve["open"] <= 0.0 and g == valve["leak"]:
-        flow = valve["leak_flow"]
-    if abs(x) > 0.5 * abs(flow):
-        rest = target - abs(flow + x) * (flow + x)
-    else:
-        rest = (target - valve["base"]) - (abs(flow + x) * (flow + x) - abs(flow) * flow)
-    chord = abs(flow + x) + sqrt(abs(target))
-    chord = max(chord, LEAST * sqrt(slope))
-    return rest / chord, slope / chord
+    if transition > 0.0:
+        steepest = 45.0 / 32.0 * slope / transition
+        return target - m, min(steepest, slope / max(abs(target) + abs(m), 1e-300))
+    chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(slope))
+    return (target - abs(m) * m) / chord, slope / chord
 
 
 @njit
-def newton_sweep(out, tables, g, x, slope, given, work):
-    """One Newton step of every cluster; returns the greatest change of flow [kg/s]."""
+def newton_step(cluster, out, tables, g, m, c, held, slope, work):
+    """One Newton step of a cluster; returns its greatest change, relative."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, clusters = tables[I_INTEGERS], tables[I_CLUSTERS]
-    moved = 0.0
-    for which in range(clusters.size):
-        cluster = clusters[which]
-        n, m = cluster["nodes"], cluster["valves"]
-        at = n * n + n
-        matrix, right = work[: n * n], work[n * n : at]
-        a, s = work[at : at + m], work[at + m : at + 2 * m]
-        for r in range(n * n):
-            matrix[r] = 0.0
-        for r in range(n):
-            i = integers[cluster["first_node"] + r]
-            right[r] = out[layout["net"] + i] + given[i]
-            matrix[n * r + r] = -slope[i]
-        for e in range(m):
-            k = integers[cluster["first_valve"] + e]
-            i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
-            a[e], s[e] = -x[k] - valves[k]["flow"], 0.0
-            if g[k] > 0.0:
-                a[e], s[e] = valve_move(tables, out, k, g[k], x[k])
-            if i >= 0:
-                right[i] -= x[k] + a[e]
-                matrix[n * i + i] += s[e]
-            if j >= 0:
-                right[j] += x[k] + a[e]
-                matrix[n * j + j] += s[e]
-            if i >= 0 and j >= 0:
-                matrix[n * i + j] -= s[e]
-                matrix[n * j + i] -= s[e]
-        if not solve_dense(matrix, right, n):
-            out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
-            return 0.0
-        for r in range(n):
-            i = integers[cluster["first_node"] + r]
-            out[layout["pressure"] + i] += right[r]
-            moved = max(moved, abs(slope[i] * right[r]))
-        for e in range(m):
-            k = integers[cluster["first_valve"] + e]
-            i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
-            step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
-            x[k] += step
-            moved = max(moved, abs(step), abs(a[e]))
-    return moved
+    integers, n, k = tables[I_INTEGERS], c.size, g.size
+    matrix, right = work[: n * n], work[n * n : n * n + n]
+    a, s = work[n * n + n : n * n + n + k], work[n * n + n + k : n * n + n + 2 * k]
+    for r in range(n * n):
+        matrix[r] = 0.0
+    for r in range(n):
+        i = integers[cluster["first_node"] + r]
+        right[r] = out[layout["net"] + i] + c[r]
+        matrix[n * r + r] = -slope[i]
+    for e in range(k):
+        which = integers[cluster["first_valve"] + e]
+        i, j = inner_row(nodes, valves[which]["from_node"]), inner_row(nodes, valves[which]["to_node"])
+        a[e], s[e] = -m[e], 0.0
+        if g[e] > 0.0:
+            a[e], s[e] = valve_move(tables, out, which, g[e], m[e])
+        put_valve(i, j, m[e], a[e], s[e], n, matrix, right)
+    for r in range(n):
+        if held[r] == 0.0:
+            right[r], matrix[n * r + r] = 0.0, 1.0
+    if not solve_dense(matrix, right, n):
+        out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
+        return 0.0
+    return move(cluster, tables, out, m, a, s, right)
+
+
+@njit
+def given_flows(t, y, out, tables):
+    """Pressures of vessels, demands, and flows of valves that lie between known pressures."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    stored_pressures_barotropic(t, y, out, tables)
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == JUNCTION:
+            demand = schedule_value(tables, nodes[i]["schedule"], t)
+            out[layout["supply"] + i] = -demand
+            out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
+            out[layout["pressure"] + i] = 0.0
+    for k in range(valves.size):
+        if nodes[valves[k]["from_node"]]["kind"] != JUNCTION and nodes[valves[k]["to_node"]]["kind"] != JUNCTION:
+            g = valve_conductance(tables, k, t)
+            out[layout["valve"] + k] = valve_target(tables, out, k, g)[0] if g > 0.0 else 0.0
+
+
+@njit
+def is_quiet(cluster, tables, out):
+    """Whether pipe ends bring the nodes of a cluster exactly what they did in the profile."""
+    for i in range(cluster["nodes"]):
+        node = tables[I_INTEGERS][cluster["first_node"] + i]
+        if out[tables[I_LAYOUT][0]["net"] + node] != 0.0:
+            return False
+    return True
 
 
 @njit
 def close_nodes_barotropic(t, y, out, tables):
-    """Pressure deviation of every node, flow of every valve and incoming wave of every pipe end, by Newton."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    n, m, work = nodes.size, valves.size, tables[I_SCRATCH]
-    g, x, work = work[:m], work[m : 2 * m], work[2 * m :]
-    slope, given, work = work[:n], work[n : 2 * n], work[2 * n :]
-    stored_pressures_barotropic(t, y, out, tables)
-    scale = 1e-300
-    for i in range(nodes.size):
-        given[i] = 0.0
-        if nodes[i]["kind"] == JUNCTION:
-            demand = schedule_value(tables, nodes[i]["schedule"], t)
-            out[layout["supply"] + i] = -demand
-            given[i] = out[layout["net"] + i] + nodes[i]["inflow"] - (demand - nodes[i]["demand"])
-            out[layout["pressure"] + i] = 0.0
-            scale = max(scale, abs(demand), BAR * nodes[i]["admittance"])
-    for k in range(valves.size):
-        g[k], x[k] = max(valve_conductance(tables, k, t), valves[k]["leak"]), 0.0
-        scale = max(scale, abs(valves[k]["flow"]), sqrt(g[k]))
-        if nodes[valves[k]["from_node"]]["kind"] != JUNCTION and nodes[valves[k]["to_node"]]["kind"] != JUNCTION:
-            x[k] = valve_move(tables, out, k, g[k], 0.0)[0] if g[k] > 0.0 else -valves[k]["flow"]
-    moved = 1e300
-    for _ in range(100):
-        ends_into_nodes(out, tables, slope, False)
-        for i in range(nodes.size):
-            scale = max(scale, abs(out[layout["net"] + i]))
-        before, moved = moved, newton_sweep(out, tables, g, x, slope, given, work)
-        if settled(moved, before, scale):
+    """Pressure deviation of every node, flow of every valve and both waves at every pipe end, by Newton.
+
+    All clusters take a step, then all pipe ends are evaluated again. A cluster that nothing reaches stays as it is.
+    """
+    clusters, work = tables[I_CLUSTERS], tables[I_SCRATCH]
+    n, v = tables[I_NODES].size, tables[I_VALVES].size
+    slope, c, held = work[:n], work[n : 2 * n], work[2 * n : 3 * n]
+    group, quiet = work[3 * n : 4 * n], work[4 * n : 5 * n]
+    g, m, work = work[5 * n : 5 * n + v], work[5 * n + v : 5 * n + 2 * v], work[5 * n + 2 * v :]
+    given_flows(t, y, out, tables)
+    moved, before = 1e300, 1e300
+    for sweep in range(101):
+        if sweep > 0:
+            ends_into_nodes(out, tables, slope, False)
+            before, moved = moved, 0.0
+        a, b = 0, 0
+        for which in range(clusters.size):
+            cluster = clusters[which]
+            i, j = a + cluster["nodes"], b + cluster["valves"]
+            if sweep == 0:
+                unchanged = prepare(t, cluster, tables, out, g[b:j], m[b:j])
+                quiet[which] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+                find_held(cluster, tables, g[b:j], held[a:i])
+                shut_out(cluster, tables, g[b:j], m[b:j], held[a:i])
+            else:
+                if sweep == 1 and quiet[which] == 1.0 and not is_quiet(cluster, tables, out):
+                    quiet[which] = 0.0
+                if quiet[which] == 0.0:
+                    step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, work)
+                    moved = max(moved, step)
+            a, b = i, j
+        if sweep > 0 and settled(moved, before):
             break
+    a, b = 0, 0
+    for which in range(clusters.size):
+        i, j = a + clusters[which]["nodes"], b + clusters[which]["valves"]
+        finish(clusters[which], tables, out, g[b:j], m[b:j], c[a:i], held[a:i], group[a:i], moved)
+        a, b = i, j
     ends_into_nodes(out, tables, slope, True)
-    if moved > UNSETTLED * scale:
-        out[STATUS] = NOT_CONVERGED
-    for k in range(valves.size):
-        if valves[k]["leak"] > 0.0 and g[k] == valves[k]["leak"]:
-            if (valves[k]["flow"] + x[k]) ** 2 > MOST * valves[k]["leak"]:
-                out[STATUS], out[WHERE] = NO_SOLUTION, asked_at(nodes, valves[k])
-            x[k] = -valves[k]["flow"]
-        out[layout["valve"] + k] = valves[k]["flow"] + x[k]
 
 
 @njit

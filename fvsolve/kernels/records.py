@@ -145,19 +145,10 @@ VALVE = np.dtype(
         ("table_size", "i8"),
         ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
         ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
-        (
-            "transition",
-            "f8",
-        ),  # mass flow below which the law is laminar [kg/s]; 0 where pipes soften the root
-        ("open", "f8"),  # conductance of the profile
+        ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 where pipes soften the root
+        ("open", "f8"),  # conductance of the profile; 0 where its flow does not obey it
         ("flow", "f8"),  # of the profile [kg/s]
         ("drop", "f8"),  # of the profile [Pa]
-        ("base", "f8"),  # laws log and table: M |M| or flow that the profile asks for
-        ("leak_flow", "f8"),
-        (
-            "leak",
-            "f8",
-        ),  # conductance when shut beside a node with no other hold, else 0; its flow counts as 0
     ],
     align=True,
 )

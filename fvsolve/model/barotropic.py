@@ -158,11 +158,8 @@ class BarotropicStart(Start):
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
-            g = row["open"] if row["open"] > 0.0 else row["leak"]
-            target = valve_target(self.scene.tables, out, k, float(g))[0] if g > 0.0 else 0.0
-            laminar = row["transition"] > 0.0
-            asked = target if laminar else np.sign(target) * np.sqrt(abs(target))
-            if row["open"] > 0.0 and abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
-                row["open"], target = 0.0, 0.0
-            row["base"] = target
-            row["leak_flow"] = asked if row["open"] == 0.0 and row["leak"] > 0.0 else 0.0
+            if row["open"] > 0.0:
+                target = valve_target(self.scene.tables, out, k, float(row["open"]))[0]
+                asked = target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
+                if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
+                    row["open"] = 0.0

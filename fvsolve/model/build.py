@@ -224,8 +224,8 @@ class Scene:
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
         most, cells = max(pipes["cells"], default=0), sum(mesh.cells for mesh in self.meshes)
-        system = max((c["nodes"] * (c["nodes"] + 2) + 4 * c["valves"] for c in self.cluster_table), default=0)
-        system += 2 * (len(self.node_table) + len(self.valve_table))
+        system = max((c["nodes"] * (c["nodes"] + 4) + 4 * c["valves"] for c in self.cluster_table), default=0)
+        system += 5 * len(self.node_table) + 2 * len(self.valve_table)
         layout = np.zeros(1, rec.LAYOUT)
         at = rec.OUT_HEAD
         for name, size in (

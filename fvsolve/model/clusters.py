@@ -24,7 +24,6 @@ def sort_nodes(scene) -> None:
     clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
     nodes["solve"] = rec.ALONE
-    leak = 1e-30 * max(valves["conductance"], default=0.0)
     for root, ks in touched.items():
         soft = np.all(nodes["admittance"][members[root]] > 0.0)
         single = len(ks) == 1 and soft and scene.case.fluid.law == "linear"
@@ -34,10 +33,6 @@ def sort_nodes(scene) -> None:
             soften(scene, ks)
         if single:
             continue
-        for k in ks:
-            at = [valves[k]["from_node"], valves[k]["to_node"]]
-            if any(inner[i] and nodes["admittance"][i] == 0.0 for i in at):
-                valves["leak"][k] = leak
         nodes["row"][members[root]] = np.arange(len(members[root]))
         clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
         integers += members[root] + ks

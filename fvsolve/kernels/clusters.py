@@ -1,0 +1,254 @@
+"""Nodes without storage that several valves join: Newton on pressures and flows together. Linear density law.
+
+Valve: M |M| = G (dp0 + p_i' - p_j'); node: c_i - Y_i p_i' = flow that leaves it through valves (the gradient
+method of Todini and Pilati 1988). Flows are whole, not deviations: far from the profile, where a valve all but
+shuts, a deviation would keep nothing but its rounding. Where nothing has changed, nothing is solved.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.isolated import check_unserved, find_held, float_shut, inner_row
+from fvsolve.kernels.records import (
+    I_CLUSTERS,
+    I_COLUMNS,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_SCRATCH,
+    I_VALVES,
+    NO_SOLUTION,
+    NOT_CONVERGED,
+    STATUS,
+    WHERE,
+)
+from fvsolve.kernels.valves import flow_at_drop, valve_conductance
+
+LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+BAR = 1e5
+UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has not only met rounding
+
+
+@njit
+def solve_dense(a, b, n):
+    """b <- a^-1 b by elimination with partial pivoting; False where a is singular. Overwrites both.
+
+    a : float64[n * n]  row by row
+    """
+    for i in range(n):
+        pivot, row = i, n * i
+        for k in range(i + 1, n):
+            if abs(a[n * k + i]) > abs(a[n * pivot + i]):
+                pivot = k
+        if a[n * pivot + i] == 0.0:
+            return False
+        if pivot != i:
+            for k in range(n):
+                a[row + k], a[n * pivot + k] = a[n * pivot + k], a[row + k]
+            b[i], b[pivot] = b[pivot], b[i]
+        for k in range(i + 1, n):
+            f = a[n * k + i] / a[row + i]
+            if f != 0.0:
+                for m in range(i, n):
+                    a[n * k + m] -= f * a[row + m]
+                b[k] -= f * b[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[n * i + k] * b[k]
+        b[i] /= a[n * i + i]
+    return True
+
+
+@njit(forceinline=True)
+def valve_step(g, transition, m, drop):
+    """a, s with dM = a + s d(drop) for the next Newton step of a valve that carries m [kg/s] at a drop [Pa].
+
+    The chord of the square root stands for its slope: between the flow now and the flow the drop asks for, it is
+    finite and never too steep.
+    """
+    if transition > 0.0:
+        target = flow_at_drop(g, transition, drop)
+        steepest = 45.0 / 32.0 * g / transition
+        return target - m, min(steepest, g / max(abs(target) + abs(m), 1e-300))
+    chord = max(abs(m) + sqrt(g * abs(drop)), LEAST * sqrt(g))
+    return (g * drop - abs(m) * m) / chord, g / chord
+
+
+@njit(forceinline=True)
+def settled(moved, before):
+    """Whether Newton's last relative change is rounding: below 1e-14, or small and no longer falling."""
+    return moved <= 1e-14 or (moved <= 1e-9 and moved >= 0.5 * before)
+
+
+@njit
+def whole_inflows(cluster, tables, out, c):
+    """c: flow into every node of a cluster from all but its valves at p' = 0; True where nothing has changed."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    integers, quiet = tables[I_INTEGERS], True
+    for i in range(c.size):
+        node = integers[cluster["first_node"] + i]
+        quiet = quiet and out[layout["net"] + node] == 0.0
+        c[i] = out[layout["supply"] + node]  # exact where only valves and columns join
+        if nodes[node]["admittance"] > 0.0:
+            c[i] = out[layout["net"] + node]
+    for k in range(tables[I_COLUMNS].size):
+        column = tables[I_COLUMNS][k]
+        i, j = inner_of(cluster, tables, column["from_node"]), inner_of(cluster, tables, column["to_node"])
+        if i >= 0 and nodes[column["from_node"]]["admittance"] == 0.0:
+            c[i] -= out[layout["column"] + k]
+        if j >= 0 and nodes[column["to_node"]]["admittance"] == 0.0:
+            c[j] += out[layout["column"] + k]
+    for e in range(cluster["valves"]):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        if i >= 0 and nodes[valve["from_node"]]["admittance"] > 0.0:
+            c[i] += valve["flow"]
+        if j >= 0 and nodes[valve["to_node"]]["admittance"] > 0.0:
+            c[j] -= valve["flow"]
+    return quiet
+
+
+@njit
+def inner_of(cluster, tables, i):
+    """Row of node i where it belongs to this cluster, else -1."""
+    row = inner_row(tables[I_NODES], i)
+    if row < 0 or row >= cluster["nodes"] or tables[I_INTEGERS][cluster["first_node"] + row] != i:
+        return -1
+    return row
+
+
+@njit
+def put_valve(i, j, m, a, s, n, matrix, right):
+    """Add a valve from row i to row j (-1: a known pressure) to the balances."""
+    if i >= 0:
+        right[i] -= m + a
+        matrix[n * i + i] += s
+    if j >= 0:
+        right[j] += m + a
+        matrix[n * j + j] += s
+    if i >= 0 and j >= 0:
+        matrix[n * i + j] -= s
+        matrix[n * j + i] -= s
+
+
+@njit
+def assemble(cluster, tables, out, g, m, c, held, a, s, matrix, right):
+    """Linear system for the change of the cluster's pressures, with the valves' changes put in."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    integers, n = tables[I_INTEGERS], c.size
+    for i in range(matrix.size):
+        matrix[i] = 0.0
+    for i in range(n):
+        node = integers[cluster["first_node"] + i]
+        right[i] = c[i] - nodes[node]["admittance"] * out[layout["pressure"] + node]
+        matrix[n * i + i] = nodes[node]["admittance"]
+    for e in range(m.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        a[e], s[e] = -m[e], 0.0
+        if g[e] > 0.0:
+            drop = out[layout["pressure"] + valve["from_node"]] - out[layout["pressure"] + valve["to_node"]]
+            a[e], s[e] = valve_step(g[e], valve["transition"], m[e], valve["drop"] + drop)
+        put_valve(i, j, m[e], a[e], s[e], n, matrix, right)
+    for i in range(n):
+        if held[i] == 0.0:
+            right[i], matrix[n * i + i] = 0.0, 1.0
+
+
+@njit
+def move(cluster, tables, out, m, a, s, right):
+    """Put a Newton step in; returns its greatest change, relative, of flows and of pressures together."""
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    integers, scale, moved, most = tables[I_INTEGERS], 1e-300, 0.0, 0.0
+    for i in range(right.size):
+        node = integers[cluster["first_node"] + i]
+        out[layout["pressure"] + node] += right[i]
+        most = max(most, abs(right[i]) / (BAR + abs(nodes[node]["pressure"] + out[layout["pressure"] + node])))
+    for e in range(m.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
+        m[e] += step
+        scale = max(scale, abs(m[e]))
+        moved = max(moved, abs(step), abs(a[e]))
+    return max(moved / scale, most)
+
+
+@njit
+def prepare(t, cluster, tables, out, g, m):
+    """Conductances and first flows of a cluster's valves; True where none has changed and no pressure beside it."""
+    layout, valves = tables[I_LAYOUT][0], tables[I_VALVES]
+    integers, quiet = tables[I_INTEGERS], True
+    for i in range(cluster["nodes"]):
+        out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
+    for e in range(g.size):
+        k = integers[cluster["first_valve"] + e]
+        valve = valves[k]
+        g[e], m[e] = valve_conductance(tables, k, t), valve["flow"]
+        quiet = quiet and g[e] == valve["open"]
+        for i in (valve["from_node"], valve["to_node"]):
+            quiet = quiet and out[layout["pressure"] + i] == 0.0
+    return quiet
+
+
+@njit
+def close_cluster(t, out, tables, which):
+    """Pressures of one cluster's nodes and flows of its valves; it starts from the profile, so the rhs stays pure."""
+    integers, cluster = tables[I_INTEGERS], tables[I_CLUSTERS][which]
+    n, k, work = cluster["nodes"], cluster["valves"], tables[I_SCRATCH]
+    at = n * n + 4 * n
+    matrix, right, c = work[: n * n], work[n * n : n * n + n], work[n * n + n : n * n + 2 * n]
+    held, group = work[n * n + 2 * n : n * n + 3 * n], work[n * n + 3 * n : at]
+    g, m = work[at : at + k], work[at + k : at + 2 * k]
+    a, s = work[at + 2 * k : at + 3 * k], work[at + 3 * k : at + 4 * k]
+    unchanged = prepare(t, cluster, tables, out, g, m)
+    quiet = whole_inflows(cluster, tables, out, c) and unchanged
+    find_held(cluster, tables, g, held)
+    shut_out(cluster, tables, g, m, held)
+    moved = 1e300
+    for _ in range(100):
+        if quiet:
+            moved = 0.0
+            break
+        assemble(cluster, tables, out, g, m, c, held, a, s, matrix, right)
+        if not solve_dense(matrix, right, n):
+            out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
+            return
+        before, moved = moved, move(cluster, tables, out, m, a, s, right)
+        if settled(moved, before):
+            break
+    finish(cluster, tables, out, g, m, c, held, group, moved)
+
+
+@njit
+def shut_out(cluster, tables, g, m, held):
+    """Nothing flows through valves that touch a node which is not held; open ones are marked by -1."""
+    for e in range(g.size):
+        if not is_held(cluster, tables, e, held):
+            m[e] = 0.0
+            g[e] = -1.0 if g[e] > 0.0 else 0.0
+
+
+@njit
+def is_held(cluster, tables, e, held):
+    """Whether valve e of a cluster lies between held nodes or known pressures."""
+    valve = tables[I_VALVES][tables[I_INTEGERS][cluster["first_valve"] + e]]
+    i, j = inner_row(tables[I_NODES], valve["from_node"]), inner_row(tables[I_NODES], valve["to_node"])
+    return (i < 0 or held[i] > 0.0) and (j < 0 or held[j] > 0.0)
+
+
+@njit
+def finish(cluster, tables, out, g, m, c, held, group, moved):
+    """Write the flows; give nodes that only shut valves reach their pressures; status where it failed."""
+    scale = 1e-300
+    for e in range(m.size):
+        k = tables[I_INTEGERS][cluster["first_valve"] + e]
+        out[tables[I_LAYOUT][0]["valve"] + k] = m[e]
+        scale = max(scale, abs(tables[I_VALVES][k]["flow"]), sqrt(tables[I_VALVES][k]["conductance"]))
+    if moved > UNSETTLED:
+        out[STATUS], out[WHERE] = NOT_CONVERGED, tables[I_INTEGERS][cluster["first_node"]]
+    for i in range(held.size):
+        if held[i] == 0.0:
+            float_shut(cluster, tables, out, g, held, group)
+            check_unserved(cluster, tables, out, c, held, group, scale)
+            return
