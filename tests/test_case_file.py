@@ -13,6 +13,8 @@ import pytest
 from pytest import approx
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
+from fvsolve.case import sections as defaults
+from fvsolve.case.claims import COMPARE_KEYS, expect_keys
 from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 
@@ -390,6 +392,46 @@ def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
     assert [key for key in sorted(keys) if not re.search(rf"\b{re.escape(key)}\b", page)] == []
     example = tomllib.loads(re.search(r"```toml\n(.*?)```", page, re.DOTALL)[1])
     assert load({**example, "fluid": tomllib.loads(SCENE)["fluid"]}).links["main"].cells == 100
+
+
+def headings(page: str) -> dict[str, str]:
+    """Heading -> text of a page of the docs."""
+    return dict(re.findall(r"^## (.*?)\n(.*?)(?=^#|\Z)", page, re.DOTALL | re.MULTILINE))
+
+
+def test_the_page_of_the_parts_names_every_kind_and_key_in_its_section():
+    found = headings((Path(__file__).parents[1] / "docs" / "parts.md").read_text(encoding="utf-8"))
+    found["orifice"] += found["valve"]
+    every = {"nodes": found["Every node"], "links": found["Every link"]}
+    wanted = {kind: (model, every[group]) for group in KINDS for kind, model in KINDS[group].items()}
+    wanted |= {"numerics": (Numerics, ""), "output": (Output, ""), "friction": (Friction, "")}
+    for name, (model, shared) in wanted.items():
+        text = shared + found[name]
+        assert [key for key in model.keys() if not re.search(rf"^\|.*`{key}`.*\|", text, re.MULTILINE)] == [], name
+    assert all(key in found["pipe"] for key in Wall.keys())
+    assert all(f"`{key}`" in found["expect and compare"] for key in [*expect_keys("flow"), *COMPARE_KEYS])
+
+
+def test_the_page_of_the_parts_has_the_defaults():
+    page = (Path(__file__).parents[1] / "docs" / "parts.md").read_text(encoding="utf-8")
+    said = {
+        name: dict(re.findall(r"^\| `(\w+)` \|.*\| (.*) \|$", one, re.MULTILINE))
+        for name, one in headings(page).items()
+    }
+    case = load(two_tanks())
+    assert [float(said["The case"][key]) for key in ("ambient_pressure", "gravity")] == [101325.0, case.gravity]
+    told, output = said["numerics"], said["output"]
+    for key in ("initial", "scheme", "limiter", "below_vapor"):
+        assert told[key] == f"`{Numerics.model_fields[key].default}`"
+    assert float(told["start"]) == case.numerics.start
+    assert told["method"] == f"`{defaults.DEFAULT_METHOD}`; with `rtol` `{defaults.DEFAULT_METHOD_RTOL}`"
+    assert told["courant"].startswith(f"{defaults.DEFAULT_COURANT} ")
+    assert float(told["rtol"].split()[0]) == case.numerics.rtol
+    assert told["cell_time"].endswith(f"/ {defaults.DEFAULT_CELLS}")
+    assert output["every"].endswith(f"/ {defaults.DEFAULT_ROWS}") and int(output["fields"]) == case.output.fields
+    hole = case.links["hole"]
+    assert float(said["valve"]["discharge_coefficient"]) == hole.discharge_coefficient
+    assert float(said["valve"]["opening"]) == hole.opening.first and said["valve"]["characteristic"] == '`"linear"`'
 
 
 def test_shipped_cases_point_editors_to_the_schema():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+import shutil
 import subprocess
 import sys
 from importlib import import_module
@@ -28,6 +30,17 @@ def test_each_is_there_and_documented(name):
 
 def test_the_page_names_no_other():
     assert set(re.findall(r"^\| `(\w+)", DOCS, re.MULTILINE)) == set(fvsolve.__all__)
+
+
+def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
+    shutil.copytree(Path(__file__).parent.parent / "cases", tmp_path / "cases")
+    monkeypatch.chdir(tmp_path)
+    found = {}
+    for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
+        exec(example, found)
+    assert found["result"].ok and Path("gate.png").exists() and found["state"].t == pytest.approx(1.0)
+    for values in (found["decay"], found["again"]):
+        assert values[:, 0] == pytest.approx([1.0, math.exp(-0.5), math.exp(-1.0)], rel=1e-6)
 
 
 def test_functions_are_not_hidden_by_the_modules_they_live_in():
