@@ -736,6 +736,11 @@ CANNOT_START = {
         {},
         "line 28: links.main.friction: roughness needs the fluid's viscosity",
     ),
+    "no viscosity for a table that is set": (
+        SCENE.replace("viscosity = 1e-3\n", ""),
+        {"links.main.friction": {"model": "steady", "roughness": 1e-4}},
+        "--set links.main.friction: roughness needs the fluid's viscosity",
+    ),
     "no viscosity for a part that is set": (
         SCENE.replace("viscosity = 1e-3\n", ""),
         {"links.main.friction": {"model": "none"}, "links.valve.laminar_reynolds": 20},

@@ -124,7 +124,8 @@ def located(error: CaseError, case: Any) -> CaseError:
     for fault in error.faults:
         keys = tuple(fault.place.split("."))
         found, before = now.get(keys), said.get(keys)
-        if found is not None and (before is None or (found != before and not isinstance(found, dict))):
+        whole = len(keys) == 2 and isinstance(found, dict)  # a part, of which some other key may be set
+        if found is not None and (before is None or (found != before and not whole)):
             faults.append(replace(fault, override=True))
         else:
             faults.append(replace(fault, line=fault.line or said.line(keys)))
