@@ -61,7 +61,7 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
     """
     if function is None:
         return functools.partial(njit, **options)
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+    if _disabled():
         return function
     numba = _numba()
     cache = Path(function.__code__.co_filename).resolve() in _sources()
@@ -72,6 +72,10 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         return numba.njit(**options)(function)
     finally:
         numba.config.CACHE_DIR = before
+
+
+def _disabled() -> bool:
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 
 @contextlib.contextmanager

@@ -2,7 +2,7 @@
 
 import functools
 
-from fvsolve.jit import njit
+from fvsolve.jit import beside, njit
 from fvsolve.kernels.network import rhs_linear
 from fvsolve.kernels.observer import events, observe_linear, record_linear
 
@@ -10,17 +10,29 @@ from fvsolve.kernels.observer import events, observe_linear, record_linear
 @functools.cache
 def functions(law: str) -> tuple:
     """(rhs, observe, record, events) of a law: linear, log or table."""
-    if law == "linear":
-        found = rhs_linear, observe_linear, record_linear, events
-    else:
-        from fvsolve.kernels.barotropic import observe_barotropic, record_barotropic, rhs_barotropic
-
-        found = rhs_barotropic, observe_barotropic, record_barotropic, events
-    compile_as(found[0], "tvvvh")
-    compile_as(found[1], "tvvhv")
-    compile_as(found[2], "tvvhv")
-    compile_as(found[3], "tvhv")
+    found = law_functions(law)
+    code = f"from fvsolve.kernels.functions import watchers; watchers({law!r}); "
+    with beside(code + "from fvsolve.steppers.erk import compiled; compiled()", "erk.run_erk-*.nbi"):
+        compile_as(found[0], "tvvvh")
+    watchers(law)
     return found
+
+
+def law_functions(law: str) -> tuple:
+    """The same, not yet compiled."""
+    if law == "linear":
+        return rhs_linear, observe_linear, record_linear, events
+    from fvsolve.kernels.barotropic import observe_barotropic, record_barotropic, rhs_barotropic
+
+    return rhs_barotropic, observe_barotropic, record_barotropic, events
+
+
+def watchers(law: str) -> None:
+    """Compile what reads a state: observe, record and events."""
+    _, observe, record, watch = law_functions(law)
+    compile_as(record, "tvvhv")
+    compile_as(observe, "tvvhv")
+    compile_as(watch, "tvhv")
 
 
 @functools.cache

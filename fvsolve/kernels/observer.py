@@ -24,6 +24,7 @@ from fvsolve.kernels.records import (
 )
 from fvsolve.kernels.tanks import tank_level
 
+HUGE = 1e100  # waves beyond it are not finite, though their squares might still be
 BLOCK = 64
 STOP_HERE = -2.0  # in out[WHERE]: the run is to end
 
@@ -99,7 +100,7 @@ def widen_low(t, r, l, least, t_least):
         low = s < least[i]
         least[i] = s if low else least[i]
         t_least[i] = t if low else t_least[i]
-        bad += s - s != 0.0
+        bad += not (abs(r[i]) < HUGE and abs(l[i]) < HUGE)
     return bad
 
 
@@ -112,7 +113,7 @@ def widen_high(t, r, l, greatest, t_greatest):
         high = s > greatest[i]
         greatest[i] = s if high else greatest[i]
         t_greatest[i] = t if high else t_greatest[i]
-        bad += s - s != 0.0
+        bad += not (abs(r[i]) < HUGE and abs(l[i]) < HUGE)
     return bad
 
 

@@ -254,7 +254,7 @@ class Scene:
     def model(self) -> Model:
         case = self.case
         inside = sorted(
-            (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t < case.numerics.end
+            (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
         )
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,

@@ -28,7 +28,10 @@ class Loop:
         tanks = int(np.sum(model.tables[rec.I_NODES]["kind"] == rec.TANK))
         ledgers = int(model.layout["ledgers"])
         self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
-        self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(ledgers)
+        self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(2 * ledgers)
+        nodes = model.tables[rec.I_NODES]
+        self.stored = np.array([row["y"] for row in nodes if row["y"] >= 0], dtype=np.int64)
+        self.carry = np.zeros(len(self.stored))
         self.out, self.out_row, self.values = model.new_out(), model.new_out(), np.zeros(probes)
         self.g, self.g_new = np.zeros(2 * tanks), np.zeros(2 * tanks)
         self.y_out = np.zeros(n)
@@ -72,7 +75,7 @@ class Loop:
             max(m.error_order + 1, 1) if m.adaptive else m.order, m.first_same_as_last, self.orders, self.memory,
             self.flags, self.y, self.k, self.f_old, self.supply, int(self.model.layout["ledger"]), self.ledger,
             self.model.scale, self.out, self.out_row, self.values, self.g, self.g_new,
-            self.model.tables[rec.I_ARMED], self.y_out, self.rows,
+            self.model.tables[rec.I_ARMED], self.stored, self.carry, self.y_out, self.rows,
         )  # fmt: skip
 
     def take_rows(self) -> np.ndarray:

@@ -39,8 +39,8 @@ class Run:
         self.loop = Loop(model)
         numerics, output = model.case.numerics, model.case.output
         self.start, self.end = numerics.start, numerics.end
-        jumps = {t: jump for t, jump in model.breaks if self.start <= t < self.end}
-        self.starts_with_jump = jumps.pop(self.start, False)
+        jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
+        self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
         orders = self.loop.orders
         orders[erk.START], orders[erk.EVERY] = self.start, output.every or (self.end - self.start) / 1000
@@ -52,9 +52,9 @@ class Run:
         for array in (model.tables[rec.I_EXTREMES], model.tables[rec.I_ENVELOPE]):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         model.tables[rec.I_MARKS][:] = np.nan
+        self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         if not self.fresh:
             self.remember(state.memory)
-        self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
@@ -62,12 +62,14 @@ class Run:
     def memory(self) -> np.ndarray:
         """Everything that a resumed run needs beside t and y, flat."""
         kept = [self.model.tables[at].ravel() for at in PERSISTENT]
-        return np.concatenate([[float(self.segment)], self.loop.memory, self.loop.ledger, *kept])
+        own = [float(self.segment), self.seconds]
+        return np.concatenate([own, self.loop.memory, self.loop.ledger, self.loop.carry, *kept])
 
     def remember(self, memory: np.ndarray) -> None:
-        at = 1 + erk.MEMORY
-        self.segment, self.loop.memory[:] = int(memory[0]), memory[1:at]
-        for array in (self.loop.ledger, *(self.model.tables[k] for k in PERSISTENT)):
+        at = 2 + erk.MEMORY
+        self.segment, self.seconds = int(memory[0]), float(memory[1])
+        self.loop.memory[:] = memory[2:at]
+        for array in (self.loop.ledger, self.loop.carry, *(self.model.tables[k] for k in PERSISTENT)):
             array.ravel()[:] = memory[at : at + array.size]
             at += array.size
 
@@ -156,6 +158,8 @@ class Run:
                 out = self.row(end, end)
                 self.pass_outputs(end, out)
             if self.segment == len(self.bounds) - 1:
+                if self.ends_with_jump:
+                    self.row(end, np.inf)
                 return "finished"
             self.segment += 1
             self.begin_segment(jump)
@@ -222,11 +226,11 @@ class Run:
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
         memory = loop.memory
+        ledger = mass_ledger(model, loop.now, loop.ledger[: len(model.node_names)])
         summary = Summary(
-            reason, reason == "finished", loop.t, find_marks(model),
-            {"mass": mass_ledger(model, loop.now, loop.ledger)}, find_extremes(model), find_envelope(model),
-            int(memory[erk.STEPS]), int(memory[erk.REJECTIONS]), int(memory[erk.CALLS]), model.cells, self.seconds,
-            self.setup,
+            reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
+            find_envelope(model), int(memory[erk.STEPS]), int(memory[erk.REJECTIONS]), int(memory[erk.CALLS]),
+            model.cells, self.seconds, self.setup,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

@@ -22,6 +22,7 @@ PHASE, BEHIND, NOW, OLD, ROWS = range(5)
 FRESH, LEAPT, EMIT, READY = range(4)
 
 EVENT_TOLERANCE = 1e-13
+HUGE = 1e100  # values beyond it count as not finite
 RATE, STATUS, WHERE = 0, 1, 2  # the entries of `out` that the loop reads
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
@@ -147,21 +148,44 @@ def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
 
 @njit
 def all_finite(y):
-    """False where any value is not finite: counted in integers, since a sum of floats is not vectorised."""
+    """False where any value is not finite or its square is not: counted in integers, which is vectorised."""
     bad = 0
     for i in range(y.size):
-        bad += y[i] - y[i] != 0.0
+        bad += not abs(y[i]) < HUGE
     return bad == 0
 
 
 @njit
 def book(h, b, supply, ledger):
     """Add a step of length h to the ledger, by the step's own weights; only once its end is known to be sound."""
-    for m in range(ledger.size):
+    count = supply.shape[1]
+    for m in range(count):
         total = 0.0
         for i in range(b.size):
             total += b[i] * supply[i, m]
-        ledger[m] += h * total
+        ledger[m], ledger[count + m] = add_up(ledger[m], h * total, ledger[count + m])
+
+
+@njit(forceinline=True)
+def add_up(total, part, carry):
+    """(total + part, what rounding took off), with what it took off before put back in (Kahan 1965)."""
+    whole = part + carry
+    new = total + whole
+    return new, whole - (new - total)
+
+
+@njit
+def add_stored(h, b, k, y, y_new, stored, carry):
+    """Stored masses once more, summed so that a million steps round as one; True where that changed a bit."""
+    changed = False
+    for q in range(stored.size):
+        i, total = stored[q], 0.0
+        for j in range(b.size):
+            total += b[j] * k[j, i]
+        new, carry[q] = add_up(y[i], h * total, carry[q])
+        changed = changed or new != y_new[i]
+        y_new[i] = new
+    return changed
 
 
 @njit
@@ -301,7 +325,7 @@ def run_erk(
     rhs, leap, observe, record, events, handle,
     a, b, c, error, dense, order, last_is_new,
     orders, memory, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
-    y_out, rows,
+    stored, carry, y_out, rows,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -309,7 +333,8 @@ def run_erk(
     leap(t, h, y, y_new, out, handle, values), where orders[LEAPS] allows it, is a whole step to t of a method of one
     stage, with the `out` and the record of its end: taken wherever no row is due;
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
-    ledger : float64[m] advanced with the step's own weights from out[where:]; rows : float64[cap, 1 + probes].
+    ledger : float64[2 m], sums of out[where:] with the step's own weights, and their carries; stored : int64[q],
+    states that are summed with a carry too; rows : float64[cap, 1 + probes].
     """
     s, reuse = b.size, False
     for _ in range(1 << 62):
@@ -337,7 +362,7 @@ def run_erk(
             if memory[UNBOOKED] > 0.0:
                 book(memory[UNBOOKED], b, supply, ledger)
                 memory[UNBOOKED] = 0.0
-            for m in range(ledger.size):
+            for m in range(supply.shape[1]):
                 supply[0, m] = out[where + m]
         if flags[PHASE] == EMIT:
             if flags[BEHIND] == 1 and next_due(orders, memory) <= memory[T]:
@@ -393,6 +418,7 @@ def run_erk(
             last = last and memory[T] + h >= orders[END]
             if orders[CONTROL] != TOLERANCE:
                 memory[STEP] = 0.0
+        rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
         memory[UNBOOKED] = h
         t_old = memory[T]
         memory[N_MARK] += 1.0
@@ -407,7 +433,7 @@ def run_erk(
         orders[BUDGET] -= 1.0
         if next_due(orders, memory) <= memory[T]:
             copy(k[0], f_old)
-        reuse = last_is_new and orders[CONTROL] == TOLERANCE and not last
+        reuse = last_is_new and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
 
@@ -422,7 +448,7 @@ def compiled():
     i, v, w = types.int64, types.float64[::1], types.float64[:, ::1]
     run_erk.compile(
         (*function_types(), types.int64[::1], w, v, v, v, w, i, types.boolean, v, v, types.int64[::1], w, w, v, w,
-         i, v, v, v, v, v, v, v, v, v, w)
+         i, v, v, v, v, v, v, v, v, types.int64[::1], v, v, w)
     )  # fmt: skip
     run_erk.disable_compile()
     return run_erk

@@ -50,8 +50,8 @@ def integrate(
         code = loop(*functions, work["handle"], method.a, method.b, method.c, method.error, method.dense,
                     method.error_order + 1 if method.adaptive else method.order, method.first_same_as_last, orders,
                     memory, flags, y, work["k"], work["f_old"], work["supply"], 3, work["none"], np.full(n, share),
-                    work["out"], work["out_row"], work["none"], work["none"], work["none"], work["none"], work["y_out"],
-                    work["rows"])  # fmt: skip
+                    work["out"], work["out_row"], work["none"], work["none"], work["none"], work["none"],
+                    work["nobody"], work["none"], work["y_out"], work["rows"])  # fmt: skip
         if code != erk.DONE:
             raise FvsolveError(f"{method.name} stopped at t = {memory[erk.T]:.6g}: the solution is not finite or the "
                                "step shrank to nothing; try a smaller step or a larger rtol")  # fmt: skip
@@ -79,7 +79,7 @@ def _work(method, n, s):
     sizes = {"f_old": n, "y_out": n, "out": 4, "out_row": 4, "none": 0}
     work = {name: np.zeros(size) for name, size in sizes.items()}
     return work | {"k": np.zeros((s, n)), "supply": np.zeros((s, 0)), "rows": np.zeros((1, 1)),
-                   "handle": np.zeros(1, dtype=np.int64)}  # fmt: skip
+                   "handle": np.zeros(1, dtype=np.int64), "nobody": np.zeros(0, dtype=np.int64)}  # fmt: skip
 
 
 _PYTHON: dict[int, Callable] = {}  # functions that numba cannot compile, by the number in their handle
