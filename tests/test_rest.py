@@ -249,3 +249,22 @@ def test_a_jump_at_the_very_end_has_two_rows():
     result = fvsolve.run(scene(nodes, links, 1.0, numerics, ["tap.flow"], 0.1))
     assert result.t[-1] == result.t[-2] == 1.0
     assert result["tap.flow"][-1] < 0.5 * result["tap.flow"][-2]
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
+def test_from_rest_a_pipe_between_two_lakes_starts_as_one_body_whichever_way_it_is_drawn(law, scheme):
+    """dq/dt = g A dH / L at first, all along; friction brakes it later."""
+    area = np.pi / 4 * 0.3**2
+    for ways in (("high", "low"), ("low", "high")):
+        nodes = {"high": lake(50.0), "low": lake(40.0)}
+        links = {"main": pipe(*ways, 100.0, 0.3, 1000.0, 20, friction=scenes.NO_FRICTION)}
+        numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.9, "initial": "rest"}
+        probes = ["main.flow@0.0", "main.flow@0.5", "main.flow@1.0", "main.head@0.5"]
+        case = scene(nodes, links, 0.5, numerics, probes, 0.05, fluid={**scenes.WATER, "law": law})
+        result = fvsolve.run(case)
+        side = 1.0 if ways[0] == "high" else -1.0
+        wanted = side * 9.80665 * area * 10.0 / 100.0 * np.asarray(result.t)
+        for name in probes[:3]:
+            assert result[name] == pytest.approx(wanted, rel=2e-3, abs=1e-12), name
+        assert result["main.head@0.5"] == pytest.approx(45.0, abs=1e-9 if law == "linear" else 0.02)

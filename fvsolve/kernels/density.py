@@ -7,7 +7,6 @@ straight beyond its ends. The wall swells by d ln(area) = compliance dp. Knows o
 from math import exp, expm1, log, log1p, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.friction import drag
 from fvsolve.kernels.records import LAW_LOG
 
 
@@ -153,13 +152,12 @@ def mass_of_head(st, floats, pipe, bernoulli, flow):
 
 @njit
 def profile_along(st, floats, pipe, start, z, flow, faces, centers):
-    """Steady profile of a pipe: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
+    """Profile of a pipe that its drag holds: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
 
     start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Fills mass per length at faces and
     centres [kg/m]; returns h + v^2/2 + g z at the other end.
     """
-    pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
-    pull *= st["rho"] * pipe["area"]
+    pull = pipe["drag"] * st["rho"] * pipe["area"]
     g, half, b = st["gravity"], 0.5 * pipe["dx"], start
     m = mass_of_head(st, floats, pipe, b - g * z, flow)
     faces[0] = m

@@ -48,19 +48,18 @@ def waves_out(y, out, tables):
             wave = end_value(r if right == 1 else l, right, family, degree, limiter, small, scratch)
             out[at + 1 + right] = wave
             node = pipe["to_node"] if right == 1 else pipe["from_node"]
-            offset = pipe["to_offset"] if right == 1 else pipe["from_offset"]
-            out[layout["net"] + node] += 2.0 * wave - pipe["admittance"] * offset
+            out[layout["net"] + node] += 2.0 * wave
 
 
 @njit(forceinline=True)
 def waves_in(out, tables):
-    """Waves that the nodes send back: incoming = Y (p' + offset) - outgoing."""
+    """Waves that the nodes send back: incoming = Y p' - outgoing."""
     layout, pipes = tables[I_LAYOUT][0], tables[I_PIPES]
     for i in range(pipes.size):
         pipe = pipes[i]
         at = layout["ends"] + 4 * i
-        p_from = out[layout["pressure"] + pipe["from_node"]] + pipe["from_offset"]
-        p_to = out[layout["pressure"] + pipe["to_node"]] + pipe["to_offset"]
+        p_from = out[layout["pressure"] + pipe["from_node"]]
+        p_to = out[layout["pressure"] + pipe["to_node"]]
         out[at] = pipe["admittance"] * p_from - out[at + 1]
         out[at + 3] = pipe["admittance"] * p_to - out[at + 2]
 

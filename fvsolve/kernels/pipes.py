@@ -173,5 +173,5 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
         rates_from_faces(k, fr, fl, dr, dl)
     if not plain:
         rub_any(k, pipe, base, r, l, dr, dl)
-    elif pipe["loss"] != 0.0:
+    elif pipe["loss"] != 0.0 or base != 0.0:
         rub(k, pipe["flow"], pipe["loss"], base, r, l, dr, dl)

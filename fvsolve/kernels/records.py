@@ -79,14 +79,12 @@ PIPE = np.dtype(
         ("diameter", "f8"),
         ("admittance", "f8"),  # area / speed [kg/s per Pa]
         ("flow", "f8"),  # mass flow of the profile [kg/s]
-        ("from_offset", "f8"),  # node pressure less the profile's pressure at that end [Pa]
-        ("to_offset", "f8"),
         ("friction", "i8"),
         ("loss", "f8"),  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
         ("rough", "f8"),  # dM/dt = -rough f(Re) |M| M  [1/kg]
         ("roughness", "f8"),  # relative roughness
         ("reynolds", "f8"),  # Reynolds number per mass flow [s/kg]
-        ("drag", "f8"),  # friction of the profile [kg/s2]
+        ("drag", "f8"),  # what holds the profile's pressure gradient, its friction where that is steady [kg/s2]
         ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
         ("slope", "f8"),  # rise per length

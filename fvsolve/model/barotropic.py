@@ -50,6 +50,8 @@ class BarotropicStart(Start):
         names = self.scene.pipe_names
         for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
             flow, i, j = float(self.pipe_flow[k]), int(row["from_node"]), int(row["to_node"])
+            row["flow"] = flow
+            row["drag"] = self.pipe_drop(row)
             b_to = self.march(row, mesh, flow)[2]
             plain = self.edges[k].drop(flow) - self.extra.get(names[k], 0.0)
             if flow > 0.0 and self.still(j):
@@ -93,12 +95,27 @@ class BarotropicStart(Start):
             if row["kind"] == rec.CHAMBER:
                 row["mass"] = law.density(self.st, self.floats, float(row["pressure"])) * row["volume"]
 
+    def match(self, row, mesh, flow: float):
+        """The profile that ends at the pressure of its `to` node; what friction does not hold of it drives the flow."""
+        j = int(row["to_node"])
+        for sweep in range(20):
+            faces, centers, b_to = self.march(row, mesh, flow)
+            leaves = 0.5 * (flow / faces[-1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
+            short = self.answer.potential[j] - self.rho * (b_to - leaves)
+            if sweep == 0 and not self.drive_pipe(mesh, row, self.pipe_drop(row) / row["area"] * mesh.length - short):
+                break
+            if abs(short) <= 1e-9 * PRESSURE_SCALE:
+                break
+            if sweep > 0:
+                row["drag"] -= short * row["area"] / mesh.length
+        return faces, centers
+
     def fill_pipes(self) -> None:
-        profile = self.scene.tables[rec.I_PROFILE]
+        profile, self.driven = self.scene.tables[rec.I_PROFILE], {}
         for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
             flow = row["flow"] = float(self.pipe_flow[k])
             row["drag"] = self.pipe_drop(row)
-            faces, centers, b_to = self.march(row, mesh, flow)
+            faces, centers = self.match(row, mesh, flow)
             n = mesh.cells
             profile[row["face"] : row["face"] + n + 1] = faces
             profile[row["center"] : row["center"] + n] = centers
@@ -109,7 +126,6 @@ class BarotropicStart(Start):
                 near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
                 row[f"{name}_base"] = into if near else sign * flow
                 row[f"{name}_mass"] = mass if near else m0
-            row["to_offset"] = 0.0 if near else self.nodes["pressure"][i] - self.pressure_of_mass(row, faces[-1])
             boiling, _ = law.mass_of_pressure(self.st, self.floats, row, self.scene.fluid.vapor_pressure)
             profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
             self.scene.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])

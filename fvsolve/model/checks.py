@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.friction import drag
 
 SECONDS_PER_CELL_STEP = 5e-9  # of a method with three stages; benchmarks/kernels.py
 SECONDS_PER_STEP = 1.5e-6
@@ -25,7 +26,8 @@ def checks(model) -> dict[str, Any]:
     for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
-        loss = row["drag"] / row["area"] * mesh.length
+        law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
+        loss = drag(*law) / row["area"] * mesh.length
         pipes[mesh.name] = {
             "length": mesh.length, "cells": mesh.cells, "wave_speed": mesh.wave_speed,
             "travel_time": mesh.length / mesh.wave_speed, "velocity": float(velocity),

@@ -212,17 +212,26 @@ class Start:
         return drag(*law)
 
     def fill_pipes(self) -> None:
-        profile = self.scene.tables[rec.I_PROFILE]
+        """Straight lines between the pressures of the ends; what friction does not hold of them drives the flow."""
+        profile, self.driven = self.scene.tables[rec.I_PROFILE], {}
         for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
             row["flow"] = self.pipe_flow[k]
             row["drag"] = self.pipe_drop(row)
-            slope = row["drag"] / row["area"]
             p = self.answer.potential[[row["from_node"], row["to_node"]]]
-            offset = p[1] - (p[0] - slope * mesh.length)
-            row["to_offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
+            self.drive_pipe(mesh, row, p[0] - p[1])
+            slope = row["drag"] / row["area"]
             cells = slice(int(row["cell"]), int(row["cell"]) + mesh.cells)
             pressure = self.scene.profiles[k] = p[0] - slope * mesh.x - self.weight * mesh.elevation
             profile[cells] = (self.scene.fluid.vapor_pressure - pressure) * row["admittance"]
+
+    def drive_pipe(self, mesh, row, change: float) -> bool:
+        """Let a pipe hold a change of potential [Pa] that its friction does not; False where friction does."""
+        beyond = change - row["drag"] / row["area"] * mesh.length
+        if abs(beyond) <= 1e-10 * (PRESSURE_SCALE + abs(change)):
+            return False
+        self.driven[mesh.name] = beyond
+        row["drag"] = change * row["area"] / mesh.length
+        return True
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""
@@ -267,9 +276,8 @@ class Start:
                 moving.append(f"chamber {name}: pressure changes by {row['stiffness'] * row['inflow']:.4g} Pa/s")
             else:
                 moving.append(f"junction {name}: {flow:.4g} m3/s more flow in than out")
-        for name, row in zip(self.scene.pipe_names, self.pipes, strict=True):
-            if row["to_offset"] != 0.0:
-                moving.append(f"pipe {name}: {row['to_offset']:.4g} Pa too little at its end for its flow")
+        for name, pressure in self.driven.items():
+            moving.append(f"pipe {name}: {pressure:.4g} Pa drive it, unbalanced by friction")
         for name, row in zip(self.scene.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
                 moving.append(f"rigid column {name}: {row['offset']:.4g} Pa drive it unbalanced")
