@@ -5,20 +5,23 @@ from math import log
 from fvsolve.jit import njit
 from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH
 
+TWO_OVER_LN10 = 2.0 / log(10.0)
 LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers between which the two laws are blended
 
 
 @njit
 def factor_turbulent(reynolds, roughness):
-    """Darcy factor of Colebrook, 1/sqrt(f) = -2 log10(e/3.7 + 2.51/(Re sqrt(f))), by Newton from Haaland.
+    """Darcy factor of Colebrook, 1/sqrt(f) = -2 log10(e/3.7 + 2.51/(Re sqrt(f))), by two steps of Halley from Haaland.
 
     reynolds [-], roughness relative to the diameter [-].
     """
-    x = -1.8 * log((roughness / 3.7) ** 1.11 + 6.9 / reynolds) / log(10.0)
     a, b = roughness / 3.7, 2.51 / reynolds
-    for _ in range(4):
+    x = -0.9 * TWO_OVER_LN10 * log(a**1.11 + 6.9 / reynolds)
+    for _ in range(2):
         inner = a + b * x
-        x -= (x + 2.0 * log(inner) / log(10.0)) / (1.0 + 2.0 * b / (inner * log(10.0)))
+        t = b / inner
+        g, slope = x + TWO_OVER_LN10 * log(inner), 1.0 + TWO_OVER_LN10 * t
+        x -= 2.0 * g * slope / (2.0 * slope * slope + g * TWO_OVER_LN10 * t * t)
     return 1.0 / (x * x)
 
 
