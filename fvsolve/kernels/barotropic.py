@@ -89,7 +89,7 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
         left_flow, left_flux, left_mass = dflow, flux, dm
     low = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, least))
     high = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, greatest))
-    return (quickest / least + max(low, high)) / dx
+    return (quickest / least + max(low, high)) / dx * pipe["quicker"]
 
 
 @njit

@@ -75,6 +75,7 @@ PIPE = np.dtype(
         ("to_node", "i8"),
         ("dx", "f8"),
         ("speed", "f8"),  # wave speed [m/s]
+        ("quicker", "f8"),  # factor on speed / dx that the ends of a short pipe ask for
         ("area", "f8"),
         ("diameter", "f8"),
         ("admittance", "f8"),  # area / speed [kg/s per Pa]

@@ -14,7 +14,7 @@ from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.schedules import Schedules
-from fvsolve.model.schemes import scheme_settings
+from fvsolve.model.schemes import quicker, scheme_settings
 from fvsolve.model.start import start_profile
 
 
@@ -149,6 +149,7 @@ class Scene:
         speed = self.case.wave_speed(name)
         self.ends(link, row)
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
+        row["quicker"] = quicker(self.case.numerics.scheme, n)
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
         row["cell"] = sum(mesh.cells for mesh in self.meshes)
         z = self.node_table["elevation"][[row["from_node"], row["to_node"]]]
@@ -220,7 +221,7 @@ class Scene:
         s["law"] = {"linear": rec.LAW_LINEAR, "log": rec.LAW_LOG, "table": rec.LAW_TABLE}[case.fluid.law]
         if self.fluid.table is not None:
             add_density_table(self.fluid, s, self.floats)
-        s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"]), *self.column_rates()])
+        s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
         most, cells = max(pipes["cells"], default=0), sum(mesh.cells for mesh in self.meshes)

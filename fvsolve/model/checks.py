@@ -58,7 +58,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if not rate > 0.0:
         return None, "nothing limits it"
     pipes = model.tables[rec.I_PIPES]
-    own = pipes["speed"] / pipes["dx"]
+    own = pipes["speed"] / pipes["dx"] * pipes["quicker"]
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
