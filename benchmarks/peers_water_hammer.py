@@ -29,7 +29,7 @@ GOALS = {
     "instant": ((1e-2, "none"), (3e-3, "none")),
 }
 PEER_STEPS = {"three": 8e-3 / 2.0 ** np.arange(8), "nine": 8e-3 / 2.0 ** np.arange(7)}  # [s]
-UPWIND5 = dict(scheme="upwind5", method="rk4", courant=0.9)
+UPWIND5 = dict(scheme="upwind5", method="rk4", courant=1.2)
 UPWIND = dict(scheme="upwind", method="euler", courant=1.0)
 MUSCL = dict(scheme="muscl", limiter="van-leer", method="ssp-rk3", courant=0.9)
 SCHEMES = {  # closure: (numerics, cell times [s]), those that do best and one to compare
