@@ -4,9 +4,11 @@ One compiled loop serves every method (Butcher arrays are data) and every model 
 """
 
 import functools
-from math import isfinite, sqrt
+from math import isfinite
 
 from fvsolve.jit import njit
+from fvsolve.steppers.events import arm, fallen, locate
+from fvsolve.steppers.step import add_stored, all_finite, book, copy, error_norm, first_step, interpolate, stages
 
 # What the loop remembers, in one flat array of floats that a restart stores.
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
@@ -21,8 +23,6 @@ DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED = range
 PHASE, BEHIND, NOW, OLD, ROWS = range(5)
 FRESH, LEAPT, EMIT, READY = range(4)
 
-EVENT_TOLERANCE = 1e-13
-HUGE = 1e100  # values beyond it count as not finite
 RATE, STATUS, WHERE = 0, 1, 2  # the entries of `out` that the loop reads
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
@@ -39,209 +39,6 @@ def function_types():
     observe = types.FunctionType(types.void(f, v, v, handle, v))
     events = types.FunctionType(types.void(f, v, handle, v))
     return rhs, leap, observe, observe, events
-
-
-@njit(forceinline=True)
-def copy(source, target):
-    """target = source, by a plain loop: numba's slice assignment looks for overlaps first."""
-    for i in range(target.size):
-        target[i] = source[i]
-
-
-@njit
-def combine(y, h, weights, count, k, out):
-    """out = y + h sum of weights[j] k[j] over j < count; up to three terms a pass."""
-    terms, c, which = 0, (0.0, 0.0, 0.0), (0, 0, 0)
-    first = True
-    for j in range(count):
-        if weights[j] != 0.0:
-            if terms == 0:
-                c, which = (h * weights[j], 0.0, 0.0), (j, 0, 0)
-            elif terms == 1:
-                c, which = (c[0], h * weights[j], 0.0), (which[0], j, 0)
-            else:
-                c, which = (c[0], c[1], h * weights[j]), (which[0], which[1], j)
-            terms += 1
-            if terms == 3:
-                add(y if first else out, c, which, terms, k, out)
-                first, terms = False, 0
-    if terms > 0:
-        add(y if first else out, c, which, terms, k, out)
-    elif first:
-        copy(y, out)
-
-
-@njit
-def add(y, c, which, terms, k, out):
-    """out = y + c0 k0 (+ c1 k1 (+ c2 k2))."""
-    k0, k1, k2 = k[which[0]], k[which[1]], k[which[2]]
-    c0, c1, c2 = c
-    if terms == 1:
-        for i in range(out.size):
-            out[i] = y[i] + c0 * k0[i]
-    elif terms == 2:
-        for i in range(out.size):
-            out[i] = y[i] + (c0 * k0[i] + c1 * k1[i])
-    else:
-        for i in range(out.size):
-            out[i] = y[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
-
-
-@njit
-def stages(rhs, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new):
-    """Stages 2 .. s from k[0], then y_new; supply[i] keeps the ledger rates of stage i."""
-    s = b.size
-    for i in range(1, s):
-        target = y_new if last_is_new and i == s - 1 else y_stage
-        combine(y, h, a[i], i, k, target)
-        rhs(t + c[i] * h, target, k[i], out, handle)
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-    if not last_is_new:
-        combine(y, h, b, s, k, y_new)
-
-
-@njit
-def error_norm(h, error, k, y, y_new, scale, tolerance):
-    """Root mean square of h sum e_j k_j over tolerance (scale + max(|y|, |y_new|))."""
-    total = 0.0
-    for i in range(y.size):
-        e = 0.0
-        for j in range(error.size):
-            e += error[j] * k[j, i]
-        w = h * e / (tolerance * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
-        total += w * w
-    return sqrt(total / max(y.size, 1))
-
-
-@njit
-def first_step(k, scale, order, tolerance, span):
-    """A cautious first step from the size of the rates [s]."""
-    total = 0.0
-    for i in range(scale.size):
-        total += (k[0, i] / scale[i]) ** 2
-    d = sqrt(total / max(scale.size, 1))
-    return min(span, 0.05 * tolerance ** (1.0 / (order + 1.0)) / d) if d > 0.0 else 1e-3 * span
-
-
-@njit
-def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
-    """Dense output at t + theta h: the method's own polynomial, else the cubic through both ends."""
-    if dense.shape[0] > 0:
-        copy(y, out)
-        for j in range(dense.shape[0]):
-            w, power = 0.0, theta
-            for m in range(dense.shape[1]):
-                w += dense[j, m] * power
-                power *= theta
-            kj = f if j == 0 else k[j]
-            if w != 0.0:
-                for i in range(y.size):
-                    out[i] += h * w * kj[i]
-        return
-    s, r = theta, 1.0 - theta
-    h00, h01 = r * r * (1.0 + 2.0 * s), s * s * (1.0 + 2.0 * r)
-    h10, h11 = h * s * r * r, -h * s * s * r
-    for i in range(y.size):
-        out[i] = h00 * y[i] + h01 * y_new[i] + (h10 * f[i] + h11 * f_new[i])
-
-
-@njit
-def all_finite(y):
-    """False where any value is not finite or its square is not: counted in integers, which is vectorised."""
-    bad = 0
-    for i in range(y.size):
-        bad += not abs(y[i]) < HUGE
-    return bad == 0
-
-
-@njit
-def book(h, b, supply, ledger):
-    """Add a step of length h to the ledger, by the step's own weights; only once its end is known to be sound."""
-    count = supply.shape[1]
-    for m in range(count):
-        total = 0.0
-        for i in range(b.size):
-            total += b[i] * supply[i, m]
-        ledger[m], ledger[count + m] = add_up(ledger[m], h * total, ledger[count + m])
-
-
-@njit(forceinline=True)
-def add_up(total, part, carry):
-    """(total + part, what rounding took off), with what it took off before put back in (Kahan 1965)."""
-    whole = part + carry
-    new = total + whole
-    return new, whole - (new - total)
-
-
-@njit
-def add_stored(h, b, k, y, y_new, stored, carry):
-    """Stored masses once more, summed so that a million steps round as one; True where that changed a bit."""
-    changed = False
-    for q in range(stored.size):
-        i, total = stored[q], 0.0
-        for j in range(b.size):
-            total += b[j] * k[j, i]
-        new, carry[q] = add_up(y[i], h * total, carry[q])
-        changed = changed or new != y_new[i]
-        y_new[i] = new
-    return changed
-
-
-@njit
-def arm(g, armed):
-    """Note which event functions are at or below zero, where the rhs follows another rule; whether any changed.
-
-    Only accepted states are asked, so no step, not even its stages beyond an event, meets the change of rule.
-    """
-    changed = False
-    for i in range(g.size):
-        now = 1.0 if g[i] <= 0.0 else 0.0
-        changed = changed or now != armed[i]
-        armed[i] = now
-    return changed
-
-
-@njit(forceinline=True)
-def fallen(g, g_new):
-    """Whether an event function went from above to zero or below."""
-    for i in range(g.size):
-        if g[i] > 0.0 and g_new[i] <= 0.0:
-            return True
-    return False
-
-
-@njit
-def nearness(g, g_new):
-    """Least share of its value that an event function has kept over the step: 1 at its start, 0 at an event."""
-    share = 1.0
-    for i in range(g.size):
-        if g[i] > 0.0:
-            share = min(share, g_new[i] / g[i])
-    return share
-
-
-@njit
-def locate(rhs, events, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new, g, g_new):
-    """The step that ends just past the first event, by the Illinois rule on its length; y_new belongs to it."""
-    low, high, at_low, at_high = 0.0, h, 1.0, nearness(g, g_new)
-    for _ in range(100):
-        if at_high >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high):
-            break
-        guess = high - at_high * (high - low) / (at_high - at_low)
-        guess += 1e-3 * EVENT_TOLERANCE * h
-        if not low < guess < high:
-            guess = 0.5 * (low + high)
-        stages(rhs, handle, a, b, c, last_is_new, t, guess, y, k, supply, where, out, y_stage, y_new)
-        events(t + guess, y_new, handle, g_new)
-        here = nearness(g, g_new)
-        if here <= 0.0:
-            high, at_high, at_low = guess, here, 0.5 * at_low
-        else:
-            low, at_low, at_high = guess, here, 0.5 * at_high
-    stages(rhs, handle, a, b, c, last_is_new, t, high, y, k, supply, where, out, y_stage, y_new)
-    events(t + high, y_new, handle, g_new)
-    return high
 
 
 @njit(forceinline=True)
