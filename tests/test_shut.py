@@ -73,3 +73,63 @@ def test_a_demand_behind_shut_valves_stops_the_run_by_name():
     assert "no flow can meet what is asked at X" in result.reason
     assert result.t[-1] <= 1.1 + 1e-9
     assert abs(result.ledger["mass"]["relative"]) < 1e-9
+
+
+def column_and_valve(opening: dict, **numerics) -> fvsolve.Result:
+    """10 m of rigid column from a lake at 50 m to a valve that opens to one at 40 m."""
+    nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
+    column = {"type": "rigid-column", "from": "A", "to": "X", "length": 10.0, "diameter": 0.1}
+    links = {"main": column, "tap": valve("X", "B", 0.61e-3, opening)}
+    settings = numerics or {"rtol": 1e-6, "method": "dormand-prince"}
+    return fvsolve.run(scene(nodes, links, 3.0, settings, ["X.head", "main.flow"], 0.05))
+
+
+@pytest.mark.parametrize("numerics", [{}, {"step": 1e-3, "method": "rk4"}], ids=["default", "fixed step"])
+def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
+    """Near the end q = F s with s^2 = dP - (L / A) F' s in kg/s and Pa: 52.478 m in X, then the lake's 50."""
+    result = column_and_valve(ramp(0.5, 0.5, 1.0, 0.0), **numerics)
+    assert result.ok, result.reason
+    assert not result.marks
+    drop, full = 1000.0 * 9.80665 * 10.0, math.sqrt(2.0 * 1000.0) * 0.61e-3
+    slowed = 10.0 / (math.pi / 4 * 0.1**2) * full / 0.5
+    s = 0.5 * (slowed + math.sqrt(slowed**2 + 4.0 * drop))
+    assert result.extremes["X.head"].greatest == pytest.approx(40.0 + s**2 / 9806.65, rel=1e-5)
+    late = result.t > 1.001
+    assert np.all(result["main.flow"][late] == 0.0)
+    assert result["X.head"][late] == pytest.approx(50.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("ends", [(1.0, 0.0), (0.0, 1.0), (1.0, 1e-6)], ids=["shuts", "opens", "all but shuts"])
+def test_no_ramp_of_a_valve_on_a_rigid_column_stalls_the_run(ends, exponent):
+    result = column_and_valve(ramp(0.5, 0.5, *ends, exponent))
+    assert result.ok, result.reason
+    assert not result.marks
+    assert result.summary["steps"] < 500
+    assert 40.0 < result.extremes["X.head"].least and result.extremes["X.head"].greatest < 56.0
+
+
+def test_a_rigid_column_starts_from_rest_when_its_valve_opens_again():
+    """Open, q' = (g A / L)(10 m - q^2 / (2 g (Cd A)^2)): a tanh from when it opens, here by a jump."""
+    opening = {"time": [0.4, 0.5, 1.0], "value": [1.0, 0.0, 1.0], "kind": "step"}
+    result = column_and_valve(opening)
+    assert result.ok, result.reason
+    rate, most = 9.80665 * math.pi / 4 * 0.1**2 / 10.0 * 10.0, 0.61e-3 * math.sqrt(2 * 9.80665 * 10.0)
+    late = result.t > 1.0
+    wanted = most * np.tanh(rate / most * (result.t[late] - 1.0))
+    assert result["main.flow"][late] == pytest.approx(wanted, abs=1e-6 * most)
+
+
+def test_rows_between_steps_do_not_overshoot_a_front():
+    nodes = {"lake": lake(60.0), "gate": junction(), "sea": lake(30.0)}
+    links = {
+        "main": {"type": "pipe", "from": "lake", "to": "gate", "length": 100.0, "diameter": 0.3, "wave_speed": 1000.0,
+                 "cells": 10, "friction": {"model": "none"}},
+        "tap": valve("gate", "sea", 0.01, {"time": [0.0, 0.1], "value": [1.0, 0.0], "kind": "step"}),
+    }  # fmt: skip
+    numerics = {"scheme": "upwind", "method": "euler", "courant": 1.0}
+    result = fvsolve.run(scene(nodes, links, 1.0, numerics, ["gate.pressure", "main.pressure@0.55"], 0.001))
+    for name in ("gate.pressure", "main.pressure@0.55"):
+        least, _, greatest, _ = result.extremes[name]
+        assert np.max(result[name]) <= greatest + 1e-6
+        assert np.min(result[name]) >= least - 1e-6

@@ -6,8 +6,14 @@ solution with the reference wave speed c), less the profile's.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import close_nodes_barotropic, drive, hold_columns_barotropic, waves_inside
-from fvsolve.kernels.columns import column_drag, column_inflows, shut_end
+from fvsolve.kernels.barotropic_nodes import (
+    close_nodes_barotropic,
+    drive,
+    hold_columns_barotropic,
+    stored_pressures_barotropic,
+    waves_inside,
+)
+from fvsolve.kernels.columns import column_drag, column_inflows, led_end, led_flow
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -103,8 +109,10 @@ def column_rates_barotropic(t, dydt, out, tables):
     )
     for k in range(columns.size):
         column = columns[k]
-        dydt[column["y"]] = 0.0
-        if shut_end(t, tables, k) == 0:
+        end = led_end(t, tables, k)
+        if end != 0:
+            dydt[column["y"]] = end * led_flow(t, tables, out, k, end, True)[1]
+        else:
             i, j = column["from_node"], column["to_node"]
             p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
             p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
@@ -128,6 +136,7 @@ def rhs_barotropic(t, y, dydt, out, handle):
     net = layout["net"]
     for i in range(tables[I_NODES].size):
         out[net + i] = 0.0
+    stored_pressures_barotropic(t, y, out, tables)
     column_inflows(t, y, out, tables)
     close_nodes_barotropic(t, y, out, tables)
     hold_columns_barotropic(t, out, tables)

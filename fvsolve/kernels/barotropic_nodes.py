@@ -20,7 +20,7 @@ from fvsolve.kernels.clusters import (
     solve_dense,
     whole_inflows,
 )
-from fvsolve.kernels.columns import shut_end
+from fvsolve.kernels.columns import gate_area, led_end
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -233,7 +233,6 @@ def newton_step(cluster, out, tables, g, m, c, held, slope, work):
 def given_flows(t, y, out, tables):
     """Pressures of vessels, demands, and flows of valves that lie between known pressures."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    stored_pressures_barotropic(t, y, out, tables)
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
             demand = schedule_value(tables, nodes[i]["schedule"], t)
@@ -305,8 +304,9 @@ def hold_columns_barotropic(t, out, tables):
     st, nodes, floats = tables[I_SETTINGS][0], tables[I_NODES], tables[I_FLOATS]
     pressure = tables[I_LAYOUT][0]["pressure"]
     for k in range(tables[I_COLUMNS].size):
-        column, end = tables[I_COLUMNS][k], shut_end(t, tables, k)
-        if end != 0:
+        column, end = tables[I_COLUMNS][k], led_end(t, tables, k)
+        x = column["to_node"] if end == 1 else column["from_node"]
+        if end != 0 and gate_area(t, tables, x)[0] == 0.0:
             i, j = column["from_node"], column["to_node"]
             if end == -1:
                 i, j = j, i

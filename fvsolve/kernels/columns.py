@@ -1,34 +1,92 @@
 """Rigid columns: one flow each, and what stops it. Knows columns and the valves at their ends; solves no node.
 
-A column that leads to a node without storage is held by that node's valves alone. When the last of them shuts,
-nothing can flow: the column stands, and the node has the pressure of its other end.
+A column that leads to a node without storage is held by that node's valves alone. Where these are all but shut
+(below a thousandth of their full area), its time constant goes to zero with their area F, and its flow follows them:
+I = sum of F sqrt(dP), with (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP) the pressure that slows it down. When the
+last of them shuts, nothing can flow: the column stands, and the node has the pressure of its other end.
 """
+
+from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.friction import drag
-from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES
+from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_SETTINGS, I_VALVES, JUNCTION
 from fvsolve.kernels.valves import flow_slope, valve_conductance
 
+NEARLY = 1e-3  # share of their full area below which valves lead their column
+INSTANT = 1e-7  # over which the rate of an area is measured [s]
+
 
 @njit
-def is_shut(t, tables, i):
-    """Whether node i is the end of one column whose every valve is shut, and asks for nothing."""
-    node = tables[I_NODES][i]
-    if node["gates"] < 0:
-        return False
+def gate_area(t, tables, i):
+    """(sum of the roots of the conductances of a node's valves, the same at full opening)."""
+    node, area, full = tables[I_NODES][i], 0.0, 0.0
     for e in range(node["gate_count"]):
-        if valve_conductance(tables, tables[I_INTEGERS][node["gates"] + e], t) > 0.0:
-            return False
-    return True
+        k = tables[I_INTEGERS][node["gates"] + e]
+        area += sqrt(valve_conductance(tables, k, t))
+        full += sqrt(tables[I_VALVES][k]["conductance"])
+    return area, full
 
 
 @njit
-def shut_end(t, tables, k):
-    """1 or -1 where column k is shut at its `to` or `from` end, else 0."""
+def led_at(t, tables, i):
+    """Whether node i is the end of one column whose every valve is all but shut, and asks for nothing."""
+    if tables[I_NODES][i]["gates"] < 0:
+        return False
+    area, full = gate_area(t, tables, i)
+    return area < NEARLY * full
+
+
+@njit
+def led_end(t, tables, k):
+    """1 or -1 where valves lead column k at its `to` or `from` end, else 0."""
     column = tables[I_COLUMNS][k]
-    if is_shut(t, tables, column["to_node"]):
+    if led_at(t, tables, column["to_node"]):
         return 1
-    return -1 if is_shut(t, tables, column["from_node"]) else 0
+    return -1 if led_at(t, tables, column["from_node"]) else 0
+
+
+@njit
+def standing_pressure(tables, out, k, end, solved):
+    """p' of the led end of column k at which nothing drives it; the other end's is guessed until nodes are `solved`."""
+    layout, nodes, column = tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS][k]
+    i = column["from_node"] if end == 1 else column["to_node"]
+    p = out[layout["pressure"] + i]
+    if nodes[i]["kind"] == JUNCTION and not solved:
+        p = (
+            (out[layout["net"] + i] + end * column["flow"]) / nodes[i]["admittance"]
+            if nodes[i]["admittance"] > 0.0
+            else 0.0
+        )
+    return p + end * (column["offset"] + column["drag"] * column["length"] / column["area"])
+
+
+@njit
+def led_flow(t, tables, out, k, end, solved):
+    """(flow out of column k through the valves that lead it, its rate, p' of that end), by damped iteration."""
+    nodes, valves, column = tables[I_NODES], tables[I_VALVES], tables[I_COLUMNS][k]
+    pressure, limit = tables[I_LAYOUT][0]["pressure"], tables[I_SETTINGS][0]["limit"]
+    x = column["to_node"] if end == 1 else column["from_node"]
+    early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate on this side of a kink
+    standing = standing_pressure(tables, out, k, end, solved)
+    p, flow, rate = standing, 0.0, 0.0
+    for _ in range(100):
+        flow, rate = 0.0, 0.0
+        for e in range(nodes[x]["gate_count"]):
+            which = tables[I_INTEGERS][nodes[x]["gates"] + e]
+            valve = valves[which]
+            side = 1.0 if valve["from_node"] == x else -1.0
+            other = out[pressure + (valve["to_node"] if side > 0.0 else valve["from_node"])]
+            drop = side * valve["drop"] + p - other
+            root = sqrt(abs(drop)) if drop >= 0.0 else -sqrt(abs(drop))
+            later = sqrt(valve_conductance(tables, which, early + INSTANT))
+            rate += (later - sqrt(valve_conductance(tables, which, early))) / INSTANT * root
+            flow += sqrt(valve_conductance(tables, which, t)) * root
+        new = 0.5 * (p + standing - column["length"] / column["area"] * rate)
+        if abs(new - p) <= 1e-12 * (1e5 + abs(new)):
+            break
+        p = new
+    return flow, rate, p
 
 
 @njit
@@ -36,8 +94,10 @@ def column_inflows(t, y, out, tables):
     """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
     layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
     for k in range(columns.size):
-        column = columns[k]
-        change = -column["flow"] if shut_end(t, tables, k) != 0 else y[column["y"]]
+        column, end = columns[k], led_end(t, tables, k)
+        change = y[column["y"]]
+        if end != 0:
+            change = end * led_flow(t, tables, out, k, end, False)[0] - column["flow"]
         out[layout["column"] + k] = column["flow"] + change
         out[layout["net"] + column["from_node"]] -= change
         out[layout["net"] + column["to_node"]] += change
@@ -46,24 +106,25 @@ def column_inflows(t, y, out, tables):
 @njit
 def hold_columns(t, out, tables):
     """Give the node at the shut end of a standing column the pressure that drives no flow through it."""
-    columns, pressure = tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
-    for k in range(columns.size):
-        column, end = columns[k], shut_end(t, tables, k)
-        lost = column["offset"] + column["drag"] * column["length"] / column["area"]
-        if end == 1:
-            out[pressure + column["to_node"]] = out[pressure + column["from_node"]] + lost
-        elif end == -1:
-            out[pressure + column["from_node"]] = out[pressure + column["to_node"]] - lost
+    pressure = tables[I_LAYOUT][0]["pressure"]
+    for k in range(tables[I_COLUMNS].size):
+        end = led_end(t, tables, k)
+        if end != 0:
+            x = tables[I_COLUMNS][k]["to_node"] if end == 1 else tables[I_COLUMNS][k]["from_node"]
+            if gate_area(t, tables, x)[0] == 0.0:
+                out[pressure + x] = led_flow(t, tables, out, k, end, True)[2]
 
 
 @njit
 def column_rates(t, dydt, out, tables):
-    """d/dt of the flow in rigid columns: (A / L) (drop') - drag'; a standing one stands."""
+    """d/dt of the flow in rigid columns: (A / L) (drop') - drag'; a led one follows its valves."""
     layout, columns, pressure = tables[I_LAYOUT][0], tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
     for k in range(columns.size):
         column = columns[k]
-        dydt[column["y"]] = 0.0
-        if shut_end(t, tables, k) == 0:
+        end = led_end(t, tables, k)
+        if end != 0:
+            dydt[column["y"]] = end * led_flow(t, tables, out, k, end, True)[1]
+        else:
             change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]] + column["offset"]
             pull = column_drag(column, out[layout["column"] + k])
             dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
@@ -91,6 +152,6 @@ def quickest_column(t, out, tables):
                 drop = valves[which]["drop"] + out[layout["pressure"] + valves[which]["from_node"]]
                 drop -= out[layout["pressure"] + valves[which]["to_node"]]
                 slope += flow_slope(valve_conductance(tables, which, t), valves[which]["transition"], drop)
-            if slope > 0.0:
+            if slope > 0.0 and led_end(t, tables, k) == 0:
                 rate = max(rate, column["area"] / column["length"] / slope)
     return rate

@@ -13,6 +13,7 @@ tableau(
     --+--
       | 1
 """,
+    dense=[[1]],
 )
 
 tableau(
