@@ -95,21 +95,26 @@ def _group_of(groups, i):
     return next(group for group in groups if i in group)
 
 
-def _components(held, edges):
-    """Sets of nodes joined by edges that find their own flow, and those sets without a held potential."""
-    label = list(range(held.size))
+def union(n: int, pairs) -> list[int]:
+    """Label of the set that each of n things belongs to when pairs are joined."""
+    label = list(range(n))
 
-    def root(i):
+    def root(i: int) -> int:
         while label[i] != i:
             i = label[i]
         return i
 
-    for edge in edges:
-        if edge.row is not None and not edge.shut:
-            label[root(edge.i)] = root(edge.j)
+    for i, j in pairs:
+        label[root(int(i))] = root(int(j))
+    return [root(i) for i in range(n)]
+
+
+def _components(held, edges):
+    """Sets of nodes joined by edges that find their own flow, and those sets without a held potential."""
+    joined = [(edge.i, edge.j) for edge in edges if edge.row is not None and not edge.shut]
     groups: dict[int, set[int]] = {}
-    for i in range(held.size):
-        groups.setdefault(root(i), set()).add(i)
+    for i, label in enumerate(union(held.size, joined)):
+        groups.setdefault(label, set()).add(i)
     parts = [frozenset(group) for group in groups.values()]
     return parts, [group for group in parts if all(np.isnan(held[i]) for i in group)]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.steady import union
 
 
 def sort_nodes(scene) -> None:
@@ -83,17 +84,3 @@ def soften(scene, ks) -> None:
             name = scene.valve_names[k]
             flow = scene.law.transition_flow(name, scene.case.links[name], 10.0, scene.fault)
             scene.valve_table["transition"][k] = flow
-
-
-def union(n: int, pairs) -> list[int]:
-    """Label of the set that each of n things belongs to when pairs are joined."""
-    label = list(range(n))
-
-    def root(i: int) -> int:
-        while label[i] != i:
-            i = label[i]
-        return i
-
-    for i, j in pairs:
-        label[root(int(i))] = root(int(j))
-    return [root(i) for i in range(n)]
