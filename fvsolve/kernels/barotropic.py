@@ -13,7 +13,7 @@ from fvsolve.kernels.barotropic_nodes import (
     stored_pressures_barotropic,
     waves_inside,
 )
-from fvsolve.kernels.columns import column_drag, column_inflows, led_end, led_flow
+from fvsolve.kernels.columns import column_inflows, column_rate
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -109,17 +109,11 @@ def column_rates_barotropic(t, dydt, out, tables):
     )
     for k in range(columns.size):
         column = columns[k]
-        end = led_end(t, tables, k)
-        if end != 0:
-            dydt[column["y"]] = end * led_flow(t, tables, out, k, end, True)[1]
-        else:
-            i, j = column["from_node"], column["to_node"]
-            p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
-            now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
-            change = now - column["base"] + column["offset"]
-            pull = column_drag(column, out[layout["column"] + k])
-            dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
+        i, j = column["from_node"], column["to_node"]
+        p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
+        p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
+        now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+        dydt[column["y"]] = column_rate(t, tables, out, k, now - column["base"])
 
 
 @njit

@@ -117,17 +117,22 @@ def hold_columns(t, out, tables):
 
 @njit
 def column_rates(t, dydt, out, tables):
-    """d/dt of the flow in rigid columns: (A / L) (drop') - drag'; a led one follows its valves."""
-    layout, columns, pressure = tables[I_LAYOUT][0], tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
+    """d/dt of the flow in rigid columns under the linear law."""
+    columns, pressure = tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
     for k in range(columns.size):
         column = columns[k]
-        end = led_end(t, tables, k)
-        if end != 0:
-            dydt[column["y"]] = end * led_flow(t, tables, out, k, end, True)[1]
-        else:
-            change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]] + column["offset"]
-            pull = column_drag(column, out[layout["column"] + k])
-            dydt[column["y"]] = column["area"] / column["length"] * change - (pull - column["drag"])
+        change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]]
+        dydt[column["y"]] = column_rate(t, tables, out, k, change)
+
+
+@njit
+def column_rate(t, tables, out, k, change):
+    """d/dt of one column's flow, (A / L) (change of what drives it) - drag'; a led one follows its valves."""
+    column, end = tables[I_COLUMNS][k], led_end(t, tables, k)
+    if end != 0:
+        return end * led_flow(t, tables, out, k, end, True)[1]
+    pull = column_drag(column, out[tables[I_LAYOUT][0]["column"] + k])
+    return column["area"] / column["length"] * (change + column["offset"]) - (pull - column["drag"])
 
 
 @njit
