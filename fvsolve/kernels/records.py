@@ -187,8 +187,6 @@ LAYOUT = np.dtype(
         ("valve", "i8"),
         ("column", "i8"),
         ("size", "i8"),
-        ("ledger", "i8"),
-        ("ledgers", "i8"),
     ],
     align=True,
 )

@@ -234,7 +234,7 @@ class Scene:
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
         ):  # fmt: skip
             layout[name], at = at, at + size
-        layout["size"], layout["ledger"], layout["ledgers"] = at, layout["supply"], len(self.node_table)
+        layout["size"] = at
         marks = np.full(len(pipes) + 3 * len(self.node_table) + len(self.column_table), np.nan)
         envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
         for array in (envelope, extremes):

@@ -26,7 +26,7 @@ class Loop:
         self.leap = leap_function(leaps)
         n, s, probes = model.y_size, self.method.stages, len(model.probes)
         tanks = int(np.sum(model.tables[rec.I_NODES]["kind"] == rec.TANK))
-        ledgers = int(model.layout["ledgers"])
+        ledgers = len(model.node_names)
         self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
         self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(2 * ledgers)
         nodes = model.tables[rec.I_NODES]
@@ -73,7 +73,7 @@ class Loop:
             self.rhs, self.leap, self.observe, self.record, self.events,
             self.model.handle, m.a, m.b, m.c, m.error, m.dense,
             max(m.error_order + 1, 1) if m.adaptive else m.order, m.first_same_as_last, self.orders, self.memory,
-            self.flags, self.y, self.k, self.f_old, self.supply, int(self.model.layout["ledger"]), self.ledger,
+            self.flags, self.y, self.k, self.f_old, self.supply, int(self.model.layout["supply"]), self.ledger,
             self.model.scale, self.out, self.out_row, self.values, self.g, self.g_new,
             self.model.tables[rec.I_ARMED], self.stored, self.carry, self.y_out, self.rows,
         )  # fmt: skip
