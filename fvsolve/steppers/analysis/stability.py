@@ -11,7 +11,7 @@ from fvsolve.steppers.analysis.stability_function import StabilityFunction, chop
 from fvsolve.steppers.exact.polynomial import Polynomial, sign
 from fvsolve.steppers.exact.sturm import first_sign_change, nowhere_negative, roots_right
 
-ANGLE_BITS = 44  # of the cosine of the angle of A(alpha)
+ANGLE_BITS = 36  # of the cosine of the angle of A(alpha)
 
 
 def e_polynomial(r: StabilityFunction) -> Polynomial:
