@@ -173,6 +173,27 @@ def test_a_rounded_tableau_is_decided_as_its_source_means_it():
     assert found.a_stable and found.i_stable and not found.l_stable and math.isinf(found.imaginary_interval)
 
 
+def in_decimals(name: str, digits: int) -> Method:
+    """The method as a user types it who has it in decimals."""
+    m = METHODS[name]
+    rows = [(c, *row) for c, row in zip(m.exact.c, m.exact.a, strict=True)]
+    said = [[f"{float(x):.{digits}g}" for x in row] for row in (*rows, m.exact.b)]
+    text = "\n".join(f"{row[0]} | {' '.join(row[1:])}" for row in said[:-1])
+    return user(f"{text}\n-\n| {' '.join(said[-1])}")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("digits", [16, 10])
+def test_decimals_lead_to_the_same_decisions(name, digits):
+    exact, found = analyse(name), analyse(in_decimals(name, digits))
+    for fact in ("a_stable", "l_stable", "i_stable", "angle", "pade", "stiffly_accurate"):
+        assert getattr(found, fact) == getattr(exact, fact), fact
+    for fact in ("real_interval", "imaginary_interval", "ssp_radius"):
+        assert getattr(found, fact) == pytest.approx(getattr(exact, fact), rel=10.0 ** (5 - digits)), fact
+    if digits == 16:
+        assert (found.order, found.stage_order) == (exact.order, exact.stage_order)
+
+
 def test_json_says_none_for_infinity():
     plain = analyse("implicit-euler").plain()
     assert plain["real_interval"] is plain["imaginary_interval"] is plain["ssp_radius"] is None
