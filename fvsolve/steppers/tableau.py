@@ -12,7 +12,7 @@ from fvsolve.errors import FvsolveError, nearest
 METHODS: dict[str, Method] = {}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Method:
     """A Runge-Kutta method: k_i = f(y + h sum_j a_ij k_j, t + c_i h), y+ = y + h sum_i b_i k_i (14).
 
@@ -34,6 +34,21 @@ class Method:
     @property
     def stages(self) -> int:
         return len(self.b)
+
+    start_error = 0.0
+
+    @property
+    def explicit(self):
+        return not np.triu(self.a).any()
+
+    @property
+    def diagonally_implicit(self):
+        return not self.explicit and not np.triu(self.a, 1).any()
+
+    @property
+    def pairs(self):
+        a = self.a[1:, 1:] if not self.a[0].any() else self.a
+        return int(np.sum(np.linalg.eigvals(a).imag > 1e-12))
 
     @property
     def adaptive(self) -> bool:
@@ -57,8 +72,6 @@ def tableau(name: str, text: str, order: int = 0, source: str = "user", dense=()
     for i, row in enumerate(a):
         if sum(row) != c[i]:
             raise FvsolveError(f"{name}: row {i + 1} adds up to {sum(row)}; wanted c = {c[i]}")
-        if any(value != 0 for value in row[i:]):
-            raise FvsolveError(f"{name}: row {i + 1} is not explicit; entries from column {i + 1} on must be 0")
     if any(len(row) != s for row in weights) or not 1 <= len(weights) <= 2:
         raise FvsolveError(f"{name}: wanted one or two rows of {s} weights below the line")
     if any(sum(row) != 1 for row in weights):
