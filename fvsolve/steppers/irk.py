@@ -70,6 +70,13 @@ def transformed(a: np.ndarray, c: np.ndarray) -> np.ndarray:
     return np.concatenate([part.ravel() for part in (t, np.linalg.inv(t), blocks, inverse, ahead)])
 
 
+def pairs_of(coefficients: np.ndarray, s: int) -> int:
+    """Number of complex pairs among the eigenvalues of A^-1."""
+    q = s - 1
+    blocks = coefficients[s * s + 3 * s + 2 * q * q :][: q * q].reshape(q, q)
+    return int(np.count_nonzero(np.tril(blocks, -1)))
+
+
 @njit(inline="always")
 def matrix(coefficients, s, which):
     """One of the matrices of `transformed`, flat."""

@@ -35,7 +35,7 @@ class Stepper:
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
         self.flags = np.array([told.FRESH, 0, 0, 1, 0], dtype=np.int64)
-        self.orders[told.ORDER] = method.error_order + 1 if method.adaptive else method.order
+        self.orders[told.ORDER] = method.control_order
         self.orders[told.FSAL] = method.explicit and method.first_same_as_last
         self.orders[told.IMPLICIT] = not method.explicit
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
@@ -47,7 +47,11 @@ class Stepper:
         """Room and functions for Newton's linear algebra."""
         from fvsolve.steppers.newton import new_work
 
-        pairs = 0 if self.method.diagonally_implicit else self.method.pairs
+        pairs = 0
+        if not self.method.diagonally_implicit:
+            from fvsolve.steppers.irk import pairs_of
+
+            pairs = pairs_of(self.coefficients, s)
         reals = 1 if self.method.diagonally_implicit else s - 1 - 2 * pairs
         self.shape = structure.shape
         self.work, self.kept = new_work(n, ledgers, structure.nnz, s, reals, structure.store_size)
