@@ -21,7 +21,7 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
     for k in range(size):
         kind = rng.choice(["junction", "junction", "junction", "chamber", "tank"])
         made = {"junction": junction, "chamber": lambda: chamber(0.2), "tank": lambda: tank(2.0, 30.0)}[kind]()
-        other = str(rng.choice(list(nodes)))
+        other = f"L{k}" if k < 2 else str(rng.choice(list(nodes)))
         nodes[f"N{k}"] = made
         links[f"p{k}"] = random_pipe(rng, other, f"N{k}", smooth)
     names = list(nodes)
