@@ -6,14 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array
 from truth.random_networks import random_network
 
 import fvsolve
-from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
-from fvsolve.steppers.differences import differences
-from fvsolve.steppers.structure import Structure
 
 CASES = sorted((Path(__file__).parent.parent / "cases").glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]
@@ -32,7 +28,7 @@ def random_state(model, rng) -> np.ndarray:
 
 def strays(model, t: float, y: np.ndarray) -> float:
     """Greatest change of a rate by a state that its pattern has not, over the greatest by one that it has."""
-    pattern, base, worst = sparsity(model).toarray(), rates(model, t, y), 0.0
+    pattern, base = sparsity(model).toarray(), rates(model, t, y)
     change = np.empty(pattern.shape)
     for j in range(model.y_size):
         moved = y.copy()

@@ -7,7 +7,7 @@ holds L and U by rows, the reciprocal pivots, and a row to work in.
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.steppers.linear_dense import LEAST, reciprocal, size_of
+from fvsolve.steppers.pivots import LEAST, bad_row, reciprocal, size_of
 from fvsolve.steppers.structure import OWN, SIZE
 
 # Offsets, from the start of the kind's own part: of each new row its state; L, U and J by rows in the new order,
@@ -126,14 +126,14 @@ def factor(shape, jacobian, shift, store):
     )
     lower, upper = store, store[l_starts[n] :]
     per, row = upper[u_starts[n] :], upper[u_starts[n] + n :]
+    bad = bad_row(shape, jacobian)
+    if bad > 0:
+        return bad
     for i in range(n):
         row[i] = 0.0
     for i in range(n):
-        total = 0.0
         for p in range(j_starts[i], j_starts[i + 1]):
-            value = jacobian[j_places[p]]
-            row[j_columns[p]] = -value
-            total += abs(value)
+            row[j_columns[p]] = -jacobian[j_places[p]]
         row[i] += shift
         start = size_of(row[i])
         for p in range(l_starts[i], l_starts[i + 1]):
@@ -145,7 +145,7 @@ def factor(shape, jacobian, shift, store):
         pivot = row[i]
         row[i] = 0.0
         kept = size_of(pivot)
-        if not (total < 1.0 / LEAST and LEAST < kept < 1.0 / LEAST and kept > LOST * start):
+        if not (LEAST < kept < 1.0 / LEAST and kept > LOST * start):
             return order[i] + 1
         per[i] = reciprocal(pivot)
         for q in range(u_starts[i], u_starts[i + 1]):

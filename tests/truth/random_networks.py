@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from truth.scenes import chamber, junction, lake, pipe, scene, tank, valve
 
 ROUGH = {"model": "quasi-steady", "roughness": 1e-4}
