@@ -111,7 +111,7 @@ def factor(shape, jacobian, shift, store):
 def solve(shape, store, x):
     """x <- (shift I - J)^-1 x."""
     n, own = shape[SIZE], shape[shape[OWN] :]
-    below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
+    below, width, order = own[BELOW], own[WIDTH], own[ORDER:]
     lower = store[n * width :]
     came = lower[n * below :]
     work, reach = came[n:], int(came[2 * n].real)
