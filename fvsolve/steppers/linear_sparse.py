@@ -1,36 +1,65 @@
-"""Factors of shift I - J on a fixed pattern, row by row, pivots on the diagonal. Knows lists; searches for nothing.
+"""Factors of shift I - J on a fixed pattern of 2 x 2 blocks, pivots on the diagonal. Knows lists; searches for nothing.
 
-States are put in an order that keeps the factors sparse; where these can differ from zero is found once. The store
-holds L and U by rows, the reciprocal pivots, and a row to work in.
+States go in pairs, pairs in an order that keeps the factors sparse, and where these can differ from zero is found
+once. The store holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a row to work in; a block
+is four numbers, row by row.
 """
 
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.steppers.pivots import LEAST, bad_row, reciprocal, size_of
-from fvsolve.steppers.structure import OWN, SIZE
+from fvsolve.steppers.pairs import pairs
+from fvsolve.steppers.pivots import LEAST, bad_row, size_of
+from fvsolve.steppers.structure import OWN
 
-# Offsets, from the start of the kind's own part: of each new row its state; L, U and J by rows in the new order,
-# J with the place of every entry in the Jacobian.
-ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_COLUMNS, J_PLACES = range(8)
-PARTS = 8
-LOST = 1e-10  # share of its diagonal entry that a pivot must keep
+# The kind's own part: how many blocks, then offsets from its start. Of each new row its two states; L and U by rows;
+# the entries of J by rows: their places in the working row, and in the Jacobian.
+BLOCKS, ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_PLACES, J_ENTRIES = range(9)
+PARTS = 9
+LOST = 1e-13  # share of the determinant of a diagonal block that must be left of it
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(order, patterns of L, U and J by rows behind their offsets; length of the store)."""
-    n = pattern.shape[1]
-    order = minimum_degree(pattern[:n])
-    j_starts, j_columns, j_places = rows_in_order(pattern, order)
-    l_starts, l_columns, u_starts, u_columns = fill(n, j_starts, j_columns)
-    parts = (order, l_starts, l_columns, u_starts, u_columns, j_starts, j_columns, j_places)
+    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the store)."""
+    two, rows, columns, inside = blocks(pattern)
+    count = len(two)
+    order = minimum_degree(pattern_of(rows, columns, count))
+    new = np.argsort(order)
+    i, j = new[rows // 2], new[columns // 2]
+    in_order = pattern_of(2 * i, 2 * j, count).tocsr()
+    l_starts, l_columns, u_starts, u_columns = fill(count, in_order.indptr, in_order.indices)
+    by_rows = np.argsort(i, kind="stable")
+    j_starts = np.concatenate(([0], np.cumsum(np.bincount(i, minlength=count))))
+    j_places = (4 * j + 2 * (rows % 2) + columns % 2)[by_rows]
+    parts = (two[order].ravel(), l_starts, l_columns, u_starts, u_columns, j_starts, j_places, inside[by_rows])
     offsets = PARTS + np.cumsum([0] + [part.size for part in parts[:-1]])
-    own = np.concatenate([np.asarray(part, dtype=np.int64) for part in (offsets, *parts)])
-    return own, l_columns.size + u_columns.size + 2 * n
+    own = np.concatenate([np.asarray(part, dtype=np.int64) for part in ([count], offsets, *parts)])
+    return own, 4 * (l_columns.size + u_columns.size + 2 * count)
+
+
+def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(pairs of states; of the entries among states: row and column as 2 pair + member, place in the Jacobian)."""
+    n = pattern.shape[1]
+    two = pairs(pattern[:n])
+    member = np.empty(n, dtype=np.int64)
+    member[two[:, 1]] = 2 * np.arange(len(two)) + 1
+    member[two[:, 0]] = 2 * np.arange(len(two))
+    inside = np.flatnonzero(pattern.indices < n)
+    columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
+    return two, member[pattern.indices[inside]], member[columns[inside]], inside
+
+
+def pattern_of(rows, columns, count: int):
+    """Which of count x count blocks have an entry, sparse by columns."""
+    from scipy.sparse import coo_array, csc_array
+
+    found = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
+    found.sum_duplicates()
+    return found
 
 
 def minimum_degree(pattern) -> np.ndarray:
-    """int64[n]: the states in an order of few neighbours first, multiple minimum degree on A + A^T (Liu 1985).
+    """int64[n]: rows in an order of few neighbours first, multiple minimum degree on A + A^T (Liu 1985).
 
     SuperLU finds it while it factors a diagonally dominant matrix of this pattern, whose pivots stay put.
     """
@@ -44,19 +73,9 @@ def minimum_degree(pattern) -> np.ndarray:
     return np.argsort(factors.perm_c).astype(np.int64)
 
 
-def rows_in_order(pattern, order) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(starts, columns, places in the Jacobian) of the rows of the states, rows and columns in a new order."""
-    from scipy.sparse import csc_array
-
-    n = pattern.shape[1]
-    places = csc_array((np.arange(1, pattern.nnz + 1), pattern.indices, pattern.indptr), shape=pattern.shape)
-    rows = places[:n].tocsr()[order][:, order]
-    rows.sort_indices()
-    return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data - 1
-
-
 def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(starts and columns of L, starts and columns of U) by rows, for pivots on the diagonal."""
+    starts, columns = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int64)
     room = 4 * columns.size + 16
     while True:
         l_starts, u_starts, chain = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
@@ -111,63 +130,88 @@ def place(shape, which):
     return shape[OWN] + shape[shape[OWN] + which]
 
 
-def factor(shape, jacobian, shift, store):
-    """store <- L, U and reciprocal pivots of shift I - J; returns 0, or 1 + the state without a good pivot.
+@njit(forceinline=True)
+def clear(block):
+    """Four zeros."""
+    block[0] = block[1] = block[2] = block[3] = 0.0
 
-    A pivot is good that keeps 1e-10 of its diagonal entry: the measure does not depend on the units of states.
+
+def factor(shape, jacobian, shift, store):
+    """store <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
+
+    A diagonal block is good whose determinant keeps 1e-13 of what it was at first and of its two terms: a measure
+    that does not depend on the units of states.
     """
-    n, order = shape[SIZE], shape[place(shape, ORDER) :]
+    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
     l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
     u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
-    j_starts, j_columns, j_places = (
-        shape[place(shape, J_STARTS) :],
-        shape[place(shape, J_COLUMNS) :],
-        shape[place(shape, J_PLACES) :],
-    )
-    lower, upper = store, store[l_starts[n] :]
-    per, row = upper[u_starts[n] :], upper[u_starts[n] + n :]
+    starts, places = shape[place(shape, J_STARTS) :], shape[place(shape, J_PLACES) :]
+    entries = shape[place(shape, J_ENTRIES) :]
+    lower, upper = store, store[4 * l_starts[count] :]
+    inverse, row = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
     bad = bad_row(shape, jacobian)
     if bad > 0:
         return bad
-    for i in range(n):
-        row[i] = 0.0
-    for i in range(n):
-        for p in range(j_starts[i], j_starts[i + 1]):
-            row[j_columns[p]] = -jacobian[j_places[p]]
-        row[i] += shift
-        start = size_of(row[i])
+    for e in range(4 * count):
+        row[e] = 0.0
+    for i in range(count):
+        for p in range(starts[i], starts[i + 1]):
+            row[places[p]] = -jacobian[entries[p]]
+        own = row[4 * i : 4 * i + 4]
+        own[0] += shift
+        own[3] += shift if order[2 * i] != order[2 * i + 1] else 1.0
+        first = size_of(own[0] * own[3]) + size_of(own[1] * own[2])
         for p in range(l_starts[i], l_starts[i + 1]):
             k = l_columns[p]
-            share = row[k] * per[k]
-            lower[p], row[k] = share, 0.0
+            x, d, share = row[4 * k : 4 * k + 4], inverse[4 * k : 4 * k + 4], lower[4 * p : 4 * p + 4]
+            l0, l1 = x[0] * d[0] + x[1] * d[2], x[0] * d[1] + x[1] * d[3]
+            l2, l3 = x[2] * d[0] + x[3] * d[2], x[2] * d[1] + x[3] * d[3]
+            share[0], share[1], share[2], share[3] = l0, l1, l2, l3
+            clear(x)
             for q in range(u_starts[k], u_starts[k + 1]):
-                row[u_columns[q]] -= share * upper[q]
-        pivot = row[i]
-        row[i] = 0.0
-        kept = size_of(pivot)
-        if not (LEAST < kept < 1.0 / LEAST and kept > LOST * start):
-            return order[i] + 1
-        per[i] = reciprocal(pivot)
+                u, y = upper[4 * q : 4 * q + 4], row[4 * u_columns[q] : 4 * u_columns[q] + 4]
+                y0, y1 = y[0] - (l0 * u[0] + l1 * u[2]), y[1] - (l0 * u[1] + l1 * u[3])
+                y2, y3 = y[2] - (l2 * u[0] + l3 * u[2]), y[3] - (l2 * u[1] + l3 * u[3])
+                y[0], y[1], y[2], y[3] = y0, y1, y2, y3
+        a, b, c, d = own[0], own[1], own[2], own[3]
+        clear(own)
+        one, other = a * d, b * c
+        det = one - other
+        left = size_of(det)
+        if not (LEAST < left < 1.0 / LEAST and left > LOST * max(first, size_of(one) + size_of(other))):
+            return order[2 * i] + 1
+        per = det.conjugate() / (det.real * det.real + det.imag * det.imag)
+        y = inverse[4 * i : 4 * i + 4]
+        y[0], y[1], y[2], y[3] = d * per, -b * per, -c * per, a * per
         for q in range(u_starts[i], u_starts[i + 1]):
-            upper[q], row[u_columns[q]] = row[u_columns[q]], 0.0
+            u, x = upper[4 * q : 4 * q + 4], row[4 * u_columns[q] : 4 * u_columns[q] + 4]
+            u[0], u[1], u[2], u[3] = x[0], x[1], x[2], x[3]
+            clear(x)
     return 0
 
 
 def solve(shape, store, x):
     """x <- (shift I - J)^-1 x."""
-    n, order = shape[SIZE], shape[place(shape, ORDER) :]
+    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
     l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
     u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
-    lower, upper = store, store[l_starts[n] :]
-    per, work = upper[u_starts[n] :], upper[u_starts[n] + n :]
-    for i in range(n):
-        total = x[order[i]]
+    lower, upper = store, store[4 * l_starts[count] :]
+    inverse, work = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
+    for i in range(count):
+        a, b = x[order[2 * i]], x[order[2 * i + 1]]
         for p in range(l_starts[i], l_starts[i + 1]):
-            total -= lower[p] * work[l_columns[p]]
-        work[i] = total
-    for i in range(n - 1, -1, -1):
-        total = work[i]
+            share, y = lower[4 * p : 4 * p + 4], work[2 * l_columns[p] : 2 * l_columns[p] + 2]
+            a -= share[0] * y[0] + share[1] * y[1]
+            b -= share[2] * y[0] + share[3] * y[1]
+        work[2 * i], work[2 * i + 1] = a, b
+    for i in range(count - 1, -1, -1):
+        a, b = work[2 * i], work[2 * i + 1]
         for p in range(u_starts[i], u_starts[i + 1]):
-            total -= upper[p] * work[u_columns[p]]
-        total *= per[i]
-        work[i] = x[order[i]] = total
+            u, y = upper[4 * p : 4 * p + 4], work[2 * u_columns[p] : 2 * u_columns[p] + 2]
+            a -= u[0] * y[0] + u[1] * y[1]
+            b -= u[2] * y[0] + u[3] * y[1]
+        d = inverse[4 * i : 4 * i + 4]
+        first, second = d[0] * a + d[1] * b, d[2] * a + d[3] * b
+        work[2 * i], work[2 * i + 1] = first, second
+        x[order[2 * i + 1]] = second  # a state without a partner is written over by its own
+        x[order[2 * i]] = first
