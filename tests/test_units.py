@@ -57,7 +57,7 @@ mm2/s: millimeter**2/second | cSt: centistokes | St: stokes | cm2/s: centimeter*
 ft2/s: foot**2/second | -: dimensionless | 1: dimensionless | %: percent | kg: kilogram | g: gram
 mg: milligram | t: metric_ton | tonne: metric_ton | lb: pound | lbm: pound | kg/s: kilogram/second
 g/s: gram/second | kg/min: kilogram/minute | kg/h: kilogram/hour | t/h: metric_ton/hour
-lb/s: pound/second | N: newton | kN: kilonewton | kgf: kilogram_force | lbf: pound_force | J: joule
+lb/s: pound/second | N: newton | kN: kilonewton | MN: meganewton | kgf: kilogram_force | lbf: pound_force | J: joule
 kJ: kilojoule | MJ: megajoule | kWh: kilowatt_hour | W: watt | kW: kilowatt | MW: megawatt
 hp: horsepower | Hz: 1/second | kHz: 1000/second | 1/s: 1/second | rad: radian | deg: degree
 C: coulomb | F: farad | K: kelvin | degC: degC | celsius: degC | degF: degF | degR: degR

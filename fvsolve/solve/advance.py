@@ -111,7 +111,7 @@ def input_schedules(model: Model) -> dict[str, Input]:
     """Input name -> what it holds."""
     rho, weight = model.case.properties.density, model.case.properties.density * model.case.gravity
     found = {}
-    nodes = zip(model.node_names, model.case.nodes.values(), model.tables[rec.I_NODES], strict=True)
+    nodes = zip(model.node_names, model.case.places.values(), model.tables[rec.I_NODES], strict=True)
     for i, (name, node, row) in enumerate(nodes):
         index = int(row["schedule"])
         if node.kind == "reservoir":

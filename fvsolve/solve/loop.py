@@ -25,15 +25,16 @@ class Loop:
         leaps = leap_allowed(model, self.method)
         self.leap = leap_function(leaps)
         n, s, probes = model.y_size, self.method.stages, len(model.probes)
-        tanks = int(np.sum(model.tables[rec.I_NODES]["kind"] == rec.TANK))
         ledgers = len(model.node_names)
         self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
         self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(2 * ledgers)
         nodes = model.tables[rec.I_NODES]
-        self.stored = np.array([row["y"] for row in nodes if row["y"] >= 0], dtype=np.int64)
+        bodies = model.tables[rec.I_BODIES]  # their travel is part of what moving chambers store
+        self.stored = np.array([row["y"] for table in (nodes, bodies) for row in table if row["y"] >= 0], dtype=np.int64)
         self.carry = np.zeros(len(self.stored))
         self.out, self.out_row, self.values = model.new_out(), model.new_out(), np.zeros(probes)
-        self.g, self.g_new = np.zeros(2 * tanks), np.zeros(2 * tanks)
+        events = model.tables[rec.I_ARMED].size
+        self.g, self.g_new = np.zeros(events), np.zeros(events)
         self.y_out = np.zeros(n)
         self.rows = np.zeros((ROW_CAPACITY, 1 + probes))
         self.memory, self.orders = np.zeros(erk.MEMORY), np.zeros(erk.ORDERS)
