@@ -12,8 +12,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import rhs_linear
-from fvsolve.kernels.observer import observe_linear, record_all
 from fvsolve.kernels.observer import events as tank_events
+from fvsolve.kernels.observer import observe_linear, record_all
 from fvsolve.kernels.records import (
     FORCE,
     I_ARMED,

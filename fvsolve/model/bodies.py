@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.mechanics import contact
 from fvsolve.kernels.schedules import schedule_value
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
@@ -72,6 +71,8 @@ def fill_brace(scene, link, row) -> None:
 
 
 def fill_stop(scene, link, row) -> None:
+    from fvsolve.kernels.mechanics import contact  # scenes without bodies load none of it
+
     x, speed = join(scene, row, ("from_body", "to_body"), (link.from_, link.to))
     row["stiffness"], row["damping"] = link.stiffness, link.damping
     row["below"] = FAR if link.least is None else x - link.least

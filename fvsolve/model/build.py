@@ -261,8 +261,7 @@ class Scene:
         ):  # fmt: skip
             layout[name], at = at, at + size
         layout["size"] = at
-        marks = np.full(
-            len(pipes) + 3 * len(self.node_table) + len(self.column_table) + len(self.piston_table), np.nan)
+        marks = np.full(len(pipes) + 3 * len(self.node_table) + len(self.column_table) + len(self.piston_table), np.nan)
         envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
         for array in (envelope, extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan

@@ -8,7 +8,6 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.schemes import ORDER
 from fvsolve.parts import EDGES
 
-
 SPOOL_FLOWS = {  # flow into the link at a port: weights of its four edges
     f"flow_{port}": [float((port == start) - (port == end)) for start, end, _ in EDGES] for port in "PTAB"
 }

@@ -13,9 +13,9 @@ from fvsolve.parts.value import Quantity, nonnegative, positive
 class Cylinder(Link, kind="cylinder"):
     """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x), x = x_rod - x_case.
 
-    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p from ambient, and
-    the case back by as much. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored energy: that of
-    its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
+    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p from ambient,
+    and the case back by as much. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored energy: that
+    of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
@@ -39,7 +39,7 @@ class Cylinder(Link, kind="cylinder"):
     ] = None
     leakage: Annotated[float, Quantity("leakage", nonnegative, "flow from A to B per pressure [m3/s/Pa]")] = 0.0
     viscous_friction: Annotated[float, Quantity("damping", nonnegative, "of piston and rod [N s/m]")] = 0.0
-    elevation: Annotated[float | None, Quantity("length", about="of its chambers above datum [m], 0 if left out")] = None
+    elevation: Annotated[float | None, Quantity("length", about="of its chambers above datum [m]")] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

@@ -28,9 +28,8 @@ class Loop:
         ledgers = len(model.node_names)
         self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
         self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(2 * ledgers)
-        nodes = model.tables[rec.I_NODES]
-        bodies = model.tables[rec.I_BODIES]  # their travel is part of what moving chambers store
-        self.stored = np.array([row["y"] for table in (nodes, bodies) for row in table if row["y"] >= 0], dtype=np.int64)
+        sums = [*model.tables[rec.I_NODES]["y"], *model.tables[rec.I_BODIES]["y"]]  # travel is part of what is stored
+        self.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         self.carry = np.zeros(len(self.stored))
         self.out, self.out_row, self.values = model.new_out(), model.new_out(), np.zeros(probes)
         events = model.tables[rec.I_ARMED].size

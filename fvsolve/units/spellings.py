@@ -173,7 +173,8 @@ SPELLINGS: dict[str, dict[str, Any]] = {
     "power": {"W": 1, "kW": 1000, "MW": 10**6, "hp": 550 * FOOT * POUND_FORCE},
     "frequency": {"Hz": 1, "kHz": 1000, "1/s": 1},
     "stiffness": {
-        "N/m": 1, "N/mm": 1000, "N/um": 10**6, "kN/m": 1000, "kN/mm": 10**6, "MN/m": 10**6, "lbf/in": POUND_FORCE / INCH,
+        "N/m": 1, "N/mm": 1000, "N/um": 10**6, "kN/m": 1000, "kN/mm": 10**6, "MN/m": 10**6,
+        "lbf/in": POUND_FORCE / INCH,
     },
     "damping": {
         "N s/m": 1, "N/(m/s)": 1, "kN s/m": 1000, "N s/mm": 1000, "lbf s/in": POUND_FORCE / INCH,
