@@ -112,6 +112,7 @@ def add_states(scene) -> None:
 def start_bodies(scene, start) -> list[str]:
     """The forces of the start and what is left of them on each body; returns what moves, in words."""
     nodes, bodies, ambient = scene.node_table, scene.body_table, scene.case.ambient_pressure
+    size = np.zeros(len(bodies))
     for row in scene.brace_table:
         if row["schedule"] >= 0:
             row["given"] = row["force"] = schedule_value(scene.tables, int(row["schedule"]), start.t)
@@ -120,9 +121,10 @@ def start_bodies(scene, start) -> list[str]:
         row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]
         row["sweep_b"] = -b["mass"] / b["volume"] * row["area_b"]
         row["leak"] = start.leak_flow(row, float(a["pressure"]), float(b["pressure"]))
-        thrust = row["area_a"] * (a["pressure"] - ambient) - row["area_b"] * (b["pressure"] - ambient)
-        row["force"] = thrust - row["damping"] * row["speed"]
-    total, size = np.zeros(len(bodies)), np.zeros(len(bodies))
+        pushed, back = row["area_a"] * (a["pressure"] - ambient), row["area_b"] * (b["pressure"] - ambient)
+        row["force"] = pushed - back - row["damping"] * row["speed"]
+        size[[row["case"], row["rod"]]] += abs(pushed) + abs(back)
+    total = np.zeros(len(bodies))
     for table, ports in ((scene.brace_table, ("from_body", "to_body")), (scene.stop_table, ("from_body", "to_body")),
                          (scene.piston_table, ("case", "rod"))):  # fmt: skip
         for row in table:
