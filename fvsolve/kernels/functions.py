@@ -12,7 +12,7 @@ def functions(law: str, bodies: bool = False) -> tuple:
     """(rhs, observe, record, events) of a law, linear, log or table, in scenes with or without bodies."""
     found = law_functions(law, bodies)
     code = f"from fvsolve.kernels.functions import watchers; watchers({law!r}, {bodies}); "
-    with beside(code + "from fvsolve.steppers.erk import compiled; compiled()", "erk.run_erk-*.nbi"):
+    with beside(code + "from fvsolve.steppers.march import compiled; compiled()", "march.march-*.nbi"):
         compile_as(law_functions(law)[0], "tvvvh")
         compile_as(found[0], "tvvvh")
     watchers(law, bodies)
