@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pytest import approx
 from scipy.interpolate import CubicSpline
+from truth.cylinders import AMBIENT, BETA, RHO, Jack, valve_flow
+from truth.scenes import reservoir, scene
 
 import fvsolve
-from truth.cylinders import AMBIENT, BETA, MU, RHO, Jack, valve_flow
-from truth.scenes import reservoir, scene
 
 CLOSE = {"method": "dormand-prince", "rtol": 1e-10}
 PROBES = ("cyl.A.pressure", "cyl.B.pressure", "load.position", "load.velocity")
@@ -119,7 +119,9 @@ def test_a_servo_cylinder_follows_the_trajectory_of_scipy(law):
 @pytest.mark.parametrize("side", ["from air", "plugged"])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_cylinder_open_to_the_air_on_both_sides_does_not_move_by_one_bit(law, side):
-    jack = Jack(law, leakage=1e-12, friction=100.0, extra={"initial_pressure_A": AMBIENT, "initial_pressure_B": AMBIENT})
+    jack = Jack(
+        law, leakage=1e-12, friction=100.0, extra={"initial_pressure_A": AMBIENT, "initial_pressure_B": AMBIENT}
+    )
     links = {}
     if side == "from air":
         links = {end: {"type": "orifice", "from": "air", "to": f"cyl.{end}", "area": 1e-5} for end in "AB"}
@@ -290,7 +292,9 @@ def bodies(links: dict, end: float, probes, rows=1000, load=None, **numerics):
     return fvsolve.run(scene(nodes, links, end, {**CLOSE, **numerics}, probes, end / rows))
 
 
-@pytest.mark.parametrize("given", [{}, {"free_length": 0.3}, {"preload": 50.0}], ids=["plain", "free length", "preload"])
+@pytest.mark.parametrize(
+    "given", [{}, {"free_length": 0.3}, {"preload": 50.0}], ids=["plain", "free length", "preload"]
+)
 def test_a_mass_on_a_spring_swings_about_where_the_spring_is_slack(given):
     """F = -k x (81) and k x^2 / 2 (82)."""
     spring = {"type": "spring", "from": "wall", "to": "load", "stiffness": 800.0, **given}
@@ -355,7 +359,9 @@ def test_a_piston_beyond_its_stroke_is_marked_and_one_without_room_ends_the_run(
     ]
     light = {"links.cyl.dead_volume_B": 1e-6, "nodes.load.mass": 1e5, "numerics.method": "rk4", "numerics.step": 1e-5}
     stopped = fvsolve.run(case, set=light)
-    assert not stopped.ok and "has left no volume at cyl.B" in stopped.reason and "give it an end-stop" in stopped.reason
+    assert (
+        not stopped.ok and "has left no volume at cyl.B" in stopped.reason and "give it an end-stop" in stopped.reason
+    )
 
 
 def test_a_controller_may_hold_spool_and_force():
