@@ -48,7 +48,7 @@ class Cylinder(Link, kind="cylinder"):
             faults.append(((), "wanted area_A or piston_diameter"))
         if "area_B" not in given and "rod_diameter" not in given:
             faults.append(((), "wanted area_B or rod_diameter"))
-        if "rod_diameter" in given and "area_A" in given:
+        if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
             faults.append((("rod_diameter",), "goes with piston_diameter; give area_B beside area_A"))
         return faults
 
