@@ -26,12 +26,12 @@ class Loop:
         (self.leap,) = arguments((leap_function(leaps),))
         structure = None if self.method.explicit else model.structure
         self.stepper = stepper = Stepper(self.method, model.y_size, len(model.node_names), structure, model.scale)
-        tanks = int(np.sum(model.tables[rec.I_NODES]["kind"] == rec.TANK))
-        nodes = model.tables[rec.I_NODES]
-        stepper.stored = np.array([row["y"] for row in nodes if row["y"] >= 0], dtype=np.int64)
+        sums = [*model.tables[rec.I_NODES]["y"], *model.tables[rec.I_BODIES]["y"]]  # travel is part of what is stored
+        stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
-        stepper.g, stepper.g_new = np.zeros(2 * tanks), np.zeros(2 * tanks)
+        events = model.tables[rec.I_ARMED].size
+        stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
         self.orders[told.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT

@@ -217,6 +217,8 @@ class Run:
             return f"stopped: the step shrank to nothing at {when}; try a larger rtol, or courant in place of it"
         if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
             return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
+        if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
+            return f"stopped: the piston has left no volume{place} at {when}; give it an end-stop"
         if code == told.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"
