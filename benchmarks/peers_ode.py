@@ -9,8 +9,9 @@ from functools import partial
 
 import numba
 import numpy as np
+from measure import Solver
 from numba import types
-from numbalsoda import dop853, lsoda, lsoda_sig
+from numbalsoda import address_as_void_pointer, dop853, lsoda, lsoda_sig
 from scipy import sparse
 from scipy.integrate import odeint, solve_ivp
 from sksundae.cvode import CVODE
@@ -31,19 +32,10 @@ class Problem:
     band: tuple[int, int] | None = None
 
 
-@dataclass(frozen=True)
-class Solver:
-    """`solve(tolerance)` gives y : float64[times, n]; `count(tolerance)` gives (steps, calls of f), nan unknown."""
-
-    name: str
-    solve: Callable[[float], np.ndarray]
-    count: Callable[[float], tuple[float, float]]
-
-
-def peers(problem: Problem, implicit: tuple[str, ...] = ("Radau", "BDF")) -> list[Solver]:
-    """All of them; `implicit`: which of SciPy's."""
+def peers(problem: Problem) -> list[Solver]:
+    """All that are made for stiff problems."""
     found = [numba_lsoda(problem), *cvodes(problem)]
-    return found + [scipy_ivp(problem, name) for name in (*implicit, "LSODA")] + [scipy_odeint(problem)]
+    return found + [scipy_ivp(problem, name) for name in ("Radau", "BDF", "LSODA")] + [scipy_odeint(problem)]
 
 
 # numbalsoda ---------------------------------------------------------------------------------------------------
@@ -77,13 +69,26 @@ def numba_lsoda(problem: Problem) -> Solver:
     return Solver("numbalsoda LSODA", solve, count)
 
 
-def explicit_reference(problem: Problem, tolerance: float = 1e-13) -> np.ndarray:
-    """y at all times by DOP853 of numbalsoda."""
+def numba_dop853(problem: Problem) -> Solver:
+    """DOP853 in Fortran, compiled f."""
     function = address(problem)
-    y, well = dop853(function.address, problem.y0, problem.t, np.zeros(1), tolerance, tolerance, MANY)
-    if not well:
-        raise SystemExit("DOP853 did not reach the end")
-    return y
+    counter = np.zeros(1)
+
+    def solve(tolerance):
+        counter[0] = 0.0
+        y, well = dop853(function.address, problem.y0, problem.t, counter, tolerance, tolerance, MANY)
+        return y if well else np.full_like(y, np.nan)
+
+    def count(tolerance):
+        solve(tolerance)
+        return np.nan, counter[0]
+
+    return Solver("numbalsoda DOP853", solve, count)
+
+
+def explicit_reference(problem: Problem, tolerance: float = 1e-13) -> np.ndarray:
+    """y at all times by DOP853, whose steps stability keeps short."""
+    return numba_dop853(problem).solve(tolerance)
 
 
 # scikit-sundae ------------------------------------------------------------------------------------------------
@@ -93,14 +98,20 @@ WRITE = types.float64[::1]
 
 
 def cvodes(problem: Problem) -> list[Solver]:
-    """CVODE's BDF with a dense or band matrix; df/dy by its own differences or by compiled ones."""
-    own = {"linsolver": "dense"}
-    if problem.band:
-        own = {"linsolver": "band", "lband": problem.band[0], "uband": problem.band[1]}
-    forms = {"scikit-sundae CVODE": own}
-    if not problem.band:
-        forms["scikit-sundae CVODE, compiled df/dy"] = own | {"jacfn": differences(problem)}
-    return [cvode(problem, name, options) for name, options in forms.items()]
+    """CVODE's BDF, df/dy by its own differences and by compiled ones."""
+    own = cvode_options(problem)
+    other = own | {"jacfn": differences(problem)}
+    return [
+        cvode(problem, "scikit-sundae CVODE", own),
+        cvode(problem, "scikit-sundae CVODE, compiled df/dy", other),
+    ]
+
+
+def cvode_options(problem: Problem) -> dict:
+    """BDF with a dense matrix, or a band where the problem has one."""
+    if problem.band is None:
+        return {"method": "BDF", "linsolver": "dense"}
+    return {"method": "BDF", "linsolver": "band", "lband": problem.band[0], "uband": problem.band[1]}
 
 
 def cvode(problem: Problem, name: str, options: dict) -> Solver:
@@ -108,11 +119,11 @@ def cvode(problem: Problem, name: str, options: dict) -> Solver:
     rhs = problem.rhs
 
     @numba.njit(types.void(types.float64, READ, WRITE), error_model="numpy")
-    def function(t, y, yp):
-        rhs(t, y, yp)
+    def function(t, y, yp):  # y is read-only there, which is another type to numba
+        rhs(t, numba.carray(address_as_void_pointer(y.ctypes.data), y.size, np.float64), yp)
 
     def solver(tolerance):
-        return CVODE(function, method="BDF", rtol=tolerance, atol=tolerance, max_num_steps=MANY, **options)
+        return CVODE(function, rtol=tolerance, atol=tolerance, max_num_steps=MANY, **options)
 
     def solve(tolerance):
         return solver(tolerance).solve(problem.t, problem.y0).y
