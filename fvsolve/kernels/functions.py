@@ -12,7 +12,7 @@ def functions(law: str) -> tuple:
     """(rhs, observe, record, events) of a law: linear, log or table."""
     found = law_functions(law)
     code = f"from fvsolve.kernels.functions import watchers; watchers({law!r}); "
-    with beside(code + "from fvsolve.steppers.erk import compiled; compiled()", "erk.run_erk-*.nbi"):
+    with beside(code + "from fvsolve.steppers.march import compiled; compiled()", "march.march-*.nbi"):
         compile_as(found[0], "tvvvh")
     watchers(law)
     return found

@@ -13,7 +13,7 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import erk
+from fvsolve.steppers import orders as told
 from fvsolve.units import show
 
 
@@ -30,18 +30,18 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     held = hold(model, inputs or {})
     loop = Loop(held)
     loop.now[:] = state.y
-    loop.memory[erk.T] = state.t
-    adaptive = loop.orders[erk.CONTROL] == erk.TOLERANCE
+    loop.memory[told.T] = state.t
+    adaptive = loop.orders[told.CONTROL] == told.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
         loop.begin(end, NO_LIMIT)
         if first and adaptive and state.memory.size == 2:
-            loop.memory[[erk.STEP, erk.ERROR_OLD]] = state.memory
-        if loop.run(NO_LIMIT) != erk.DONE:
+            loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory
+        if loop.run(NO_LIMIT) != told.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
-    return State(loop.t, loop.now.copy(), loop.memory[[erk.STEP, erk.ERROR_OLD]].copy())
+    return State(loop.t, loop.now.copy(), loop.memory[[told.STEP, told.ERROR_OLD]].copy())
 
 
 class Input(NamedTuple):

@@ -1,4 +1,4 @@
-"""One explicit Runge-Kutta step, its error, its dense output and its sums. Knows arrays; controls nothing."""
+"""What steps of every kind share: sums, error norm, dense output, ledgers. Knows arrays; controls nothing."""
 
 from math import sqrt
 
@@ -54,20 +54,6 @@ def add(y, c, which, terms, k, out):
 
 
 @njit
-def stages(rhs, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new):
-    """Stages 2 .. s from k[0], then y_new; supply[i] keeps the ledger rates of stage i."""
-    s = b.size
-    for i in range(1, s):
-        target = y_new if last_is_new and i == s - 1 else y_stage
-        combine(y, h, a[i], i, k, target)
-        rhs(t + c[i] * h, target, k[i], out, handle)
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-    if not last_is_new:
-        combine(y, h, b, s, k, y_new)
-
-
-@njit
 def error_norm(h, error, k, y, y_new, scale, tolerance):
     """Root mean square of h sum e_j k_j over tolerance (scale + max(|y|, |y_new|))."""
     total = 0.0
@@ -78,16 +64,6 @@ def error_norm(h, error, k, y, y_new, scale, tolerance):
         w = h * e / (tolerance * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
         total += w * w
     return sqrt(total / max(y.size, 1))
-
-
-@njit
-def first_step(k, scale, order, tolerance, span):
-    """A cautious first step from the size of the rates [s]."""
-    total = 0.0
-    for i in range(scale.size):
-        total += (k[0, i] / scale[i]) ** 2
-    d = sqrt(total / max(scale.size, 1))
-    return min(span, 0.05 * tolerance ** (1.0 / (order + 1.0)) / d) if d > 0.0 else 1e-3 * span
 
 
 @njit

@@ -1,0 +1,74 @@
+"""How long a step keeps what Euler steps keep: the SSP radius (Kraaijevanger 1991). Knows exact numbers of tableaux."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from fvsolve.steppers.tableau import Method
+
+BITS = 52  # of the radius
+LONGEST = Fraction(1 << 64)  # a radius beyond is infinite
+
+
+def ssp_radius(method: Method) -> float:
+    """The greatest r with (I + r K)^-1 1 >= 0 and r K (I + r K)^-1 >= 0, K = [[A, 0], [b^T, 0]]; 0 where none.
+
+    Steps up to r times the greatest Euler step that keeps a norm from growing keep it too; inf where all do.
+    """
+    k = _used(method)
+    if any(_negative(x, method) for row in k for x in row) or not _fills_in(k):
+        return 0.0
+    if _monotone(k, LONGEST, method):
+        return math.inf
+    low, high = Fraction(0), Fraction(1)
+    while _monotone(k, high, method):
+        low, high = high, 2 * high
+    for _ in range(BITS):
+        middle = (low + high) / 2
+        if _monotone(k, middle, method):
+            low = middle
+        else:
+            high = middle
+    simple = low.limit_denominator(1000)
+    return float(simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple, method) else low)
+
+
+def _used(method: Method) -> list[list]:
+    """K of the stages that the new state depends on."""
+    a, b = method.exact.a, method.exact.b
+    used, new = set(), {j for j, x in enumerate(b) if x != 0}
+    while new - used:
+        used |= new
+        new = {j for i in used for j, x in enumerate(a[i]) if x != 0}
+    stages = sorted(used)
+    return [[row[j] for j in stages] + [Fraction(0)] for row in (*(a[i] for i in stages), b)]
+
+
+def _fills_in(k: list[list]) -> bool:
+    """Whether K^2 has entries only where K has: else the radius is 0."""
+    n = len(k)
+    return all(
+        k[i][j] != 0 or not any(k[i][m] != 0 and k[m][j] != 0 for m in range(n)) for i in range(n) for j in range(n)
+    )
+
+
+def _monotone(k: list[list], r: Fraction, method: Method) -> bool:
+    """Whether the two conditions hold at r, decided: X = (I + r K)^-1 [1, r K] has no negative entry."""
+    n = len(k)
+    rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
+    for i in range(n):
+        pivot = next((m for m in range(i, n) if rows[m][i] != 0), None)
+        if pivot is None:
+            return False
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        top = rows[i] = [x / rows[i][i] if x != 0 else x for x in rows[i]]
+        for m in range(n):
+            if m != i and rows[m][i] != 0:
+                factor = rows[m][i]
+                rows[m] = [x - factor * y if y != 0 else x for x, y in zip(rows[m], top, strict=True)]
+    return not any(_negative(x, method) for row in rows for x in row[n:])
+
+
+def _negative(x, method: Method) -> bool:
+    return x < -1000 * method.rounding if method.rounding else x < 0

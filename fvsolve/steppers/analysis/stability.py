@@ -1,0 +1,107 @@
+"""Where |R(s)| <= 1, decided in exact numbers (13). Knows stability functions; knows no time loop."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.steppers.analysis.stability_function import StabilityFunction, chopped
+from fvsolve.steppers.exact.polynomial import Polynomial, sign
+from fvsolve.steppers.exact.sturm import first_sign_change, nowhere_negative, roots_right
+
+ANGLE_BITS = 44  # of the cosine of the angle of A(alpha)
+
+
+def e_polynomial(r: StabilityFunction) -> Polynomial:
+    """E(x) = |D(iy)|^2 - |N(iy)|^2 with x = y^2 (Norsett 1975): |R(iy)| <= 1 where E >= 0."""
+    found = _modulus(r.denominator) - _modulus(r.numerator)
+    if not r.doubt:
+        return found
+    size = [sum(abs(x) for x in p.coefficients) for p in (r.numerator, r.denominator)]
+    return chopped(found, (4 * max(size) * max(r.doubt),))
+
+
+def i_stable(r: StabilityFunction) -> bool:
+    """|R(iy)| <= 1 for all y."""
+    return nowhere_negative(e_polynomial(r))
+
+
+def a_stable(r: StabilityFunction) -> bool:
+    """|R(s)| <= 1 for all Re s <= 0: I-stable and all poles in the right half plane (5.8)."""
+    return i_stable(r) and roots_right(r.denominator)
+
+
+def l_stable(r: StabilityFunction) -> bool:
+    """A-stable, and R(s) -> 0 as s -> infinity."""
+    return r.numerator.degree < r.denominator.degree and a_stable(r)
+
+
+def real_interval(r: StabilityFunction) -> float:
+    """The greatest x with |R| <= 1 on [-x, 0]; inf where there is no end, 0 where not even a short one is."""
+    mirrored = [Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)]
+    edges = [mirrored[0] - mirrored[1], mirrored[0] + mirrored[1]]
+    edges = [chopped(p, r.doubt) for p in edges]
+    if any(_starts_negative(p) for p in edges):
+        return 0.0
+    return min((x for p in edges if (x := first_sign_change(p)) is not None), default=math.inf)
+
+
+def imaginary_interval(r: StabilityFunction) -> float:
+    """The greatest y with |R| <= 1 on [-iy, iy]; inf where there is no end, 0 where |R(iy)| > 1 at once."""
+    e = e_polynomial(r)
+    if _starts_negative(e):
+        return 0.0
+    found = first_sign_change(e)
+    return math.inf if found is None else math.sqrt(found)
+
+
+def angle(r: StabilityFunction) -> float | None:
+    """The greatest alpha [degrees] with |R(s)| <= 1 for all |arg(-s)| <= alpha; None where no ray is stable.
+
+    Decided on rays of rational cosine, and halved; within the sector there must be no pole.
+    """
+    if a_stable(r):
+        return 90.0
+    if not _stable_ray(r, Fraction(1)):
+        return None
+    steep, flat = Fraction(0), Fraction(1)
+    for _ in range(ANGLE_BITS):
+        middle = (steep + flat) / 2
+        if _stable_ray(r, middle):
+            flat = middle
+        else:
+            steep = middle
+    return math.degrees(math.acos(float(flat)))
+
+
+def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
+    """|R| <= 1 along s = -x exp(i phi), x >= 0, and no pole between this ray and the negative axis."""
+    if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), r.doubt)):
+        poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
+        return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
+    return False
+
+
+def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
+    """|p(-x exp(i phi))|^2 as a polynomial in x: sum_jk p_j p_k (-x)^(j+k) cos((j - k) phi)."""
+    cosines = [Fraction(1), cosine]
+    while len(cosines) <= p.degree:
+        cosines.append(2 * cosine * cosines[-1] - cosines[-2])
+    found = [Fraction(0)] * (2 * p.degree + 1)
+    for j, x in enumerate(p.coefficients):
+        for k, y in enumerate(p.coefficients):
+            found[j + k] = found[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
+    return Polynomial(found)
+
+
+def _modulus(p: Polynomial) -> Polynomial:
+    """|p(iy)|^2 as a polynomial in x = y^2."""
+    even, odd = (Polynomial(x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients[i::2])) for i in (0, 1))
+    return even * even + Polynomial([0, 1]) * odd * odd
+
+
+def _starts_negative(p: Polynomial) -> bool:
+    """Whether p(x) < 0 for small x > 0."""
+    return next((sign(x) < 0 for x in p.coefficients if x != 0), False)

@@ -1,0 +1,246 @@
+"""Exact numbers a + b theta + c theta^2 + ..., theta a real algebraic number. Knows no method."""
+
+from __future__ import annotations
+
+import functools
+from fractions import Fraction
+from math import isqrt
+
+from fvsolve.steppers.exact.polynomial import Polynomial, sign
+from fvsolve.steppers.exact.sturm import count_roots
+
+MIXED = "{} in one tableau; wanted one root alone, or decimals of 20 digits and more in place of all"
+BITS = 160  # of the first bracket of a root: enough for most signs and every float
+
+
+class Field:
+    """The rational numbers with one root theta of a polynomial that has no double root."""
+
+    def __init__(self, name: str, polynomial: Polynomial, near: float):
+        self.name = name
+        self.polynomial = (polynomial // polynomial.gcd(polynomial.derivative())).monic()
+        self.low, self.high = _isolated(self.polynomial, Fraction(near), name)
+        self.tail = tuple(-x for x in self.polynomial.coefficients[:-1])  # theta^n in lower powers
+
+    @property
+    def theta(self) -> Algebraic:
+        return Algebraic(self, [Fraction(0), Fraction(1)])
+
+    def refine(self, bits: int) -> None:
+        """Halve the bracket of theta until it is shorter than 2^-bits."""
+        low, high, p = self.low, self.high, self.polynomial
+        rising = p(low) < 0
+        while high - low > Fraction(1, 1 << bits):
+            middle = (low + high) / 2
+            if (p(middle) < 0) == rising:
+                low = middle
+            else:
+                high = middle
+        self.low, self.high = low, high
+
+
+class SquareRoot(Field):
+    """The rational numbers with sqrt(d)."""
+
+    def __init__(self, d: int):
+        self.name = f"sqrt({d})"
+        self.d = d
+        self.polynomial = Polynomial([-d, 0, 1])
+        self.tail = (Fraction(d), Fraction(0))
+        self.refine(BITS)
+
+    def refine(self, bits: int) -> None:
+        root = isqrt(self.d << (2 * bits))
+        self.low, self.high = Fraction(root, 1 << bits), Fraction(root + 1, 1 << bits)
+
+
+class Algebraic:
+    """An element of a field that is not rational; operations return fractions where they can."""
+
+    __slots__ = ("field", "parts")
+
+    def __init__(self, field: Field, parts):
+        self.field, self.parts = field, tuple(parts)
+
+    def _other(self, other) -> tuple | None:
+        if isinstance(other, Algebraic):
+            if other.field is not self.field:
+                raise ValueError(MIXED.format(f"{self.field.name} and {other.field.name}"))
+            return other.parts
+        return (Fraction(other),) if isinstance(other, (int, Fraction)) else None
+
+    def __add__(self, other):
+        parts = self._other(other)
+        if parts is None:
+            return NotImplemented
+        long, short = (self.parts, parts) if len(self.parts) >= len(parts) else (parts, self.parts)
+        return number(self.field, [x + y for x, y in zip(long, short, strict=False)] + list(long[len(short) :]))
+
+    __radd__ = __add__
+
+    def __neg__(self):
+        return Algebraic(self.field, [-x for x in self.parts])
+
+    def __sub__(self, other):
+        return self + -other
+
+    def __rsub__(self, other):
+        return -self + other
+
+    def __mul__(self, other):
+        parts = self._other(other)
+        if parts is None:
+            return NotImplemented
+        if len(parts) == 1:
+            return number(self.field, [x * parts[0] for x in self.parts])
+        found = [Fraction(0)] * (len(self.parts) + len(parts) - 1)
+        for i, x in enumerate(self.parts):
+            for j, y in enumerate(parts):
+                if x and y:
+                    found[i + j] += x * y
+        tail = self.field.tail
+        while len(found) > len(tail):
+            top = found.pop()
+            if top:
+                for j, y in enumerate(tail, start=len(found) - len(tail)):
+                    found[j] += top * y
+        return number(self.field, found)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other):
+        if isinstance(other, Algebraic):
+            return self * other.inverse()
+        return NotImplemented if not isinstance(other, (int, Fraction)) else self * Fraction(1, other)
+
+    def __rtruediv__(self, other):
+        return self.inverse() * other
+
+    def __pow__(self, power: int):
+        found = Fraction(1)
+        for _ in range(power):
+            found = found * self
+        return found
+
+    def inverse(self):
+        """1 / self by the extended Euclidean algorithm."""
+        if self.sign() == 0:
+            raise ZeroDivisionError("division by zero")
+        modulus, one = self.field.polynomial, Polynomial(self.parts)
+        modulus = modulus // modulus.gcd(one)  # a factor that is not the one of theta
+        r0, r1, s0, s1 = modulus, one % modulus, Polynomial([]), Polynomial([1])
+        while r1.degree > 0:
+            whole, rest = divmod(r0, r1)
+            r0, r1, s0, s1 = r1, rest, s1, s0 - whole * s1
+        return number(self.field, (s1 / r1.coefficients[0]).coefficients)
+
+    def bracket(self) -> tuple[Fraction, Fraction]:
+        """Bounds, by interval arithmetic on the bracket of theta."""
+        low = high = Fraction(0)
+        for value in reversed(self.parts):
+            ends = [low * self.field.low, low * self.field.high, high * self.field.low, high * self.field.high]
+            low, high = min(ends) + value, max(ends) + value
+        return low, high
+
+    def sign(self) -> int:
+        """-1, 0 or 1, decided."""
+        low, high = self.bracket()
+        if low <= 0 <= high and self._vanishes():
+            return 0
+        bits = BITS
+        while low <= 0 <= high:
+            bits *= 2
+            self.field.refine(bits)
+            low, high = self.bracket()
+        return 1 if low > 0 else -1
+
+    def _vanishes(self) -> bool:
+        common = self.field.polynomial.gcd(Polynomial(self.parts))
+        return common.degree > 0 and common(self.field.low) * common(self.field.high) <= 0
+
+    def __eq__(self, other) -> bool:
+        difference = self - other if self._other(other) is not None else None
+        return difference is not None and sign(difference) == 0
+
+    def __lt__(self, other) -> bool:
+        return sign(self - other) < 0
+
+    def __le__(self, other) -> bool:
+        return sign(self - other) <= 0
+
+    def __gt__(self, other) -> bool:
+        return sign(self - other) > 0
+
+    def __ge__(self, other) -> bool:
+        return sign(self - other) >= 0
+
+    def __abs__(self):
+        return -self if self.sign() < 0 else self
+
+    def __hash__(self) -> int:
+        return hash((id(self.field), self.parts))
+
+    def __float__(self) -> float:
+        """The nearest float."""
+        low, high = self.bracket()
+        bits = BITS
+        while float(low) != float(high):
+            bits *= 2
+            self.field.refine(bits)
+            low, high = self.bracket()
+        return float(low)
+
+    def __str__(self) -> str:
+        terms = []
+        for power, value in enumerate(self.parts):
+            symbol = "" if power == 0 else self.field.name + (f"^{power}" if power > 1 else "")
+            if value:
+                terms.append(_term(abs(value), symbol, "-" if value < 0 else "+" if terms else ""))
+        return "".join(terms)
+
+    __repr__ = __str__
+
+
+def number(field: Field, parts):
+    """The number with these parts: a fraction where it is one."""
+    parts = list(parts)
+    while len(parts) > 1 and not parts[-1]:
+        parts.pop()
+    return Algebraic(field, parts) if len(parts) > 1 else parts[0] if parts else Fraction(0)
+
+
+@functools.cache
+def square_root(n: int):
+    """sqrt(n), n a whole number >= 0, as a whole multiple of a root without square factor."""
+    outside, inside, k = 1, n, 2
+    while k * k <= inside:
+        while inside % (k * k) == 0:
+            outside, inside = outside * k, inside // (k * k)
+        k += 1
+    if inside <= 1:
+        return Fraction(outside * inside)
+    return number(_root_field(inside), [Fraction(0), Fraction(outside)])
+
+
+@functools.cache
+def _root_field(d: int) -> SquareRoot:
+    return SquareRoot(d)
+
+
+def _term(value: Fraction, symbol: str, sign: str) -> str:
+    if not symbol:
+        return f"{sign}{value}"
+    front = "" if value.numerator == 1 else f"{value.numerator}*"
+    back = "" if value.denominator == 1 else f"/{value.denominator}"
+    return f"{sign}{front}{symbol}{back}"
+
+
+def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fraction]:
+    """A bracket of the root nearest to `near`: it holds no other, and p changes its sign there."""
+    width = Fraction(1, 1 << 40)
+    while width <= 1 << 20:
+        low, high = near - width, near + width
+        if p(low) * p(high) < 0 and count_roots(p, low, high) == 1:
+            return low, high
+        width *= 2
+    raise ValueError(f"the polynomial of {name} has no single root near {float(near):.12g}")

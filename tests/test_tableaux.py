@@ -1,0 +1,201 @@
+"""Tableaux as data: each has the order its source gives it, and not the next, and a wrong one is refused."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import cos, pi, sqrt
+
+import pytest
+
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers.analysis.trees import Conditions, density, trees
+from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.tableau import method_named, tableau
+
+# stages, order, order of the embedded solution, stage order; from the sources
+PUBLISHED = {
+    "euler": (1, 1, 0, 1),
+    "improved-euler": (2, 2, 0, 1),
+    "modified-euler": (2, 2, 0, 1),
+    "ralston": (2, 2, 0, 1),
+    "heun": (3, 3, 0, 1),
+    "kutta-3": (3, 3, 0, 1),
+    "rk4": (4, 4, 0, 1),
+    "three-eighths": (4, 4, 0, 1),
+    "ssp-rk2": (2, 2, 0, 1),
+    "ssp-rk3": (3, 3, 0, 1),
+    "ssp-rk10-4": (10, 4, 0, 1),
+    "bogacki-shampine": (4, 3, 2, 1),
+    "dormand-prince": (7, 5, 4, 1),
+    "tsitouras": (7, 5, 4, 1),
+    "verner-7": (10, 7, 6, 1),
+    "implicit-euler": (1, 1, 0, 1),
+    "implicit-midpoint": (1, 2, 0, 1),
+    "gauss-4": (2, 4, 0, 2),
+    "gauss-6": (3, 6, 0, 3),
+    "trapezoid": (2, 2, 0, 2),
+    "lobatto-iiia-4": (3, 4, 0, 3),
+    "lobatto-iiia-6": (4, 6, 0, 4),
+    "lobatto-iiic-2": (2, 2, 0, 1),
+    "lobatto-iiic-4": (3, 4, 0, 2),
+    "radau-ia-3": (2, 3, 0, 1),
+    "radau-ia-5": (3, 5, 0, 2),
+    "radau-iia-3": (2, 3, 0, 2),
+    "radau-iia-5": (3, 5, 3, 3),
+    "alexander-2": (2, 2, 0, 1),
+    "alexander-3": (3, 3, 0, 1),
+    "crouzeix-3": (2, 3, 0, 1),
+    "crouzeix-4": (3, 4, 0, 1),
+    "tr-bdf2": (3, 2, 3, 2),
+    "esdirk-3": (5, 3, 2, 2),
+    "esdirk-4": (6, 4, 3, 2),
+    "esdirk-5": (7, 5, 4, 2),
+}
+ALIASES = {"gauss-2": "implicit-midpoint", "radau-iia-1": "implicit-euler", "lobatto-iiia-2": "trapezoid"}
+
+
+def test_rooted_trees_are_counted_as_in_the_books():
+    assert [len(trees(n)) for n in range(1, 11)] == [1, 1, 2, 4, 9, 20, 48, 115, 286, 719]
+
+
+def test_densities_are_those_of_the_tall_and_the_bushy_tree():
+    assert sorted(density((4, i)) for i in range(4)) == [4, 8, 12, 24]
+
+
+def test_the_published_list_is_whole():
+    assert {method.name for method in METHODS.values()} == set(PUBLISHED)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_what_is_derived_is_what_was_published(name):
+    m = METHODS[name]
+    assert (m.stages, m.order, m.error_order, m.stage_order) == PUBLISHED[name]
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_every_condition_holds_up_to_the_order_and_one_fails_beyond(name):
+    m = METHODS[name]
+    conditions = Conditions(m.exact.a, m.rounding)
+    assert all(conditions.holds(n, m.exact.b) for n in range(1, m.order + 1))
+    assert not conditions.holds(m.order + 1, m.exact.b)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_rows_add_up_to_c_as_floats_too(name):
+    m = METHODS[name]
+    assert m.a.sum(axis=1) == pytest.approx(m.c, abs=4e-14)
+    assert m.b.sum() == pytest.approx(1.0, abs=4e-15)
+
+
+@pytest.mark.parametrize("alias, name", ALIASES.items())
+def test_first_members_of_families_are_known_by_both_names(alias, name):
+    assert method_named(alias) is method_named(name)
+
+
+def test_one_coefficient_that_is_off_by_its_last_digit_costs_the_order():
+    text = METHODS["esdirk-4"].text.replace("-654441/2922500", "-654442/2922500").replace("5012029/34652500", "x")
+    a21 = Fraction(31, 50) - Fraction(1, 4) - Fraction(174375, 388108) + Fraction(654442, 2922500)
+    assert tableau_order(text.replace("x", str(a21))) < 4
+
+
+def tableau_order(text: str) -> int:
+    try:
+        return tableau("changed", text).order
+    finally:
+        METHODS.pop("changed", None)
+
+
+def test_algebraic_numbers_are_those_of_the_books():
+    assert METHODS["gauss-6"].c[0] == pytest.approx(0.5 - sqrt(15) / 10, abs=1e-16)
+    assert METHODS["radau-iia-5"].a[0, 1] == pytest.approx((296 - 169 * sqrt(6)) / 1800, abs=1e-16)
+    assert METHODS["alexander-3"].a[0, 0] == pytest.approx(0.435866521508459, abs=1e-15)
+    assert METHODS["crouzeix-4"].a[0, 0] == pytest.approx(0.5 + cos(pi / 18) / sqrt(3), abs=1e-15)
+    assert -METHODS["radau-iia-5"].start_error == pytest.approx((6 + 81 ** (1 / 3) - 9 ** (1 / 3)) / 30, abs=1e-15)
+
+
+@pytest.mark.parametrize("name", ["dormand-prince", "tsitouras", "bogacki-shampine", "trapezoid", "esdirk-5"])
+def test_the_last_rate_is_the_first_of_the_next_step(name):
+    assert METHODS[name].first_same_as_last and METHODS[name].stiffly_accurate
+
+
+@pytest.mark.parametrize("name", ["radau-iia-5", "alexander-2", "lobatto-iiic-4"])
+def test_stiffly_accurate_methods_need_not_start_with_the_last_rate(name):
+    assert METHODS[name].stiffly_accurate and not METHODS[name].first_same_as_last
+
+
+@pytest.mark.parametrize("name", [*PUBLISHED])
+def test_collocation_is_recognised_and_its_polynomial_meets_the_stages(name):
+    m = METHODS[name]
+    family = name.startswith(("gauss", "radau-iia", "lobatto-iiia", "implicit", "trapezoid", "euler"))
+    assert (len(m.dense) > 0) == (family or name == "dormand-prince")
+    if family:
+        powers = m.c[:, None] ** range(1, m.stages + 1)
+        assert powers @ m.dense.T == pytest.approx(m.a, abs=1e-14)
+    if len(m.dense):
+        assert m.dense.sum(axis=1) == pytest.approx(m.b, abs=1e-14)
+
+
+def test_every_decimal_of_a_published_array_counts():
+    assert (METHODS["tsitouras"].digits, METHODS["esdirk-5"].digits, METHODS["rk4"].digits) == (40, 25, None)
+
+
+@pytest.mark.parametrize(
+    "text, wanted",
+    [
+        ("0 |\n1 | 1/2\n--+----\n | 1/2 1/2", "row 2 adds up to 1/2; wanted c = 1"),
+        ("0 |\n1 | 1\n--+----\n | 1/2 1/4", "weights must add up to 1, these add up to 3/4"),
+        ("0 |\n1 | 1 2 -2\n--+----\n | 1/2 1/2", "row 2 has 3 entries; wanted at most 2"),
+        ("0 |\n1 | x\n--+----\n | 1/2 1/2", 'unknown symbol "x"; known are sqrt(n)'),
+        ("0 |\n1 | 1)\n--+----\n | 1/2 1/2", '"1)": ")" does not fit'),
+        ("0 |\n1 | 1/0\n--+----\n | 1/2 1/2", '"1/0" divides by zero'),
+        ("0 |\n1 | sqrt(2)\n--+----\n | sqrt(3) 1", "sqrt(2) and sqrt(3) in one tableau"),
+        ("0 |", "wanted rows, a ruled line and weights"),
+        ("", "wanted rows, a ruled line and weights"),
+        ("0\n--+--\n | 1", 'has no "|"'),
+        ("0 |\n--+----\n | 1/2 1/2", "rows of 1 weights"),
+        ("0.123456789 | 0.1234567\n--+--\n | 1", "row 1 adds up to 1234567/10000000; wanted c = 123456789/1000000000"),
+    ],
+)
+def test_a_wrong_array_is_refused_with_its_fault(text, wanted):
+    with pytest.raises(FvsolveError) as caught:
+        tableau("wrong", text)
+    assert wanted in str(caught.value)
+    assert "wrong" not in METHODS
+
+
+def test_all_faults_are_said_at_once():
+    with pytest.raises(FvsolveError) as caught:
+        tableau("wrong", "0 | 1/2\n1 | 1/3 1/3\n--+--\n | 1/2 1/3")
+    assert str(caught.value).splitlines() == [
+        "wrong: 3 faults",
+        "  row 1 adds up to 1/2; wanted c = 0",
+        "  row 2 adds up to 2/3; wanted c = 1",
+        "  weights must add up to 1, these add up to 5/6",
+    ]
+
+
+def test_published_digits_hold_to_their_precision():
+    text = "0 |\n0.66666666666667 | 0.66666666666667\n--+--\n | 1/4 3/4"
+    assert tableau_order(text) == 2
+    assert tableau_order(text.replace("0.66666666666667", "0.666666")) == 1
+
+
+def test_a_named_number_is_the_root_that_was_asked_for():
+    text = "g | g\n1 | 1-g g\n--+--\n | 1-g g"
+    for near in (0.29, 1.7):
+        m = tableau("user", text, numbers={"g": ("x^2-2x+1/2", near)})
+        assert m.order == 2 and m.a[0, 0] == pytest.approx(near, abs=0.01)
+    del METHODS["user"]
+
+
+@pytest.mark.parametrize(
+    "polynomial, near, wanted",
+    [
+        ("x+1", 1.0, "no polynomial in x of degree 2 or more"),
+        ("x^2+y", 1.0, 'unknown symbol "y"'),
+        ("x^2+1", 1.0, "no single root near 1"),
+    ],
+)
+def test_a_named_number_that_is_none_is_refused(polynomial, near, wanted):
+    with pytest.raises(FvsolveError, match=wanted.replace("(", r"\(")):
+        tableau("user", "g | g\n--+--\n | 1", numbers={"g": (polynomial, near)})
