@@ -44,16 +44,22 @@ def cylinder_table(quick: bool) -> None:
 
 def implicit_methods() -> list[str]:
     """Implicit methods with an error estimate."""
-    return [m.name for m in METHODS.values() if m.adaptive and not getattr(m, "explicit", True)]
+    return [m.name for m in METHODS.values() if m.adaptive and not m.explicit]
 
 
 def fvsolve_solver(problem: Problem, method: str) -> Solver:
     """fvsolve.integrate by one method."""
 
-    def solve(tolerance):
-        return fvsolve.integrate(problem.rhs, problem.y0, problem.t, method=method, rtol=tolerance, atol=tolerance)
+    def solve(tolerance, counts=None):
+        options = {"rtol": tolerance, "atol": tolerance, "counts": counts}
+        return fvsolve.integrate(problem.rhs, problem.y0, problem.t, method=method, **options)
 
-    return Solver(f"fvsolve {method}", solve)
+    def count(tolerance):
+        counts = {}
+        solve(tolerance, counts)
+        return counts["steps"], counts["rhs"]
+
+    return Solver(f"fvsolve {method}", solve, count)
 
 
 def verdict(charts: dict[str, list[Run]], target: float) -> None:

@@ -74,8 +74,11 @@ def pipe_peers(pulse: Acoustics) -> list[Solver]:
     mixed = Problem(pulse.rhs_mixed, pulse.start.y[pulse.mixed], t, pulse.band)
     back = np.argsort(pulse.mixed)
     found = [at_end(solver, slice(None)) for solver in (numba_dop853(straight), numba_lsoda(straight))]
-    found.append(at_end(cvode(straight, "scikit-sundae CVODE Adams", {"method": "Adams"}), slice(None)))
-    banded = [cvode(mixed, "scikit-sundae CVODE, band", cvode_options(mixed)), scipy_odeint(mixed)]
+    banded = [
+        cvode(mixed, "scikit-sundae CVODE, band", cvode_options(mixed)),
+        cvode(mixed, "scikit-sundae CVODE Adams, band", cvode_options(mixed) | {"method": "Adams"}),
+        scipy_odeint(mixed),
+    ]
     return found + [at_end(solver, back) for solver in (*banded, scipy_ivp(mixed, "BDF"), scipy_ivp(mixed, "Radau"))]
 
 
