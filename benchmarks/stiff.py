@@ -2,6 +2,8 @@
 
 cylinder: error of a trajectory against wall time, tolerances 1e-3 to 1e-10; also drawn, into stiff.png.
 pipe:     acoustics of 1 000 cells, explicit and implicit, beside peers on the same ordinary differential equations.
+network:  what a step of Newton's method costs in networks of 1 000 and 10 000 cells.
+start:    what the first implicit run of a machine, and every later one, takes longer than an explicit run.
 
 `--quick` for fewer tolerances and repeats. One thread. Wall times are the best of several, everything compiled before.
 """
@@ -10,9 +12,11 @@ import argparse
 
 from measure import machine
 from stiff_cylinder import cylinder_table
+from stiff_network import network_table
 from stiff_pipe import pipe_table
+from stiff_start import start_table
 
-TABLES = {"cylinder": cylinder_table, "pipe": pipe_table}
+TABLES = {"cylinder": cylinder_table, "pipe": pipe_table, "network": network_table, "start": start_table}
 
 
 def main() -> None:
