@@ -160,7 +160,7 @@ BAD = {
     "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: length is missing"),
     "unknown type": (
         swap('"valve"', '"vavle"'),
-        'line 33: links.valve.type: no type "vavle"; types are orifice, pipe, ',
+        'line 33: links.valve.type: no type "vavle"; types are cylinder, damper, ',
     ),
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
     "missing type": (
@@ -169,7 +169,7 @@ BAD = {
     ),
     "a link among nodes": (
         swap('"junction"', '"pipe"'),
-        'nodes.gate.type: no type "pipe"; types are chamber, inflow,',
+        'nodes.gate.type: no type "pipe"; types are chamber, frame,',
     ),
     "a link among nodes, where": (swap('"junction"', '"pipe"'), "it belongs under [links]"),
     "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: no type 3"),

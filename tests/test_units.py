@@ -57,7 +57,13 @@ mm2/s: millimeter**2/second | cSt: centistokes | St: stokes | cm2/s: centimeter*
 ft2/s: foot**2/second | -: dimensionless | 1: dimensionless | %: percent | kg: kilogram | g: gram
 mg: milligram | t: metric_ton | tonne: metric_ton | lb: pound | lbm: pound | kg/s: kilogram/second
 g/s: gram/second | kg/min: kilogram/minute | kg/h: kilogram/hour | t/h: metric_ton/hour
-lb/s: pound/second | N: newton | kN: kilonewton | kgf: kilogram_force | lbf: pound_force | J: joule
+lb/s: pound/second | N: newton | kN: kilonewton | MN: meganewton | kgf: kilogram_force | lbf: pound_force
+N/m: newton/meter | N/mm: newton/millimeter | N/um: newton/micrometer | kN/m: kilonewton/meter
+kN/mm: kilonewton/millimeter | MN/m: meganewton/meter | lbf/in: pound_force/inch | N s/m: newton*second/meter
+N/(m/s): newton*second/meter | kN s/m: kilonewton*second/meter | N s/mm: newton*second/millimeter
+lbf s/in: pound_force*second/inch | m3/s/Pa: meter**3/second/pascal | l/s/bar: liter/second/bar
+l/min/bar: liter/minute/bar | L/min/bar: liter/minute/bar | ml/min/bar: milliliter/minute/bar
+cm3/s/bar: centimeter**3/second/bar | cm3/min/bar: centimeter**3/minute/bar | J: joule
 kJ: kilojoule | MJ: megajoule | kWh: kilowatt_hour | W: watt | kW: kilowatt | MW: megawatt
 hp: horsepower | Hz: 1/second | kHz: 1000/second | 1/s: 1/second | rad: radian | deg: degree
 C: coulomb | F: farad | K: kelvin | degC: degC | celsius: degC | degF: degF | degR: degR
@@ -66,6 +72,7 @@ PINT = dict(row.strip().split(": ") for line in ROWS.splitlines() for row in lin
 PINT_SI = {
     "m": "meter", "m2": "meter**2", "m3": "meter**3", "s": "second", "Pa": "pascal",
     "m3/s": "meter**3/second",
+    "N/m": "newton/meter", "N s/m": "newton*second/meter", "m3/s/Pa": "meter**3/second/pascal",
     "m/s": "meter/second", "m/s2": "meter/second**2", "kg/m3": "kilogram/meter**3", "Pa s": "pascal*second",
     "K": "kelvin", "-": "dimensionless", "m2/s": "meter**2/second", "kg": "kilogram",
     "kg/s": "kilogram/second",

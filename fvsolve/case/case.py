@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -58,25 +59,35 @@ class Case:
         named += [one.probe for one in [*self.expect.values(), *self.compare.values()]]
         return list({probe.text: probe for probe in named}.values())
 
+    @cached_property
+    def places(self) -> dict[str, Node]:
+        """Places of the fluid: hydraulic nodes, then the chambers that cylinders own, as they are at the start."""
+        found = {name: node for name, node in self.nodes.items() if node.domain == "hydraulic"}
+        for name, link in self.links.items():
+            if link.owns:
+                rod, case = (self.nodes[link.ports[port]].initial_position for port in ("rod", "case"))
+                found |= {f"{name}.{place}": chamber for place, chamber in link.chambers(rod - case).items()}
+        return found
+
     @property
     def elevations_stated(self) -> bool:
-        """Whether the nodes state elevations."""
-        return any(node.elevation is not None for node in self.nodes.values())
+        """Whether the places of the fluid state elevations."""
+        return any(place.elevation is not None for place in self.places.values())
 
     def elevation(self, name: str) -> float:
-        """Height of a node above datum [m]: as stated; 0 where none is.
+        """Height of a place of the fluid above datum [m]: as stated; 0 where none is.
 
         A reservoir given by head may leave it out where others state theirs: it then lies level with the
         first node that one of its links leads to, since its head alone drives the flow.
         """
-        stated = self.nodes[name].elevation
+        stated = self.places[name].elevation
         if stated is not None or not self.elevations_stated:
             return stated or 0.0
         for link in self.links.values():
             ends = list(link.ports.values())
             for other in ends if name in ends else []:
-                if self.nodes[other].elevation is not None:
-                    return self.nodes[other].elevation
+                if self.places[other].elevation is not None:
+                    return self.places[other].elevation
         return 0.0
 
     def wave_speed(self, name: str) -> float:

@@ -10,7 +10,7 @@ from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
 from fvsolve.case.sections import Numerics
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import KINDS, Chamber, Reservoir
+from fvsolve.parts import KINDS, Chamber, Cylinder, EndStop, Reservoir, Spring
 from fvsolve.steppers.methods import METHODS
 from fvsolve.units import show
 
@@ -20,15 +20,22 @@ Found = Iterator[tuple[tuple, str]]
 def network(table: dict[str, Any]) -> Found:
     """Faults of the incidence list, from names alone: unknown places, loose nodes, islands, nothing fixed."""
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
+    places = _places(nodes, links)
     ends: dict[str, list[str]] = {}
+    complete = True
     for name, link in links.items():
-        found = {key: _dict(link).get(key) for key in ("from", "to")}
-        for key, place in found.items():
-            if isinstance(place, str) and place not in nodes:
-                yield ("links", name, key), _unknown_place(place, nodes, links)
-        if isinstance(found["from"], str) and found["from"] == found["to"]:
-            yield ("links", name, "to"), f"joins {show(found['to'])} to itself"
-        ends[name] = [place for place in found.values() if isinstance(place, str) and place in nodes]
+        found = _ports(_dict(link))
+        for keys, place, domain in found:
+            if isinstance(place, str) and place not in places:
+                yield ("links", name, *keys), _unknown_place(place, places, nodes, links)
+            elif isinstance(place, str) and None not in (domain, places[place]) and places[place] != domain:
+                yield ("links", name, *keys), _unlike_place(place, domain, places, nodes, _dict(link))
+        joined = [place for _, place, _ in found if isinstance(place, str)]
+        for k, (keys, place, _) in enumerate(found):
+            if isinstance(place, str) and place in [other for _, other, _ in found[:k]]:
+                yield ("links", name, *keys), f"joins {show(place)} to itself"
+        complete = complete and len(set(joined)) == len(found) and all(place in places for place in joined)
+        ends[name] = [place for place in [*joined, *_owned(name, link)] if place in places]
     for group in ("nodes", "links"):
         if table.get(group) == {}:
             yield (group,), "is empty; wanted two places and a link between them at least"
@@ -36,15 +43,16 @@ def network(table: dict[str, Any]) -> Found:
     for name in nodes:
         if name not in touched:
             yield ("nodes", name), "no link touches it"
-    if any(len(set(places)) < 2 for places in ends.values()):
+    if not complete:
         return  # what hangs together is not known
     islands = _islands(ends)
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
         yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
     for island in islands:
-        kinds = [KINDS["nodes"].get(str(_dict(nodes[name]).get("type"))) for name in island]
-        if all(kind is not None and not kind.fixes_pressure for kind in kinds):
+        wet = [name for name in island if places[name] != "translational"]
+        kinds = [_kind("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
+        if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(islands) == 1 else f" of {listing(island, 6)}"
             yield ("nodes",), f"nothing fixes the pressure{where}; wanted a reservoir, tank or chamber"
     yield from _rigid_junctions(nodes, links, ends)
@@ -53,8 +61,14 @@ def network(table: dict[str, Any]) -> Found:
 def parts(
     nodes: dict[str, Any], links: dict[str, Any], ambient: float, gravity: float | None, fluid: Any, raw: Raw
 ) -> Found:
-    """Faults of elevations and pressures."""
+    """Faults of elevations, pressures and bodies."""
     yield from _elevations(nodes, links)
+    yield from _mechanics(nodes, links)
+    for name, link in links.items():
+        for place in link.owns if fluid is not None else ():
+            key = f"initial_pressure_{place}"
+            if getattr(link, key) is not None:
+                yield from _vacuum(("links", name, key), [getattr(link, key)], fluid, raw)
     for name, node in nodes.items():
         level, height = getattr(node, "level", None), getattr(node, "height", None)
         if height is not None and level > height:
@@ -99,11 +113,47 @@ def _dict(value: Any) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _unknown_place(place: str, nodes: dict[str, Any], links: dict[str, Any]) -> str:
+def _kind(group: str, part: Any) -> Any:
+    return KINDS[group].get(str(_dict(part).get("type")))
+
+
+def _owned(name: str, link: Any) -> dict[str, str]:
+    """Places that a link owns, as others name them -> domain."""
+    kind = _kind("links", link)
+    return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
+
+
+def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | None]:
+    """Every place -> its domain, None where its type is at fault."""
+    kinds = {name: _kind("nodes", node) for name, node in nodes.items()}
+    found = {name: kind.domain if kind else None for name, kind in kinds.items()}
+    return found | {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
+
+
+def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
+    """(keys, place as the file says it, domain it must have) of every port of a link that is stated."""
+    kind = _kind("links", link)
+    if kind is None:
+        return [((key,), link.get(key), None) for key in ("from", "to")]
+    given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in kind.keys() else (link, ())
+    wanted = [port for port in kind.joins if port in given or port not in kind.may_lack]
+    return [((*below, port), given.get(port), kind.joins[port]) for port in wanted]
+
+
+def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]) -> str:
     if place in links:
-        places = f"put a junction between; places are {listing(nodes)}"
-        return f"{show(place)} is a link, and a link joins places: {places}"
-    return f"no place named {show(place)}; places are {listing(nodes)}{did_you_mean(place, nodes)}"
+        own = [other for other in places if other not in nodes and other.startswith(f"{place}.")]
+        if own:
+            return f"{show(place)} is a {_dict(links[place])['type']}; its places are {listing(own)}"
+        return f"{show(place)} is a link, and a link joins places: put a junction between; places are {listing(places)}"
+    return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
+
+
+def _unlike_place(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
+    what = f"is a {nodes[place]['type']}" if place in nodes else "is a chamber"
+    alike = [name for name, other in places.items() if other == domain]
+    has = f"; {domain} places are {listing(alike)}" if alike else ""
+    return f"{show(place)} {what}, a {places[place]} place, and this port of a {link['type']} a {domain} one{has}"
 
 
 def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
@@ -137,14 +187,18 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
 
 
 def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
-    stated = [name for name, node in nodes.items() if node.elevation is not None]
-    by_head = [name for name, node in nodes.items() if isinstance(node, Reservoir) and node.head is not None]
-    for name in nodes:
-        if stated and name not in stated and name not in by_head:
-            yield ("nodes", name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
+    wet = {("nodes", name): node for name, node in nodes.items() if node.domain == "hydraulic"}
+    wet |= {("links", name): link for name, link in links.items() if link.owns}
+    stated = [name for (_, name), part in wet.items() if part.elevation is not None]
+    for (group, name), part in wet.items():
+        by_head = isinstance(part, Reservoir) and part.head is not None
+        if stated and name not in stated and not by_head:
+            yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
+    heights_of = {name: node.elevation for name, node in nodes.items()}
+    heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in link.owns}
     for name, link in links.items():
         length = getattr(link, "length", None)
-        heights = [nodes[place].elevation for place in (link.from_, link.to) if place in nodes]
+        heights = [heights_of[place] for place in link.ports.values() if place in heights_of]
         if length is None or len(heights) < 2 or None in heights:
             continue
         if abs(heights[1] - heights[0]) > length:
@@ -153,6 +207,28 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
                 ("links", name, "length"),
                 f"{length:g} m is too short: its ends lie {climb:g} m apart in height",
             )
+
+
+def _mechanics(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
+    """Faults of pistons outside their stroke, of springs drawn backwards and of stops without room."""
+    at = {name: node.initial_position for name, node in nodes.items() if node.domain == "translational"}
+    for name, link in links.items():
+        ports = [port for port, domain in link.joins.items() if domain == "translational"]
+        places = [link.ports.get(port) for port in ports]
+        if not ports or any(place not in at for place in places):
+            continue
+        first, second = (at[place] for place in places)
+        if isinstance(link, Cylinder):
+            x = first - second
+            if not 0.0 <= x <= link.stroke:
+                yield ("links", name, "stroke"), (f"the piston starts at {x:g} m, {places[0]} less {places[1]}; wanted "
+                                                  f"0 to {link.stroke:g} m")  # fmt: skip
+            if min(link.areas()) <= 0.0:
+                yield ("links", name, "rod_diameter"), "leaves no area at B; wanted one below piston_diameter"
+        if isinstance(link, Spring) and second < first and (link.free_length or link.preload):
+            yield ("links", name, "to"), f"{link.to} lies behind {link.from_} at the start; exchange from and to"
+        if isinstance(link, EndStop) and None not in (link.least, link.greatest) and link.least >= link.greatest:
+            yield ("links", name, "greatest"), f"{link.greatest:g} m is not above least, {link.least:g} m"
 
 
 def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Found:

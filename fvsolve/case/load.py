@@ -16,7 +16,7 @@ from fvsolve.case.raw import Raw, override, read_raw
 from fvsolve.case.sections import DEFAULT_ROWS, FluidSpec, Numerics, Output
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
-from fvsolve.parts import KINDS, Friction, Pipe
+from fvsolve.parts import KINDS, Chamber, Friction, Pipe
 from fvsolve.parts.pipe import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -89,6 +89,8 @@ class _Reader:
         self.unused_signals()
         numerics = self.table("numerics", Numerics)
         kinds = {group: self.kinds(group) for group in parts}
+        kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
+                           for place in kind.owns}  # fmt: skip
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.raw.table))
@@ -247,13 +249,13 @@ class _Reader:
         for name, given in self.setting.signals.items():
             if name in self.setting.used or (isinstance(given, dict) and "signal" in given):
                 continue
-            problems = []
-            for dimension in ("number", "flow", "pressure", "head"):
+            problems, dimensions = [], ("number", "flow", "pressure", "head", "force")
+            for dimension in dimensions:
                 try:
                     Scheduled(dimension).read(given, self.setting)
                 except ValueError as error:
                     problems.append(error)
-            if len(problems) == 4:
+            if len(problems) == len(dimensions):
                 self.misfit(("signals", name), problems[0])
 
     def cells(self, links: dict[str, Any], properties: Any, numerics: Numerics | None) -> dict[str, Any]:

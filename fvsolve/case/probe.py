@@ -10,7 +10,11 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Link, Node
 from fvsolve.units import show
 
-_PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+)\.([^.@]+)(?:@(.*))?")
+_PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*))?")
+
+
+DEFAULT_OF_NODES = ("pressure", "head", "level", "position", "velocity")
+DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 
 
 @dataclass(frozen=True)
@@ -61,9 +65,9 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
 
 
 def default_probes(kinds: Kinds) -> list[Probe]:
-    """All nodes (pressure, head, level) and all links (flow)."""
+    """All nodes (pressure, head, level; position, velocity) and all links (flows; force)."""
     found = []
-    for part, quantities in (("nodes", ("pressure", "head", "level")), ("links", ("flow",))):
+    for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
             for quantity in quantities if kind is not None else ():

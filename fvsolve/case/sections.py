@@ -82,7 +82,7 @@ class OutputUnits(Value):
     """`[output] units`: a unit per quantity of a probe."""
 
     about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }'
-    quantities = ("pressure", "gauge_pressure", "head", "level", "flow", "velocity", "time")
+    quantities = ("pressure", "gauge_pressure", "head", "level", "flow", "velocity", "position", "force", "time")
 
     def read(self, given: Any, setting: Setting) -> dict[str, str]:
         if not isinstance(given, dict):

@@ -44,6 +44,7 @@ from fvsolve.kernels.records import (
     PIPE_PRESSURE,
     PRESSURE,
     RATE,
+    SPOOL_FLOW,
     STATUS,
     VALVE_FLOW,
     WHERE,
@@ -175,6 +176,15 @@ def as_asked(st, floats, probe, p):
 
 
 @njit
+def valve_volume_flow(st, floats, tables, out, k):
+    """Flow of a valve [m3/s] at the density upstream."""
+    layout, nodes, valve = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES][k]
+    flow = out[layout["valve"] + k]
+    up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
+    return flow / density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
+
+
+@njit
 def observe_barotropic(t, y, out, handle, values):
     """Values of every probe; flows in m3/s at the density of the place, or upstream of a valve."""
     tables = open_tables(handle)
@@ -196,10 +206,10 @@ def observe_barotropic(t, y, out, handle, values):
             else:
                 value = flow / m if probe["head"] == 2 else flow / density(st, floats, p)
         elif kind == VALVE_FLOW:
-            flow = out[layout["valve"] + i]
-            valve = tables[I_VALVES][i]
-            up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
-            value = flow / density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
+            value = valve_volume_flow(st, floats, tables, out, i)
+        elif kind == SPOOL_FLOW:
+            for e in range(4):
+                value += floats[probe["weights"] + e] * valve_volume_flow(st, floats, tables, out, i + e)
         elif kind == COLUMN_FLOW:
             value = out[layout["column"] + i] / st["rho"]
         values[k] = value

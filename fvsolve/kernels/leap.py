@@ -1,6 +1,6 @@
 """A step of upwind and Euler at once, under the linear density law. Knows both: that is what makes it fast.
 
-The loop of `steppers.erk` passes over all cells again for the rates, the sum, the envelope and the search for
+The loop of `steppers.march` passes over all cells again for the rates, the sum, the envelope and the search for
 NaN. Here a block of cells moves and is compared with the envelope while it lies in the cache. The operations
 are the same in the same order, so the bits are too.
 """

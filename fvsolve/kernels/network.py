@@ -11,17 +11,18 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.pipes import family_of, pipe_rates
 from fvsolve.kernels.records import (
-    CHAMBER,
     FIXED,
     I_ARMED,
     I_COLUMNS,
     I_LAYOUT,
     I_NODES,
     I_PIPES,
+    I_PISTONS,
     I_SCRATCH,
     I_SETTINGS,
     I_VALVES,
     JUNCTION,
+    MOVING,
     OK,
     RATE,
     STATUS,
@@ -84,6 +85,17 @@ def net_flows(out, tables):
         change = out[layout["column"] + k] - columns[k]["flow"]
         out[net + columns[k]["from_node"]] -= change
         out[net + columns[k]["to_node"]] += change
+    for k in range(tables[I_PISTONS].size):
+        for i in (tables[I_PISTONS][k]["a"], tables[I_PISTONS][k]["b"]):
+            out[net + i] -= out[layout["swept"] + nodes[i]["row"]]
+
+
+@njit(forceinline=True)
+def stiffness_of(nodes, layout, out, i):
+    """Pressure per stored mass [Pa/kg] of node i now, 0 where it stores none."""
+    if nodes[i]["kind"] == MOVING:
+        return out[layout["stiffness"] + nodes[i]["row"]]
+    return nodes[i]["stiffness"]
 
 
 @njit(forceinline=True)
@@ -112,12 +124,13 @@ def greatest_rate(t, out, tables):
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     rate = max(tables[I_SETTINGS][0]["rate"], quickest_column(t, out, tables))
     for i in range(nodes.size):
-        if nodes[i]["kind"] == CHAMBER or nodes[i]["kind"] == TANK:
-            rate = max(rate, nodes[i]["stiffness"] * nodes[i]["admittance"])
+        if nodes[i]["kind"] != FIXED and nodes[i]["kind"] != JUNCTION:
+            rate = max(rate, stiffness_of(nodes, layout, out, i) * nodes[i]["admittance"])
     for k in range(valves.size):
         valve = valves[k]
         i, j = valve["from_node"], valve["to_node"]
-        stiff = nodes[i]["stiffness"] + nodes[j]["stiffness"]
+        stiff_i, stiff_j = stiffness_of(nodes, layout, out, i), stiffness_of(nodes, layout, out, j)
+        stiff = stiff_i + stiff_j
         if stiff > 0.0:
             g = valve_conductance(tables, k, t)
             drop = valve["drop"] + (out[layout["pressure"] + i] - out[layout["pressure"] + j])
@@ -129,8 +142,8 @@ def greatest_rate(t, out, tables):
                 soft += 1.0 / nodes[j]["admittance"]
             rate = max(rate, stiff * slope / (1.0 + soft * slope))
             if valve["transition"] > 0.0 and g > 0.0:
-                change = nodes[i]["stiffness"] * out[layout["net"] + i]
-                change -= nodes[j]["stiffness"] * out[layout["net"] + j]
+                change = stiff_i * out[layout["net"] + i]
+                change -= stiff_j * out[layout["net"] + j]
                 width = valve["transition"] * valve["transition"] / g
                 if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))

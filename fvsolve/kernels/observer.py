@@ -18,6 +18,7 @@ from fvsolve.kernels.records import (
     PIPE_FLOW,
     PIPE_PRESSURE,
     PRESSURE,
+    SPOOL_FLOW,
     TANK,
     VALVE_FLOW,
     WHERE,
@@ -68,6 +69,9 @@ def observe_linear(t, y, out, handle, values):
             value = out[layout["valve"] + i]
         elif kind == COLUMN_FLOW:
             value = out[layout["column"] + i]
+        elif kind == SPOOL_FLOW:
+            for e in range(4):
+                value += tables[I_FLOATS][probe["weights"] + e] * out[layout["valve"] + i + e]
         values[k] = probe["scale"] * value + probe["offset"]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 # Codes of kinds, as the kernels see them.
 FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
+MOVING = 4  # a chamber whose volume a piston changes: its pressure is there before the nodes are closed
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
 UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
     0,
@@ -23,7 +24,7 @@ ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE = 0, 1, 2
 
 # Status codes that travel up; the message is made in Python.
-OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE = 0, 1, 2, 3
+OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME = 0, 1, 2, 3, 4
 
 SETTINGS = np.dtype(
     [
@@ -124,8 +125,8 @@ NODE = np.dtype(
             "i8",
         ),  # offset of a shaped tank's table in `floats` (levels, areas, volumes); -1 for a prism
         ("shapes", "i8"),  # rows of that table
-        ("volume", "f8"),  # chamber [m3]
-        ("row", "i8"),  # row in its cluster; of a tank, its number
+        ("volume", "f8"),  # chamber [m3]; of a moving one, at the start
+        ("row", "i8"),  # row in its cluster; of a tank or moving chamber, its number
         ("gates", "i8"),  # where only valves hold one rigid column: offset of these in `integers`, else -1
         ("gate_count", "i8"),
         ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
@@ -172,6 +173,65 @@ COLUMN = np.dtype(
     align=True,
 )
 
+BODY = np.dtype(
+    [
+        ("y", "i8"),  # offset of its position, velocity follows; both as deviations; -1 for a frame
+        ("lightness", "f8"),  # 1 / mass, 0 for a frame [1/kg]
+        ("position", "f8"),  # at the start [m]
+        ("velocity", "f8"),  # at the start [m/s]
+        ("force", "f8"),  # sum of all at the start, snapped to zero [N]
+    ],
+    align=True,
+)
+
+BRACE = np.dtype(  # springs, dampers and forces: push = force + (schedule - given) - stiffness dx - damping (v - speed)
+    [
+        ("from_body", "i8"),
+        ("to_body", "i8"),
+        ("schedule", "i8"),  # -1 for none
+        ("given", "f8"),  # value of the schedule at the start [N]
+        ("stiffness", "f8"),
+        ("damping", "f8"),
+        ("speed", "f8"),  # v_to - v_from at the start [m/s]
+        ("force", "f8"),  # push at the start [N]
+    ],
+    align=True,
+)
+
+STOP = np.dtype(
+    [
+        ("from_body", "i8"),
+        ("to_body", "i8"),
+        ("stiffness", "f8"),
+        ("damping", "f8"),
+        ("below", "f8"),  # room at the start before it pushes forward, infinite for none [m]
+        ("above", "f8"),  # and before it holds back
+        ("force", "f8"),
+    ],
+    align=True,
+)
+
+PISTON = np.dtype(
+    [
+        ("case", "i8"),  # bodies
+        ("rod", "i8"),
+        ("a", "i8"),  # nodes
+        ("b", "i8"),
+        ("area_a", "f8"),
+        ("area_b", "f8"),
+        ("sweep_a", "f8"),  # mass in A per travel at the density of the start, its change is no excess [kg/m]
+        ("sweep_b", "f8"),  # likewise in B, negative
+        ("position", "f8"),  # x at the start [m]
+        ("stroke", "f8"),
+        ("leakage", "f8"),  # [m3/s/Pa]
+        ("leak", "f8"),  # mass flow from A to B in the profile [kg/s]
+        ("damping", "f8"),
+        ("speed", "f8"),
+        ("force", "f8"),
+    ],
+    align=True,
+)
+
 SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
 # Piece: start, kind (0 polynomial in t - origin, 1 power), origin, then a, b, c, d or v0, v1, duration, exponent
 PIECE_COLUMNS = 7
@@ -186,6 +246,10 @@ LAYOUT = np.dtype(
         ("ends", "i8"),
         ("valve", "i8"),
         ("column", "i8"),
+        ("stiffness", "i8"),  # of moving chambers, pressure per mass [Pa/kg]
+        ("swept", "i8"),  # mass flow that the piston and its leak take from moving chambers [kg/s]
+        ("net_force", "i8"),  # on bodies [N]
+        ("push", "i8"),  # of braces, then of stops, then of pistons [N]
         ("size", "i8"),
     ],
     align=True,
@@ -196,7 +260,7 @@ OUT_HEAD = 4
 PROBE = np.dtype(
     [
         ("kind", "i8"),
-        ("index", "i8"),  # of the node, pipe, valve or column
+        ("index", "i8"),  # of the node, pipe, valve, column, body, push or piston
         ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside
         ("cell", "i8"),  # first of the cells that are read
         ("count", "i8"),  # how many
@@ -208,7 +272,8 @@ PROBE = np.dtype(
     ],
     align=True,
 )
-PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW = 0, 1, 2, 3, 4, 5  # probe kinds
+PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
+POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY = 7, 8, 9, 10, 11
 
 RECORDS = {
     "settings": SETTINGS,
@@ -220,6 +285,10 @@ RECORDS = {
     "clusters": CLUSTER_RECORD,
     "schedules": SCHEDULE,
     "probes": PROBE,
+    "bodies": BODY,
+    "braces": BRACE,
+    "stops": STOP,
+    "pistons": PISTON,
 }
 ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
@@ -234,6 +303,10 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_CLUSTERS,
     I_SCHEDULES,
     I_PROBES,
+    I_BODIES,
+    I_BRACES,
+    I_STOPS,
+    I_PISTONS,
     I_INTEGERS,
     I_FLOATS,
     I_PROFILE,

@@ -8,7 +8,7 @@ from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, valve_target
 from fvsolve.kernels.schedules import schedule_value
-from fvsolve.model.start import PRESSURE_SCALE, Start
+from fvsolve.model.start import PRESSURE_SCALE, STORED, Start
 
 
 class BarotropicStart(Start):
@@ -41,6 +41,9 @@ class BarotropicStart(Start):
         value = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
         return head_pressure(self.st, self.floats, value - row["elevation"]) if row["head_given"] else value
 
+    def leak_flow(self, row, p_a: float, p_b: float) -> float:
+        return law.density(self.st, self.floats, max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
+
     def still(self, i: int) -> bool:
         return self.nodes["kind"][i] != rec.JUNCTION
 
@@ -61,6 +64,8 @@ class BarotropicStart(Start):
         for k, row in enumerate(self.valves):
             i, j = int(row["from_node"]), int(row["to_node"])
             self.factor[k] = self.dense(i, j)
+        for k, row in enumerate(self.pistons):
+            self.factor[len(self.valves) + k] = self.dense(int(row["a"]), int(row["b"]))
 
     def dense(self, i: int, j: int) -> float:
         """(upstream density / rho)(driving pressure / change of potential)."""
@@ -92,7 +97,7 @@ class BarotropicStart(Start):
             if self.nodes["kind"][i] not in (rec.FIXED, rec.TANK):
                 self.nodes["pressure"][i] = self.pressure(i)
         for row in self.nodes:
-            if row["kind"] == rec.CHAMBER:
+            if row["kind"] in STORED:
                 row["mass"] = law.density(self.st, self.floats, float(row["pressure"])) * row["volume"]
 
     def match(self, row, mesh, flow: float):

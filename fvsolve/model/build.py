@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError, Fault
 from fvsolve.kernels import records as rec
+from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.density import add_density_table
 from fvsolve.model.hydraulics import Hydraulics
@@ -16,6 +17,9 @@ from fvsolve.model.probes import lower_probes
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import quicker, scheme_settings
 from fvsolve.model.start import start_profile
+from fvsolve.parts import EDGES
+
+KINDS = ("pipe", "rigid-column", "valve", "spool-valve")  # of links that carry the fluid
 
 
 def build(case) -> Model:
@@ -39,7 +43,7 @@ class Scene:
         self.law = Hydraulics(case)
         self.schedules = Schedules()
         self.floats: list[float] = []
-        self.node_index = {name: i for i, name in enumerate(case.nodes)}
+        self.node_index = {name: i for i, name in enumerate(case.places)}
         self.faults: list[Fault] = []
         self.warnings: list[str] = []
         self.size = self.tanks = 0
@@ -63,13 +67,17 @@ class Scene:
     # nodes ------------------------------------------------------------------------------------------------
 
     def nodes(self) -> None:
-        table = np.zeros(len(self.case.nodes), rec.NODE)
+        table = np.zeros(len(self.case.places), rec.NODE)
         table["y"] = table["shape"] = table["schedule"] = table["row"] = -1
         table["full"] = np.inf
-        for i, (name, node) in enumerate(self.case.nodes.items()):
+        moving = 0
+        for i, (name, node) in enumerate(self.case.places.items()):
             row = table[i]
             row["elevation"] = self.case.elevation(name)
             getattr(self, "node_" + node.kind)(name, node, row)
+            if name not in self.case.nodes:
+                row["kind"], row["row"] = rec.MOVING, moving
+                moving += 1
         self.node_table = table
 
     def node_reservoir(self, name, node, row) -> None:
@@ -116,30 +124,35 @@ class Scene:
     def node_chamber(self, name, node, row) -> None:
         row["kind"], row["volume"] = rec.CHAMBER, node.volume
         row["stiffness"] = self.fluid.bulk_modulus / (self.fluid.density * node.volume)
-        row["y"] = self.states([f"{name}.mass"], 1e5 / row["stiffness"])
+        stored = "mass" if name in self.case.nodes else "excess"
+        row["y"] = self.states([f"{name}.{stored}"], 1e5 / row["stiffness"])
 
     # links ------------------------------------------------------------------------------------------------
 
     def links(self) -> None:
-        by_kind: dict[str, list] = {"pipe": [], "rigid-column": [], "valve": []}
+        by_kind: dict[str, list] = {}
         for name, link in self.case.links.items():
-            by_kind["valve" if link.kind == "orifice" else link.kind].append((name, link))
-        self.pipe_names = [name for name, _ in by_kind["pipe"]]
-        self.column_names = [name for name, _ in by_kind["rigid-column"]]
-        self.valve_names = [name for name, _ in by_kind["valve"]]
+            by_kind.setdefault("valve" if link.kind == "orifice" else link.kind, []).append((name, link))
+        pipes, columns, valves, spools = (by_kind.get(kind, []) for kind in KINDS)
+        self.pipe_names = [name for name, _ in pipes]
+        self.column_names = [name for name, _ in columns]
+        self.valve_names = [name for name, _ in valves] + [name for name, _ in spools for _ in EDGES]
         self.pipe_table = np.zeros(len(self.pipe_names), rec.PIPE)
         self.column_table = np.zeros(len(self.column_names), rec.COLUMN)
         self.valve_table = np.zeros(len(self.valve_names), rec.VALVE)
         self.meshes: list[PipeMesh] = []
-        for k, (name, link) in enumerate(by_kind["pipe"]):
+        for k, (name, link) in enumerate(pipes):
             self.pipe(name, link, self.pipe_table[k])
-        for k, (name, link) in enumerate(by_kind["rigid-column"]):
+        for k, (name, link) in enumerate(columns):
             self.column(name, link, self.column_table[k])
-        for k, (name, link) in enumerate(by_kind["valve"]):
+        for k, (name, link) in enumerate(valves):
             self.valve(name, link, self.valve_table[k])
+        for k, (name, link) in enumerate(spools):
+            self.spool(name, link, self.valve_table[len(valves) + len(EDGES) * k :])
         for row in self.pipe_table:
             self.node_table["admittance"][row["from_node"]] += row["admittance"]
             self.node_table["admittance"][row["to_node"]] += row["admittance"]
+        lower_bodies(self)
 
     def ends(self, link, row) -> None:
         row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
@@ -176,13 +189,24 @@ class Scene:
     def valve(self, name, link, row) -> None:
         self.ends(link, row)
         row["schedule"] = self.schedules.add(link.opening)
-        row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
+        self.restriction(name, link, row)
         if link.characteristic == "equal-percentage":
             row["characteristic"] = 1
         elif link.characteristic != "linear":
             row["characteristic"], row["table"] = 2, len(self.floats)
             row["table_size"] = len(link.characteristic.opening)
             self.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
+
+    def spool(self, name, link, rows) -> None:
+        """Four valves; those of one side of zero share a schedule of their opening."""
+        parts = {side: self.schedules.add_part(link.position, side) for side in (1, -1)}
+        for (start, end, side), row in zip(EDGES, rows, strict=False):
+            row["from_node"], row["to_node"] = (self.node_index[link.ports[port]] for port in (start, end))
+            row["schedule"] = parts[side]
+            self.restriction(name, link, row)
+
+    def restriction(self, name, link, row) -> None:
+        row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
         if link.laminar_reynolds is not None:
             row["transition"] = self.law.transition_flow(name, link, link.laminar_reynolds, self.fault)
 
@@ -232,18 +256,21 @@ class Scene:
         for name, size in (
             ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("net", len(self.node_table)),
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
+            ("stiffness", 2 * len(self.piston_table)), ("swept", 2 * len(self.piston_table)),
+            ("net_force", len(self.body_table)), ("push", len(self.push_names)),
         ):  # fmt: skip
             layout[name], at = at, at + size
         layout["size"] = at
-        marks = np.full(len(pipes) + 3 * len(self.node_table) + len(self.column_table), np.nan)
+        marks = np.full(len(pipes) + 3 * len(self.node_table) + len(self.column_table) + len(self.piston_table), np.nan)
         envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
         for array in (envelope, extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         self.tables = (
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
-            schedules, self.probe_table, np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float),
-            profile, np.zeros(max(2 * most + 64, system)), marks, np.zeros(2 * self.tanks), pieces,
-            envelope, extremes,
+            schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,
+            np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
+            np.zeros(max(2 * most + 64, system, 2 * len(self.body_table))), marks,
+            np.zeros(2 * (self.tanks + len(self.stop_table))), pieces, envelope, extremes,
         )  # fmt: skip
 
     def column_rates(self):
@@ -259,8 +286,8 @@ class Scene:
         )
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
-            list(case.nodes), list(case.links), self.valve_names, self.column_names,
-            {name: case.elevation(name) for name in case.nodes}, case.probes, self.warnings, self.steady,
+            list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
+            {name: case.elevation(name) for name in case.places}, case.probes, self.warnings, self.steady,
             self.profiles,
         )  # fmt: skip
 

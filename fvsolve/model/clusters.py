@@ -48,7 +48,7 @@ def sort_nodes(scene) -> None:
     scene.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
         if nodes["solve"][i] == rec.ALONE:
-            name = list(scene.case.nodes)[i]
+            name = list(scene.case.places)[i]
             scene.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
 
@@ -66,7 +66,7 @@ def gates(scene) -> None:
 
 
 def asks_nothing(scene, i: int) -> bool:
-    node = list(scene.case.nodes.values())[i]
+    node = list(scene.case.places.values())[i]
     schedule = node.demand if node.kind == "junction" else node.flow
     return not np.any(schedule.value)
 

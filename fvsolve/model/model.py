@@ -59,6 +59,7 @@ class Model:
     link_names: list[str]
     valve_names: list[str]
     column_names: list[str]
+    piston_names: list[str]
     elevation: dict[str, float]
     probes: list[Any]
     warnings: list[str]
@@ -88,10 +89,10 @@ class Model:
         return make_handle(self.tables)
 
     def functions(self) -> tuple:
-        """(rhs, observe, record, events) for the density law of the case, compiled."""
+        """(rhs, observe, record, events) for the density law of the case, with bodies where it has some, compiled."""
         from fvsolve.kernels.functions import functions
 
-        return functions(self.case.fluid.law)
+        return functions(self.case.fluid.law, len(self.tables[rec.I_BODIES]) > 0)
 
     def new_out(self) -> np.ndarray:
         """An array for what the rhs writes beside dydt."""
@@ -212,6 +213,10 @@ class Model:
             if row["y"] >= 0:
                 initial += float(row["mass"])
                 change += float(y[row["y"]])
+        for row in self.tables[rec.I_PISTONS]:  # what moving chambers hold is their excess and what was swept
+            places = self.tables[rec.I_BODIES][[row["case"], row["rod"]]]["y"]
+            back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
+            change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
         return initial, change
 
     @property

@@ -6,15 +6,32 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.schemes import ORDER
+from fvsolve.parts import EDGES
+
+SPOOL_FLOWS = {  # flow into the link at a port: weights of its four edges
+    f"flow_{port}": [float((port == start) - (port == end)) for start, end, _ in EDGES] for port in "PTAB"
+}
 
 
 def lower_probes(scene) -> np.ndarray:
     """The probe table of a scene; pressures of the profile are filled in later by `probe_offsets`."""
     table = np.zeros(len(scene.case.probes), rec.PROBE)
     for row, probe in zip(table, scene.case.probes, strict=True):
-        if probe.part == "nodes":
+        if probe.part == "nodes" and probe.name in scene.body_index:
+            row["index"] = scene.body_index[probe.name]
+            row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
+        elif probe.part == "nodes":
             row["index"] = scene.node_index[probe.name]
             row["kind"] = rec.LEVEL if probe.quantity == "level" else rec.PRESSURE
+        elif probe.quantity == "force":
+            row["index"], row["kind"] = scene.push_names.index(probe.name), rec.FORCE
+        elif probe.name in scene.piston_names:
+            row["index"] = scene.piston_names.index(probe.name)
+            row["kind"] = rec.PISTON_POSITION if probe.quantity == "position" else rec.PISTON_VELOCITY
+        elif probe.quantity in SPOOL_FLOWS:
+            row["index"], row["kind"] = scene.valve_names.index(probe.name), rec.SPOOL_FLOW
+            row["weights"] = len(scene.floats)
+            scene.floats += SPOOL_FLOWS[probe.quantity]
         elif probe.name in scene.valve_names:
             row["index"], row["kind"] = scene.valve_names.index(probe.name), rec.VALVE_FLOW
         elif probe.name in scene.column_names:
@@ -60,11 +77,11 @@ def linear_offsets(scene, start, row, probe) -> None:
     """scale * (deviation of pressure or flow) + offset."""
     weight = scene.fluid.density * scene.case.gravity
     row["scale"], row["offset"] = 1.0, 0.0
-    if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW):
+    if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
         row["scale"] = 1.0 / scene.fluid.density
         if probe.quantity == "velocity":
             row["scale"] /= scene.pipe_table[row["index"]]["area"]
-    elif row["kind"] != rec.LEVEL:
+    elif row["kind"] in (rec.PRESSURE, rec.PIPE_PRESSURE):
         if row["kind"] == rec.PRESSURE:
             base, z = (scene.node_table[row["index"]][key] for key in ("pressure", "elevation"))
         else:

@@ -33,6 +33,16 @@ class Schedules:
             self.spacing = min(self.spacing, 4.0 * float(np.median(np.diff(schedule.time))))
         return len(self.records) - 1
 
+    def add_part(self, schedule, side: int) -> int:
+        """Index of the positive part of side * value; where it leaves and meets zero are kinks."""
+        index = self.add(schedule, side)
+        first, count = self.records[index]
+        rows, crossings = positive_part(np.array(self.rows[first : first + count]))
+        self.rows[first:], self.records[index] = rows, (first, len(rows))
+        for time in crossings:
+            self.breaks.setdefault(time, False)
+        return index
+
     def tables(self) -> tuple[np.ndarray, np.ndarray]:
         """The two arrays that kernels read."""
         rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
@@ -97,3 +107,35 @@ def piece_slope(piece: np.ndarray, t: float) -> float:
     """d/dt of a polynomial piece."""
     s = t - piece[2]
     return piece[4] + s * (2.0 * piece[5] + s * 3.0 * piece[6])
+
+
+def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
+    """Pieces of max(0, value), and the times at which a piece crosses zero between its ends."""
+    rows, crossings = [], []
+    for k, piece in enumerate(pieces):
+        start, end = piece[0], pieces[k + 1, 0] if k + 1 < len(pieces) else np.inf
+        near = 1e-12 * max(abs(start), abs(end), end - start) if np.isfinite([start, end]).all() else 0.0
+        inside = [t for t in piece_roots(piece) if start + near < t < end - near]
+        crossings += inside
+        for low, high in zip([start, *inside], [*inside, end], strict=True):
+            middle = 0.5 * (low + high) if np.isfinite([low, high]).all() else piece[2]
+            held = piece_value(piece, middle) > 0.0
+            rows.append([low, *piece[1:]] if held else [low, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return rows, crossings
+
+
+def piece_value(piece: np.ndarray, t: float) -> float:
+    """Value of a piece at a time within it."""
+    s = t - piece[2]
+    if piece[1] == 0:
+        return piece[3] + s * (piece[4] + s * (piece[5] + s * piece[6]))
+    return piece[4] + (piece[3] - piece[4]) * max(0.0, 1.0 - s / piece[5]) ** piece[6]
+
+
+def piece_roots(piece: np.ndarray) -> list[float]:
+    """Times at which a piece is zero, rising; none of one that is constant."""
+    if piece[1] == 1:
+        v0, v1, duration, exponent = piece[3:]
+        return [piece[2] + duration * (1.0 - (v1 / (v1 - v0)) ** (1.0 / exponent))] if v0 * v1 < 0.0 else []
+    found = np.roots(piece[:2:-1]) if np.any(piece[4:]) else np.zeros(0)
+    return sorted(piece[2] + float(s.real) for s in found if abs(s.imag) <= 1e-9 * abs(s))

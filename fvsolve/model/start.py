@@ -11,9 +11,11 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
+from fvsolve.model.bodies import start_bodies
 from fvsolve.model.probes import probe_offsets
 from fvsolve.steady import Edge, solve_steady
 
+STORED = (rec.CHAMBER, rec.MOVING)
 PRESSURE_SCALE = 1e5
 SNAP = 1e-12  # flows below this share of the scene's are zero
 
@@ -42,7 +44,7 @@ class Start:
     def __init__(self, scene) -> None:
         self.scene, self.case = scene, scene.case
         self.nodes, self.pipes = scene.node_table, scene.pipe_table
-        self.columns, self.valves = scene.column_table, scene.valve_table
+        self.columns, self.valves, self.pistons = scene.column_table, scene.valve_table, scene.piston_table
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
         scene.tables[rec.I_SETTINGS][0]["limit"] = self.t
@@ -78,7 +80,8 @@ class Start:
         columns = [self.wall_edge(name, row, row["length"]) for name, row in
                    zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
         valves = [self.valve_edge(k) for k in range(len(self.valves))]
-        self.edges = [*pipes, *columns, *valves]
+        leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
+        self.edges = [*pipes, *columns, *valves, *leaks]
         self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, self.flow_scale))
         self.report_faults(held)
         flow = self.answer.flow
@@ -90,19 +93,26 @@ class Start:
             self.inflow[edge.j] += value
         self.inflow[np.abs(self.inflow) <= 10.0 * self.tolerance] = 0.0
         n, m = len(pipes), len(pipes) + len(columns)
-        self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m:]
+        self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
 
     def givens(self) -> tuple[np.ndarray, np.ndarray]:
         """Potentials that are held (nan: to be found) and demands of junctions [kg/s]."""
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
-        for i, (node, row) in enumerate(zip(self.case.nodes.values(), self.nodes, strict=True)):
+        for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] in (rec.FIXED, rec.TANK):
                 held[i] = self.potential_of(self.given_pressure(row, node), row["elevation"])
-            elif row["kind"] == rec.CHAMBER and node.initial_pressure is not None:
+            elif row["kind"] in STORED and node.initial_pressure is not None:
                 held[i] = self.potential_of(node.initial_pressure, row["elevation"])
+            elif row["kind"] == rec.MOVING and not self.touched(i):
+                held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
             elif row["kind"] == rec.JUNCTION:
                 demand[i] = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
         return held, np.zeros_like(demand) if self.rest else demand
+
+    def touched(self, i: int) -> bool:
+        """Whether a link of the fluid joins node i."""
+        tables = (self.pipes, self.columns, self.valves)
+        return any(np.any((table["from_node"] == i) | (table["to_node"] == i)) for table in tables)
 
     def wall_edge(self, name: str, row, length: float) -> Edge:
         """A pipe or column: drop = (L / A) drag(M)."""
@@ -151,9 +161,22 @@ class Start:
 
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
 
+    def leak_edge(self, k: int) -> Edge:
+        """What leaks past a piston: M = rho leakage dP."""
+        row = self.pistons[k]
+        g = row["leakage"] * self.scene.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
+        i, j = int(row["a"]), int(row["b"])
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
+
+    def leak_flow(self, row, p_a: float, p_b: float) -> float:
+        """Mass flow from A to B past a piston, as kernels.mechanics.leak_flow has it [kg/s]."""
+        return self.scene.fluid.density * row["leakage"] * (p_a - p_b)
+
     def report_faults(self, held) -> None:
         """What no steady state can meet, each by its name."""
-        names = list(self.case.nodes)
+        names = list(self.case.places)
         for i in self.answer.no_solution:
             drawn = self.demand[i] / self.scene.fluid.density
             self.scene.fault(
@@ -198,12 +221,12 @@ class Start:
 
     def fill_nodes(self) -> None:
         self.nodes["pressure"] = self.answer.potential - self.weight * self.nodes["elevation"]
-        for node, row in zip(self.case.nodes.values(), self.nodes, strict=True):
+        for node, row in zip(self.case.places.values(), self.nodes, strict=True):
             if row["kind"] in (rec.FIXED, rec.TANK):
                 row["pressure"] = self.given_pressure(row, node)
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
         fluid = self.scene.fluid
-        chambers = self.nodes["kind"] == rec.CHAMBER
+        chambers = np.isin(self.nodes["kind"], STORED)
         self.nodes["mass"][chambers] = fluid.density * self.nodes["volume"][chambers] * (
             1.0 + (self.nodes["pressure"][chambers] - fluid.pressure) / fluid.bulk_modulus)  # fmt: skip
 
@@ -263,17 +286,19 @@ class Start:
                 row["drop"] = abs(flow) * flow / row["open"]
 
     def report(self) -> dict[str, Any]:
-        moving = []
-        fluid = self.scene.fluid
-        for name, row in zip(self.case.nodes, self.nodes, strict=True):
-            if row["inflow"] == 0.0 or row["kind"] == rec.FIXED:
+        moving = start_bodies(self.scene, self)
+        fluid, net = self.scene.fluid, self.nodes["inflow"].copy()
+        for row in self.pistons:
+            net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
+        for name, row, inflow in zip(self.case.places, self.nodes, net, strict=True):
+            if inflow == 0.0 or row["kind"] == rec.FIXED:
                 continue
-            flow = row["inflow"] / fluid.density
+            flow = inflow / fluid.density
             if row["kind"] == rec.TANK:
                 what = "rises" if flow > 0 else "falls"
                 moving.append(f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s")
-            elif row["kind"] == rec.CHAMBER:
-                moving.append(f"chamber {name}: pressure changes by {row['stiffness'] * row['inflow']:.4g} Pa/s")
+            elif row["kind"] in STORED:
+                moving.append(f"chamber {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s")
             else:
                 moving.append(f"junction {name}: {flow:.4g} m3/s more flow in than out")
         for name, pressure in self.driven.items():
@@ -281,9 +306,9 @@ class Start:
         for name, row in zip(self.scene.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
                 moving.append(f"rigid column {name}: {row['offset']:.4g} Pa drive it unbalanced")
-        for name, row in zip(self.scene.valve_names, self.valves, strict=True):
+        for k, (name, row) in enumerate(zip(self.scene.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
-                g = valve_conductance(self.scene.tables, self.scene.valve_names.index(name), self.t)
+                g = valve_conductance(self.scene.tables, k, self.t)
                 if g > 0.0:
                     moving.append(f"valve {name}: open with {row['drop']:.4g} Pa across it and no flow")
         if self.case.numerics.initial == "equilibrium":

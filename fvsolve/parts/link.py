@@ -2,24 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import Text
+from fvsolve.parts.table import Table, keys_json, read_keys
+from fvsolve.parts.value import NEEDED, Setting, Text, Value
+from fvsolve.units import show
 
 
 class Link(Table):
-    """A part with two ports, `from` and `to`; its flow [m3/s] is positive into it at `from`.
+    """A part whose ports join places; flow is positive into it at each port.
 
-    Each port joins a place; potential times flow, summed over the ports, is the power [W] it takes up.
+    Potential times flow, summed over the ports, is the power [W] it takes up: pressure and volume flow where the
+    domain is hydraulic, velocity and force where it is translational.
     """
 
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Link]]] = {}
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
+    joins: ClassVar[dict[str, str]] = {}  # port -> domain of the place it wants
+    may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
+    owns: ClassVar[dict[str, str]] = {}  # place of its own, `LINK.PLACE` to others -> domain
+
+    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if kind:
+            cls.kind = kind
+            Link.kinds[kind] = cls
+
+
+class TwoPort(Link):
+    """A link with the ports `from` and `to`; its own flow [m3/s] is the one at `from`."""
+
+    joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
 
     from_: Annotated[str, Text("the place it starts from"), Field(alias="from")]
     to: Annotated[str, Text("the place it leads to")]
@@ -29,7 +47,29 @@ class Link(Table):
         """Port name -> place."""
         return {"from": self.from_, "to": self.to}
 
-    def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
-        super().__init_subclass__(**rest)
-        cls.kind = kind
-        Link.kinds[kind] = cls
+
+class Coupling(TwoPort):
+    """A link between bodies on one axis; its force [N] pushes `to` forward and `from` back by as much."""
+
+    joins: ClassVar[dict[str, str]] = {"from": "translational", "to": "translational"}
+    quantities: ClassVar[dict[str, str]] = {"force": "force"}
+
+
+@dataclass(frozen=True)
+class Ports(Value):
+    """The table `ports` of a link with other ports than `from` and `to`: port name -> place."""
+
+    names: tuple[str, ...]
+    about: str = "the place that each port joins"
+
+    def read(self, given: Any, setting: Setting) -> dict[str, str]:
+        if not isinstance(given, dict):
+            example = ", ".join(f'{name} = "..."' for name in self.names)
+            raise ValueError(f"{show(given)} is no table; wanted {{ {example} }}")
+        return read_keys(given, self.keys(), setting)
+
+    def keys(self) -> dict[str, tuple[Value, Any]]:
+        return {name: (Text(), NEEDED) for name in self.names}
+
+    def json(self) -> dict[str, Any]:
+        return keys_json(self.keys())

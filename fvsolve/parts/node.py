@@ -9,7 +9,7 @@ from fvsolve.parts.value import Quantity, Rows
 
 
 class Node(Table):
-    """A place with one pressure; pressure is taken at its elevation.
+    """A place with one potential: a pressure, taken at its elevation, or a velocity where the domain is translational.
 
     Ports: those of the links that name it. Stored and dissipated energy: none, unless the kind says so.
     """
@@ -20,6 +20,7 @@ class Node(Table):
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
     }  # fmt: skip
     fixes_pressure: ClassVar[bool] = False
+    domain: ClassVar[str] = "hydraulic"  # | "translational"
 
     elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = None
     position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 from fvsolve.parts.friction import NONE, Friction
-from fvsolve.parts.link import Link
+from fvsolve.parts.link import TwoPort
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Number, Quantity, Setting, Value, Whole, between, nonnegative, positive
 from fvsolve.units import show
@@ -36,7 +36,7 @@ class WallOrStiff(Value):
         return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
 
 
-class Pipe(Link, kind="pipe"):
+class Pipe(TwoPort, kind="pipe"):
     """A pipe of constant slope: mass and momentum along it, wave speed sqrt(K / rho).
 
     Ports: from, to; each end offers its outgoing characteristic. Stored energy, p from ambient: rho A

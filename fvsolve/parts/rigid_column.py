@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Annotated
 
 from fvsolve.parts.friction import NONE, Friction
-from fvsolve.parts.link import Link
+from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import Number, Quantity, nonnegative, positive
 
 
-class RigidColumn(Link, kind="rigid-column"):
+class RigidColumn(TwoPort, kind="rigid-column"):
     """An incompressible pipe, (rho length / A) dq/dt = drop of p + rho g z - friction; one state, its flow q.
 
     Ports: from, to. Stored energy: rho length q^2 / (2 A) [J]. Dissipated power: friction and minor loss,

@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.parts.link import Link
+from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.table import Table, keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     Choice,
@@ -88,12 +88,8 @@ class Trim(Value):
         return {"anyOf": [self.names.json(), keys_json(self.keys)]}
 
 
-class Valve(Link, kind="valve"):
-    """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
-
-    Ports: from, to; both directions alike; opening 0 is exactly no flow. Stored energy: none. Dissipated
-    power: dp q [W].
-    """
+class Sized(Table):
+    """The size of a restriction, by one of four coefficients."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("discharge_coefficient", "loss_coefficient", "Kv", "Cv"),
@@ -106,10 +102,6 @@ class Valve(Link, kind="valve"):
     Cv: Annotated[float | None, Number(positive, "US gpm of water at 1 psi")] = None
     area: Annotated[float | None, Quantity("area", positive, "of the opening [m2]")] = None
     diameter: Annotated[float | None, Quantity("length", positive, "of the opening [m]")] = None
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = Field(
-        default_factory=lambda: constant(1.0)
-    )
-    characteristic: Annotated[Any, Trim()] = "linear"
     laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which it is laminar")] = None
 
     def model_post_init(self, _: Any) -> None:
@@ -142,3 +134,16 @@ class Valve(Link, kind="valve"):
         if self.loss_coefficient is not None:
             return area / math.sqrt(self.loss_coefficient)
         return self.discharge_coefficient * area
+
+
+class Valve(Sized, TwoPort, kind="valve"):
+    """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
+
+    Ports: from, to; both directions alike; opening 0 is exactly no flow. Stored energy: none. Dissipated
+    power: dp q [W].
+    """
+
+    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = Field(
+        default_factory=lambda: constant(1.0)
+    )
+    characteristic: Annotated[Any, Trim()] = "linear"

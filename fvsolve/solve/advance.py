@@ -13,15 +13,16 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import erk
+from fvsolve.steppers import orders as told
 from fvsolve.units import show
 
 
 def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
     """The state at `until` [s]; `inputs` hold named schedules at a value meanwhile.
 
-    inputs : {"valve.opening": 0.3, "lake.head": 12.0, "gate.demand": 0.1}, SI. Raises FvsolveError for an
-    input that names nothing or is out of range, a time before the state's, and a run that cannot go on.
+    inputs : {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}, SI. Raises
+    FvsolveError for an input that names nothing or is out of range, a time before the state's, and a run that
+    cannot go on.
     """
     if not math.isfinite(until):
         raise FvsolveError(f"until = {until} is no time; wanted a finite number of seconds")
@@ -30,28 +31,29 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     held = hold(model, inputs or {})
     loop = Loop(held)
     loop.now[:] = state.y
-    loop.memory[erk.T] = state.t
-    adaptive = loop.orders[erk.CONTROL] == erk.TOLERANCE
+    loop.memory[told.T] = state.t
+    adaptive = loop.orders[told.CONTROL] == told.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
         loop.begin(end, NO_LIMIT)
         if first and adaptive and state.memory.size == 2:
-            loop.memory[[erk.STEP, erk.ERROR_OLD]] = state.memory
-        if loop.run(NO_LIMIT) != erk.DONE:
+            loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory
+        if loop.run(NO_LIMIT) != told.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
-    return State(loop.t, loop.now.copy(), loop.memory[[erk.STEP, erk.ERROR_OLD]].copy())
+    return State(loop.t, loop.now.copy(), loop.memory[[told.STEP, told.ERROR_OLD]].copy())
 
 
 class Input(NamedTuple):
     """A schedule that can be held: what kernels read is scale * value + offset, of the kind that is named."""
 
-    kind: str  # "opening" | "pressure" | "head" | "flow"
+    kind: str  # "opening" | "position" | "pressure" | "head" | "flow" | "force"
     schedule: int
     scale: float = 1.0
     offset: float = 0.0
     node: int = -1  # of a reservoir
+    other: int = -1  # of a spool, the schedule of its edges below zero
 
 
 def hold(model: Model, inputs: dict[str, float]) -> Model:
@@ -74,8 +76,12 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             nodes["head_given"][one.node] = one.kind == "head"
         else:
             found = one.scale * found + one.offset
-        schedules[one.schedule] = (len(pieces) + len(rows), 1)
-        rows.append([-np.inf, 0.0, 0.0, found, 0.0, 0.0, 0.0])
+        parts = [(one.schedule, found)]
+        if one.other >= 0:
+            parts = [(one.schedule, max(found, 0.0)), (one.other, max(-found, 0.0))]
+        for schedule, part in parts:
+            schedules[schedule] = (len(pieces) + len(rows), 1)
+            rows.append([-np.inf, 0.0, 0.0, part, 0.0, 0.0, 0.0])
     tables[rec.I_SCHEDULES], tables[rec.I_NODES] = schedules, nodes
     tables[rec.I_PIECES] = np.vstack([pieces, rows])
     return replace(model, tables=tuple(tables))
@@ -92,6 +98,8 @@ def checked(name: str, value: float, one: Input) -> float:
         raise FvsolveError(f"{name} = {found} is not finite; wanted {WANTED[one.kind]}")
     if one.kind == "opening" and not 0.0 <= found <= 1.0:
         raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
+    if one.kind == "position" and not -1.0 <= found <= 1.0:
+        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
     pressure = one.scale * found + one.offset
     if one.node >= 0 and not pressure > 0.0:
         said = f"{name} = {found:g}" + (f" is {pressure:.4g} Pa absolute" if one.kind == "head" else " is a vacuum")
@@ -104,6 +112,8 @@ WANTED = {
     "pressure": "an absolute pressure above 0 [Pa]",
     "head": "a head whose pressure is above 0 Pa absolute [m]",
     "flow": "a finite number [m3/s]",
+    "position": "a number from -1 to 1",
+    "force": "a finite number [N]",
 }
 
 
@@ -111,7 +121,7 @@ def input_schedules(model: Model) -> dict[str, Input]:
     """Input name -> what it holds."""
     rho, weight = model.case.properties.density, model.case.properties.density * model.case.gravity
     found = {}
-    nodes = zip(model.node_names, model.case.nodes.values(), model.tables[rec.I_NODES], strict=True)
+    nodes = zip(model.node_names, model.case.places.values(), model.tables[rec.I_NODES], strict=True)
     for i, (name, node, row) in enumerate(nodes):
         index = int(row["schedule"])
         if node.kind == "reservoir":
@@ -123,5 +133,14 @@ def input_schedules(model: Model) -> dict[str, Input]:
         elif node.kind == "inflow":
             found[f"{name}.flow"] = Input("flow", index, -rho)
     for name, row in zip(model.valve_names, model.tables[rec.I_VALVES], strict=True):
-        found[f"{name}.opening"] = Input("opening", int(row["schedule"]))
+        if model.case.links[name].kind != "spool-valve":
+            found[f"{name}.opening"] = Input("opening", int(row["schedule"]))
+        elif f"{name}.position" not in found:
+            found[f"{name}.position"] = Input("position", int(row["schedule"]))
+        elif found[f"{name}.position"].other < 0:
+            found[f"{name}.position"] = found[f"{name}.position"]._replace(other=int(row["schedule"]))
+    pushed = zip((name for name, link in model.case.links.items() if link.kind == "force"),
+                 (row for row in model.tables[rec.I_BRACES] if row["schedule"] >= 0), strict=True)  # fmt: skip
+    for name, row in pushed:
+        found[f"{name}.force"] = Input("force", int(row["schedule"]))
     return found

@@ -10,7 +10,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.summary import Summary, find_envelope, find_extremes, find_marks, mass_ledger
-from fvsolve.steppers import erk
+from fvsolve.steppers import orders as told
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
@@ -43,12 +43,12 @@ class Run:
         self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
         orders = self.loop.orders
-        orders[erk.START], orders[erk.EVERY] = self.start, output.every or (self.end - self.start) / 1000
-        orders[erk.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
-        orders[erk.FIELD_COUNT] = output.fields
+        orders[told.START], orders[told.EVERY] = self.start, output.every or (self.end - self.start) / 1000
+        orders[told.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
+        orders[told.FIELD_COUNT] = output.fields
         self.segment, self.fresh = 0, state.memory.size == 0
         self.loop.now[:] = state.y
-        self.loop.memory[erk.T] = state.t
+        self.loop.memory[told.T] = state.t
         for array in (model.tables[rec.I_EXTREMES], model.tables[rec.I_ENVELOPE]):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         model.tables[rec.I_MARKS][:] = np.nan
@@ -63,13 +63,13 @@ class Run:
         """Everything that a resumed run needs beside t and y, flat."""
         kept = [self.model.tables[at].ravel() for at in PERSISTENT]
         own = [float(self.segment), self.seconds]
-        return np.concatenate([own, self.loop.memory, self.loop.ledger, self.loop.carry, *kept])
+        return np.concatenate([own, self.loop.memory, self.loop.stepper.ledger, self.loop.stepper.carry, *kept])
 
     def remember(self, memory: np.ndarray) -> None:
-        at = 2 + erk.MEMORY
+        at = 2 + told.MEMORY
         self.segment, self.seconds = int(memory[0]), float(memory[1])
         self.loop.memory[:] = memory[2:at]
-        for array in (self.loop.ledger, self.loop.carry, *(self.model.tables[k] for k in PERSISTENT)):
+        for array in (self.loop.stepper.ledger, self.loop.stepper.carry, *(self.model.tables[k] for k in PERSISTENT)):
             array.ravel()[:] = memory[at : at + array.size]
             at += array.size
 
@@ -81,8 +81,8 @@ class Run:
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
         out = self.model.evaluate(t, self.loop.now, limit)[1]
-        self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.values)
-        self.sink.rows(np.array([t]), self.loop.values[None, :].copy())
+        self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.stepper.values)
+        self.sink.rows(np.array([t]), self.loop.stepper.values[None, :].copy())
         return out
 
     def flush(self) -> None:
@@ -97,12 +97,12 @@ class Run:
         """Count the rows and frames that are due at a jump or at the end, which are written apart."""
         memory, orders = self.loop.memory, self.loop.orders
         near = 1e-12 * max(abs(t), abs(self.end))
-        if orders[erk.EVERY] > 0:
-            while orders[erk.START] + memory[erk.NEXT_OUTPUT] * orders[erk.EVERY] <= t + near:
-                memory[erk.NEXT_OUTPUT] += 1
-        if orders[erk.FIELD_EVERY] > 0 and memory[erk.NEXT_FIELD] <= orders[erk.FIELD_COUNT]:
-            if orders[erk.START] + memory[erk.NEXT_FIELD] * orders[erk.FIELD_EVERY] <= t + near:
-                memory[erk.NEXT_FIELD] += 1
+        if orders[told.EVERY] > 0:
+            while orders[told.START] + memory[told.NEXT_OUTPUT] * orders[told.EVERY] <= t + near:
+                memory[told.NEXT_OUTPUT] += 1
+        if orders[told.FIELD_EVERY] > 0 and memory[told.NEXT_FIELD] <= orders[told.FIELD_COUNT]:
+            if orders[told.START] + memory[told.NEXT_FIELD] * orders[told.FIELD_EVERY] <= t + near:
+                memory[told.NEXT_FIELD] += 1
                 self.frame(t, self.loop.now, out)
 
     # the run ------------------------------------------------------------------------------------------------
@@ -120,9 +120,9 @@ class Run:
 
     def open(self) -> None:
         out = self.row(self.start, self.start)
-        if self.loop.orders[erk.FIELD_EVERY] > 0:
+        if self.loop.orders[told.FIELD_EVERY] > 0:
             self.frame(self.start, self.loop.now, out)
-        self.loop.memory[erk.NEXT_OUTPUT] = self.loop.memory[erk.NEXT_FIELD] = 1.0
+        self.loop.memory[told.NEXT_OUTPUT] = self.loop.memory[told.NEXT_FIELD] = 1.0
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self, end: float) -> None:
@@ -168,22 +168,22 @@ class Run:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         left, spent = self.budget, 0.0  # rows and frames interrupt a chunk, they do not begin another
         while True:
-            before, steps = time.perf_counter(), self.loop.memory[erk.STEPS]
+            before, steps = time.perf_counter(), self.loop.memory[told.STEPS]
             code = self.loop.run(left)
-            left = max(1.0, left - (self.loop.memory[erk.STEPS] - steps))
+            left = max(1.0, left - (self.loop.memory[told.STEPS] - steps))
             spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
-            if code == erk.FIELD:
-                count = self.loop.memory[erk.NEXT_FIELD] - 1
-                due = self.start + count * self.loop.orders[erk.FIELD_EVERY]
-                self.frame(due, self.loop.y_out, self.loop.out_row)
-            elif code == erk.CHUNK:
+            if code == told.FIELD:
+                count = self.loop.memory[told.NEXT_FIELD] - 1
+                due = self.start + count * self.loop.orders[told.FIELD_EVERY]
+                self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
+            elif code == told.CHUNK:
                 self.pause(spent)
                 left, spent = self.budget, 0.0
-            elif code == erk.DONE:
+            elif code == told.DONE:
                 return ""
-            elif code != erk.ROWS_FULL:
+            elif code != told.ROWS_FULL:
                 return self.failure(code)
 
     def pause(self, spent: float) -> None:
@@ -191,7 +191,7 @@ class Run:
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, 1e9))
         if self.progress is not None:
-            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[erk.STEPS]))
+            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[told.STEPS]))
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
             self.save()
 
@@ -203,21 +203,23 @@ class Run:
         """Where, when and what to try."""
         model, loop = self.model, self.loop
         place = ""
-        if code == erk.BAD_VALUE:
+        if code == told.BAD_VALUE:
             bad = np.flatnonzero(~np.isfinite(loop.now))
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == erk.BAD_STATUS and loop.out[rec.WHERE] >= 0:
+        elif code == told.BAD_STATUS and loop.out[rec.WHERE] >= 0:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {loop.t:.6g} s"
-        if code == erk.STOPPED:
+        if code == told.STOPPED:
             return f"stopped: pressure below vapour pressure at {when}, as below_vapor asks"
-        if code in (erk.BAD_VALUE, erk.BAD_STATUS):
+        if code in (told.BAD_VALUE, told.BAD_STATUS):
             loop.step_back()
-        if code == erk.TINY_STEP:
+        if code == told.TINY_STEP:
             return f"stopped: the step shrank to nothing at {when}; try a larger rtol, or courant in place of it"
-        if code == erk.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
+        if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
             return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
-        if code == erk.BAD_STATUS:
+        if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
+            return f"stopped: the piston has left no volume{place} at {when}; give it an end-stop"
+        if code == told.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"
 
@@ -226,10 +228,10 @@ class Run:
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
         memory = loop.memory
-        ledger = mass_ledger(model, loop.now, loop.ledger[: len(model.node_names)])
+        ledger = mass_ledger(model, loop.now, loop.stepper.ledger[: len(model.node_names)])
         summary = Summary(
             reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
-            find_envelope(model), int(memory[erk.STEPS]), int(memory[erk.REJECTIONS]), int(memory[erk.CALLS]),
+            find_envelope(model), int(memory[told.STEPS]), int(memory[told.REJECTIONS]), int(memory[told.CALLS]),
             model.cells, self.seconds, self.setup,
         )  # fmt: skip
         self.sink.end(summary)

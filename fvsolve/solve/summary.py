@@ -51,8 +51,10 @@ def find_marks(model: Model) -> list[Mark]:
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
+    kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
     texts = {
         "stopped dead": "its last way out shut while it flowed; a rigid column has no surge, a pipe would",
+        "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would hold it",
         "below vapor pressure": "pressure falls below vapour pressure; the liquid column would part",
         "dry": "the tank is dry but outflow is asked for; it goes on at level 0",
         "spilling": "the tank is full to its height and spills",

@@ -1,7 +1,7 @@
 """Events: functions that fall through zero, and the step that ends there. Knows no model."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.step import stages
+from fvsolve.steppers.orders import T
 
 EVENT_TOLERANCE = 1e-13
 
@@ -40,23 +40,33 @@ def nearness(g, g_new):
 
 
 @njit
-def locate(rhs, events, handle, a, b, c, last_is_new, t, h, y, k, supply, where, out, y_stage, y_new, g, g_new):
-    """The step that ends just past the first event, by the Illinois rule on its length; y_new belongs to it."""
-    low, high, at_low, at_high = 0.0, h, 1.0, nearness(g, g_new)
-    for _ in range(100):
-        if at_high >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high):
+def locate(
+    attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y, now, new, k,
+    supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
+):  # fmt: skip
+    """The step that ends just past the first event, by the Illinois rule on its length; y[new] belongs to it."""
+    t, low, high, at_low, at_high = memory[T], 0.0, h, 1.0, nearness(g, g_new)
+    guess = h
+    for turn in range(101):
+        done = turn == 100 or at_high >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
+        if done and guess == high:
             break
         guess = high - at_high * (high - low) / (at_high - at_low)
         guess += 1e-3 * EVENT_TOLERANCE * h
         if not low < guess < high:
             guess = 0.5 * (low + high)
-        stages(rhs, handle, a, b, c, last_is_new, t, guess, y, k, supply, where, out, y_stage, y_new)
-        events(t + guess, y_new, handle, g_new)
+        if done:
+            guess = high
+        attempt(
+            rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, guess, y, now, new, k,
+            supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+        )  # fmt: skip
+        events(t + guess, y[new], handle, g_new)
+        if done:
+            break
         here = nearness(g, g_new)
         if here <= 0.0:
             high, at_high, at_low = guess, here, 0.5 * at_low
         else:
             low, at_low, at_high = guess, here, 0.5 * at_high
-    stages(rhs, handle, a, b, c, last_is_new, t, high, y, k, supply, where, out, y_stage, y_new)
-    events(t + high, y_new, handle, g_new)
     return high

@@ -2,65 +2,86 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
+import numba
 import numpy as np
-from numba import objmode
+from numba import objmode, types
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import erk
+from fvsolve.steppers import orders as told
+from fvsolve.steppers.march import compiled, compiled_as
+from fvsolve.steppers.stepper import Stepper
+from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method, method_named
+
+NO_LIMIT = 1e308
 
 
 def integrate(
     f: Callable, y0, t, method: str | Method = "dormand-prince", rtol: float | None = None,
-    step: float | None = None, atol: float | None = None,
+    step: float | None = None, atol=None, counts: dict | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Values of y at the times t : float64[len(t), n], for y' = f(t, y), y(t[0]) = y0.
 
-    f : f(t, y) -> float64[n]; it is compiled where numba can, else called as Python.
-    rtol : relative tolerance of methods with an error estimate (default 1e-6), atol its absolute share, default rtol
-    step : fixed step [s], for every method. Raises FvsolveError for two step settings, a method without an error
-    estimate and no step, times out of order, and where the solution does not stay finite.
+    f : f(t, y) -> float64[n], or f(t, y, dydt), which fills its last argument; compiled where numba can
+    rtol : relative tolerance of methods with an error estimate (default 1e-6); atol : absolute one, a number or
+    float64[n], default rtol; step : fixed step [s], for every method
+    counts : a dict to be filled with the numbers of steps, rejections, rhs, jacobians, factorisations, newton, ...
+    Times are met by dense output; a method whose order exceeds that of its dense output by three steps onto them.
+    Raises FvsolveError for two step settings, a method without an error estimate and no step, times out of order,
+    and where the solution does not stay finite or Newton fails.
     """
     method = method_named(method) if isinstance(method, str) else method
     t, y0 = np.asarray(t, dtype=np.float64), np.atleast_1d(np.asarray(y0, dtype=np.float64))
     _check(method, t, rtol, step)
-    functions, loop = _functions(f, t[0], y0)
-    n, s = y0.size, method.stages
+    n = y0.size
+    size = step if step is not None else (1e-6 if rtol is None else rtol)
+    scale = np.full(n, 1.0) if atol is None or step is not None else np.broadcast_to(atol / np.float64(size), n).copy()
+    stepper = Stepper(method, n, 0, _full(n) if not method.explicit else None, scale)
+    orders, memory, flags, y = stepper.orders, stepper.memory, stepper.flags, stepper.y
+    y[0], memory[told.T] = y0, t[0]
+    orders[told.CONTROL] = told.FIXED_STEP if step is not None else told.TOLERANCE
+    orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
+    lands = method.order > stepper.dense_order + 2
+    stops = t[1:] if lands else t[-1:]
+    stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, n + 1))
+    if f not in _COMPILED:
+        _COMPILED[f] = _functions(f, t[0], y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
+    functions, _PYTHON[id(f)] = _COMPILED[f]
+    handle = np.array([id(f)])
+    _RAISED.pop(id(f), None)
     found = np.empty((t.size, n))
     found[0] = y0
-    y = np.zeros((4, n))
-    y[0] = y0
-    memory, orders = np.zeros(erk.MEMORY), np.zeros(erk.ORDERS)
-    memory[erk.T] = t[0]
-    orders[[erk.END, erk.STEP_MAX, erk.STOP_AT, erk.BUDGET]] = t[-1], 1e308, 1e308, 1e308
-    orders[erk.CONTROL] = erk.FIXED_STEP if step is not None else erk.TOLERANCE
-    orders[erk.SIZE] = step if step is not None else (1e-6 if rtol is None else rtol)
-    share = 1.0 if atol is None or step is not None else atol / orders[erk.SIZE]
-    flags = np.array([erk.FRESH, 0, 0, 1, 0], dtype=np.int64)
-    work = _work(method, n, s)
-    key = work["handle"][0] = id(f)
-    _PYTHON[int(key)] = f
-    for i in range(1, t.size):
-        orders[erk.END] = t[i]
-        orders[erk.BUDGET] = 1e308
-        flags[erk.PHASE], flags[erk.BEHIND] = erk.FRESH, 0
-        kept = memory[erk.STEP]
-        code = loop(*functions, work["handle"], method.a, method.b, method.c, method.error, method.dense,
-                    method.error_order + 1 if method.adaptive else method.order, method.first_same_as_last, orders,
-                    memory, flags, y, work["k"], work["f_old"], work["supply"], 3, work["none"], np.full(n, share),
-                    work["out"], work["out_row"], work["none"], work["none"], work["none"], work["none"],
-                    work["nobody"], work["none"], work["y_out"], work["rows"])  # fmt: skip
-        if code != erk.DONE:
-            raise FvsolveError(f"{method.name} stopped at t = {memory[erk.T]:.6g}: the solution is not finite or the "
-                               "step shrank to nothing; try a smaller step or a larger rtol")  # fmt: skip
-        found[i] = y[flags[erk.NOW]]
-        if step is None and memory[erk.STEP] == 0.0:
-            memory[erk.STEP] = kept
-        if step is not None:
-            memory[erk.STEP] = 0.0
+    for i, stop in enumerate(stops, t.size - len(stops)):
+        orders[told.END], orders[told.BUDGET] = stop, NO_LIMIT
+        flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
+        kept = memory[told.STEP]
+        code = stepper.call(*functions, handle, WHERE, stepper.none)
+        if code != told.DONE:
+            raise FvsolveError(_failure(method, code, memory)) from _RAISED.pop(id(f), None)
+        found[i] = y[flags[told.NOW]]
+        memory[told.STEP] = 0.0 if step is not None else memory[told.STEP] or kept
+    if not lands:
+        found[1:-1] = stepper.rows[: t.size - 2, 1:]
+    if counts is not None:
+        counts |= stepper.counts()
     return found
+
+
+@functools.cache
+def _full(n):
+    return Structure.full(n)
+
+
+def _failure(method, code, memory) -> str:
+    when = f"{method.name} stopped at t = {memory[told.T]:.6g}: "
+    if code == told.NEWTON_STUCK:
+        return when + f"Newton did not converge, worst in y[{int(memory[told.WORST])}]; try another rtol or method"
+    return when + "the solution is not finite or the step shrank to nothing; try a smaller step or a larger rtol"
 
 
 def _check(method, t, rtol, step) -> None:
@@ -75,20 +96,31 @@ def _check(method, t, rtol, step) -> None:
             raise FvsolveError(f"{name} = {value!r} is not a positive number")
 
 
-def _work(method, n, s):
-    sizes = {"f_old": n, "y_out": n, "out": 4, "out_row": 4, "none": 0}
-    work = {name: np.zeros(size) for name, size in sizes.items()}
-    return work | {"k": np.zeros((s, n)), "supply": np.zeros((s, 0)), "rows": np.zeros((1, 1)),
-                   "handle": np.zeros(1, dtype=np.int64), "nobody": np.zeros(0, dtype=np.int64)}  # fmt: skip
-
-
+_COMPILED: WeakKeyDictionary = WeakKeyDictionary()  # the user's function -> the loop's, and f(t, y, dydt)
 _PYTHON: dict[int, Callable] = {}  # functions that numba cannot compile, by the number in their handle
+_RAISED: dict[int, BaseException] = {}  # what they raised
+WHERE = 3  # no ledger behind it in `out`
 
 
 def _call_python(t, y, dydt, out, handle):
     out[:] = (0.0, 0.0, -1.0, 0.0)
-    with objmode():
-        dydt[:] = _PYTHON[int(handle[0])](t, y)
+    if dydt.size > 0:
+        with objmode():
+            _python(t, y, dydt, int(handle[0]))
+
+
+def _python(t, y, dydt, key):
+    """f called as Python; compiled code cannot pass on what it raises, so that waits until the loop is back."""
+    try:
+        _PYTHON[key](t, y, dydt)
+    except BaseException as error:
+        _RAISED[key] = error
+        dydt[:] = np.nan
+
+
+def _row(t, y, out, handle, values):
+    for i in range(values.size):
+        values[i] = y[i]
 
 
 def _nothing(t, y, out, handle, values):
@@ -103,52 +135,58 @@ def _no_events(t, y, handle, g):
     pass
 
 
+def in_place(f) -> bool:
+    """Whether f(t, y, dydt) fills its last argument."""
+    return len(inspect.signature(getattr(f, "py_func", f)).parameters) == 3
+
+
 def _functions(f, t0, y0):
-    """(rhs, leap, observe, record, events) around f, and the loop that takes them; f compiled where numba can."""
-    if not hasattr(erk.run_erk, "compile"):
+    """(leap, observe, record, events, rhs) around f, compiled where numba can."""
+    if not hasattr(compiled(), "overloads"):
 
         def plain(t, y, dydt, out, handle):
             out[:] = (0.0, 0.0, -1.0, 0.0)
-            dydt[:] = f(t, y)
+            if dydt.size > 0:
+                _python(t, y, dydt, int(handle[0]))
 
-        return (plain, _no_leap, _nothing, _nothing, _no_events), erk.run_erk
-    from numba import types
-
+        return _no_leap, _row, _nothing, _no_events, plain
     v, handle = types.float64[::1], types.int64[::1]
     functions = (
-        (_rhs(f, t0, y0), (types.float64, v, v, v, handle)),
         (_no_leap, (types.float64, types.float64, v, v, v, handle, v)),
-        (_nothing, (types.float64, v, v, handle, v)),
+        (_row, (types.float64, v, v, handle, v)),
         (_nothing, (types.float64, v, v, handle, v)),
         (_no_events, (types.float64, v, handle, v)),
+        (_rhs(f, t0, y0), (types.float64, v, v, v, handle)),
     )
-    return tuple(_compiled(function, signature) for function, signature in functions), erk.compiled()
-
-
-def _compiled(function, signature):
-    import numba
-
-    found = numba.njit(function)
-    found.compile(signature)
-    found.disable_compile()
-    return found
+    return tuple(compiled_as(numba.njit(function), signature) for function, signature in functions)
 
 
 def _rhs(f, t0, y0):
-    """f in the loop's own form; a function that numba refuses is called as Python."""
-    import numba
+    """f in the loop's own form, NaN where it raises; a function that numba refuses is called as Python."""
     from numba.core.errors import NumbaError
 
-    inner = f if hasattr(f, "py_func") else numba.njit(f)
+    inner, fills = f if hasattr(f, "py_func") else numba.njit(f), in_place(f)
     try:
-        inner(t0, y0)
+        inner(t0, y0, np.empty_like(y0)) if fills else inner(t0, y0)
     except (NumbaError, TypeError, NotImplementedError):
         return _call_python
 
     def rhs(t, y, dydt, out, handle):
         out[0], out[1], out[2] = 0.0, 0.0, -1.0
-        d = inner(t, y)
-        for i in range(dydt.size):
-            dydt[i] = d[i]
+        if dydt.size > 0:
+            try:
+                d = inner(t, y)
+                for i in range(dydt.size):
+                    dydt[i] = d[i]
+            except Exception:
+                dydt[:] = np.nan
 
-    return rhs
+    def rhs_in_place(t, y, dydt, out, handle):
+        out[0], out[1], out[2] = 0.0, 0.0, -1.0
+        if dydt.size > 0:
+            try:
+                inner(t, y, dydt)
+            except Exception:
+                dydt[:] = np.nan
+
+    return rhs_in_place if fills else rhs

@@ -1,0 +1,275 @@
+"""Bodies on one axis and what pushes them: pistons, springs, dampers, forces, stops. Knows the tables; solves no step.
+
+Wraps the rhs of the fluid: first the pressures of moving chambers and what their pistons sweep, then the fluid, then
+forces and accelerations. A chamber's state is its excess mass e over what its volume V would hold at the density
+m0 / V0 of the start, so that it is the pressure that is stepped and not the small difference of two large masses:
+p - p0 = beta e / (rho0 V) under `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under `log` and `table`.
+"""
+
+from math import log, log1p, sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import density, log_density, pressure_of_log
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.network import rhs_linear
+from fvsolve.kernels.observer import events as tank_events
+from fvsolve.kernels.observer import observe_linear, record_all
+from fvsolve.kernels.records import (
+    FORCE,
+    I_ARMED,
+    I_BODIES,
+    I_BRACES,
+    I_FLOATS,
+    I_LAYOUT,
+    I_MARKS,
+    I_NODES,
+    I_PISTONS,
+    I_PROBES,
+    I_SCRATCH,
+    I_SETTINGS,
+    I_STOPS,
+    LAW_LINEAR,
+    NO_VOLUME,
+    PISTON_POSITION,
+    PISTON_VELOCITY,
+    POSITION,
+    RATE,
+    STATUS,
+    VELOCITY,
+    WHERE,
+)
+from fvsolve.kernels.schedules import schedule_value
+
+
+@njit(forceinline=True)
+def motion(body, y):
+    """(change of position since the start [m], velocity [m/s]) of a body."""
+    if body["y"] < 0:
+        return 0.0, 0.0
+    return y[body["y"]], body["velocity"] + y[body["y"] + 1]
+
+
+@njit(forceinline=True)
+def between(tables, y, i, j):
+    """(change of the distance from body i to body j, its rate)."""
+    x_i, v_i = motion(tables[I_BODIES][i], y)
+    x_j, v_j = motion(tables[I_BODIES][j], y)
+    return x_j - x_i, v_j - v_i
+
+
+@njit(forceinline=True)
+def contact(stiffness, damping, depth, speed):
+    """Force of a contact that is `depth` deep and gets deeper at `speed`; it never pulls [N]."""
+    return max(0.0, stiffness * depth + damping * speed) if depth > 0.0 else 0.0
+
+
+@njit
+def leak_flow(tables, piston, p_a, p_b):
+    """Mass flow from A to B past the piston [kg/s], at the density upstream."""
+    st = tables[I_SETTINGS][0]
+    rho = st["rho"]
+    if st["law"] != LAW_LINEAR:
+        rho = density(st, tables[I_FLOATS], max(p_a, p_b))
+    return rho * piston["leakage"] * (p_a - p_b)
+
+
+@njit
+def chamber_state(tables, node, volume, excess):
+    """(deviation of pressure [Pa], stiffness [Pa/kg]) of a moving chamber of `volume` now."""
+    st, floats = tables[I_SETTINGS][0], tables[I_FLOATS]
+    if st["law"] == LAW_LINEAR:
+        stiffness = node["stiffness"] * node["volume"] / volume
+        return stiffness * excess, stiffness
+    share = node["volume"] / volume * excess / node["mass"]
+    q0 = log(node["mass"] / (st["rho"] * node["volume"]))
+    p = pressure_of_log(st, floats, 0.0, q0 + log1p(share))
+    mass = node["mass"] * volume / node["volume"] + excess
+    return p - pressure_of_log(st, floats, 0.0, q0), 1.0 / (log_density(st, floats, p)[1] * mass)
+
+
+@njit
+def chambers(y, out, tables):
+    """Pressures and stiffness of moving chambers, and the flow that the piston and its leak take from each."""
+    layout, nodes, pistons = tables[I_LAYOUT][0], tables[I_NODES], tables[I_PISTONS]
+    for k in range(pistons.size):
+        piston = pistons[k]
+        x, speed = between(tables, y, piston["case"], piston["rod"])
+        for side in range(2):
+            i = piston["b"] if side == 1 else piston["a"]
+            area = -piston["area_b"] if side == 1 else piston["area_a"]
+            sweep = piston["sweep_b"] if side == 1 else piston["sweep_a"]
+            p, stiffness = chamber_state(tables, nodes[i], nodes[i]["volume"] + area * x, y[nodes[i]["y"]])
+            out[layout["pressure"] + i] = p
+            out[layout["stiffness"] + nodes[i]["row"]] = stiffness
+            out[layout["swept"] + nodes[i]["row"]] = sweep * speed
+        if piston["leakage"] > 0.0:
+            a, b = piston["a"], piston["b"]
+            p_a = nodes[a]["pressure"] + out[layout["pressure"] + a]
+            p_b = nodes[b]["pressure"] + out[layout["pressure"] + b]
+            leak = leak_flow(tables, piston, p_a, p_b) - piston["leak"]
+            out[layout["swept"] + nodes[a]["row"]] += leak
+            out[layout["swept"] + nodes[b]["row"]] -= leak
+
+
+@njit(forceinline=True)
+def push(out, tables, k, i, j, change, start):
+    """Book push k, `start` at the start and changed by `change`, on body j forward and on body i back."""
+    layout = tables[I_LAYOUT][0]
+    out[layout["push"] + k] = start + change
+    out[layout["net_force"] + i] -= change
+    out[layout["net_force"] + j] += change
+
+
+@njit
+def forces(t, y, out, tables):
+    """Net force on every body; what was balanced at the start and has not changed adds no bit."""
+    layout, bodies, braces = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_BRACES]
+    stops, pistons, armed = tables[I_STOPS], tables[I_PISTONS], tables[I_ARMED]
+    for i in range(bodies.size):
+        out[layout["net_force"] + i] = bodies[i]["force"]
+    for k in range(braces.size):
+        brace = braces[k]
+        x, speed = between(tables, y, brace["from_body"], brace["to_body"])
+        change = -brace["stiffness"] * x - brace["damping"] * (speed - brace["speed"])
+        if brace["schedule"] >= 0:
+            change += schedule_value(tables, brace["schedule"], t) - brace["given"]
+        push(out, tables, k, brace["from_body"], brace["to_body"], change, brace["force"])
+    first = armed.size - 2 * stops.size
+    for k in range(stops.size):
+        stop = stops[k]
+        x, speed = between(tables, y, stop["from_body"], stop["to_body"])
+        total = 0.0
+        if armed[first + 2 * k] > 0.0:
+            total += contact(stop["stiffness"], stop["damping"], -(stop["below"] + x), -speed)
+        if armed[first + 2 * k + 1] > 0.0:
+            total -= contact(stop["stiffness"], stop["damping"], x - stop["above"], speed)
+        at = braces.size + k
+        push(out, tables, at, stop["from_body"], stop["to_body"], total - stop["force"], stop["force"])
+    for k in range(pistons.size):
+        piston = pistons[k]
+        _, speed = between(tables, y, piston["case"], piston["rod"])
+        change = piston["area_a"] * out[layout["pressure"] + piston["a"]]
+        change -= piston["area_b"] * out[layout["pressure"] + piston["b"]]
+        change -= piston["damping"] * (speed - piston["speed"])
+        push(out, tables, braces.size + stops.size + k, piston["case"], piston["rod"], change, piston["force"])
+
+
+@njit(forceinline=True)
+def load(tables, i, j, stiffness, damping):
+    """Add to what holds and brakes two bodies, per mass [1/s2, 1/s], in scratch."""
+    bodies, work = tables[I_BODIES], tables[I_SCRATCH]
+    lightness = bodies[i]["lightness"] + bodies[j]["lightness"]
+    for body in (i, j):
+        work[2 * body] += lightness * stiffness
+        work[2 * body + 1] += lightness * damping
+
+
+@njit
+def mechanical_rate(out, tables):
+    """Greatest rate of a body [1/s], c / 2 + sqrt(c^2 / 4 + k) with all springs k, fluid ones too, and dampers c."""
+    layout, nodes, bodies = tables[I_LAYOUT][0], tables[I_NODES], tables[I_BODIES]
+    braces, stops, pistons = tables[I_BRACES], tables[I_STOPS], tables[I_PISTONS]
+    armed, work = tables[I_ARMED], tables[I_SCRATCH]
+    for i in range(2 * bodies.size):
+        work[i] = 0.0
+    for k in range(braces.size):
+        load(tables, braces[k]["from_body"], braces[k]["to_body"], braces[k]["stiffness"], braces[k]["damping"])
+    first = armed.size - 2 * stops.size
+    for k in range(stops.size):
+        if armed[first + 2 * k] + armed[first + 2 * k + 1] > 0.0:
+            load(tables, stops[k]["from_body"], stops[k]["to_body"], stops[k]["stiffness"], stops[k]["damping"])
+    for k in range(pistons.size):
+        piston = pistons[k]
+        stiff_a = out[layout["stiffness"] + nodes[piston["a"]]["row"]]
+        stiff_b = out[layout["stiffness"] + nodes[piston["b"]]["row"]]
+        spring = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
+        load(tables, piston["case"], piston["rod"], spring, piston["damping"])
+    rate = 0.0
+    for i in range(bodies.size):
+        if bodies[i]["y"] >= 0:
+            brake = 0.5 * work[2 * i + 1]
+            rate = max(rate, brake + sqrt(brake * brake + work[2 * i]))
+    return rate
+
+
+@njit
+def finish_bodies(t, y, dydt, out, tables):
+    """Forces, d/dt of positions and velocities, the rate; status where a piston has used up its chamber."""
+    layout, nodes, bodies = tables[I_LAYOUT][0], tables[I_NODES], tables[I_BODIES]
+    forces(t, y, out, tables)
+    out[RATE] = max(out[RATE], mechanical_rate(out, tables))
+    for k in range(tables[I_PISTONS].size):
+        for i in (tables[I_PISTONS][k]["a"], tables[I_PISTONS][k]["b"]):
+            if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:
+                out[STATUS], out[WHERE] = NO_VOLUME, i
+    if dydt.size == 0:
+        return
+    for i in range(bodies.size):
+        at = bodies[i]["y"]
+        if at >= 0:
+            dydt[at] = bodies[i]["velocity"] + y[at + 1]
+            dydt[at + 1] = out[layout["net_force"] + i] * bodies[i]["lightness"]
+
+
+@njit
+def rhs_linear_bodies(t, y, dydt, out, handle):
+    """`rhs_linear` of a scene with bodies."""
+    chambers(y, out, open_tables(handle))
+    rhs_linear(t, y, dydt, out, handle)
+    finish_bodies(t, y, dydt, out, open_tables(handle))
+
+
+@njit
+def observe_bodies(y, out, tables, values):
+    """Values of the probes that read bodies and what pushes them."""
+    layout, bodies, pistons, probes = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_PISTONS], tables[I_PROBES]
+    for k in range(probes.size):
+        kind, i = probes[k]["kind"], probes[k]["index"]
+        if kind == POSITION:
+            values[k] = bodies[i]["position"] + motion(bodies[i], y)[0]
+        elif kind == VELOCITY:
+            values[k] = motion(bodies[i], y)[1]
+        elif kind == FORCE:
+            values[k] = out[layout["push"] + i]
+        elif kind == PISTON_POSITION:
+            values[k] = pistons[i]["position"] + between(tables, y, pistons[i]["case"], pistons[i]["rod"])[0]
+        elif kind == PISTON_VELOCITY:
+            values[k] = between(tables, y, pistons[i]["case"], pistons[i]["rod"])[1]
+
+
+@njit
+def observe_linear_bodies(t, y, out, handle, values):
+    """`observe_linear` of a scene with bodies."""
+    observe_linear(t, y, out, handle, values)
+    observe_bodies(y, out, open_tables(handle), values)
+
+
+@njit
+def record_bodies(t, y, out, tables, values):
+    """`record_all`, and the first time that a piston is beyond its stroke."""
+    marks, pistons = tables[I_MARKS], tables[I_PISTONS]
+    for k in range(pistons.size):
+        piston, at = pistons[k], marks.size - pistons.size + k
+        x = piston["position"] + between(tables, y, piston["case"], piston["rod"])[0]
+        if not 0.0 <= x <= piston["stroke"] and marks[at] != marks[at]:
+            marks[at] = t
+    record_all(t, y, out, tables, values)
+
+
+@njit
+def record_linear_bodies(t, y, out, handle, values):
+    """`record_linear` of a scene with bodies."""
+    observe_linear_bodies(t, y, out, handle, values)
+    record_bodies(t, y, out, open_tables(handle), values)
+
+
+@njit
+def events_bodies(t, y, handle, g):
+    """`events`, and the room that is left before each side of a stop."""
+    tables = open_tables(handle)
+    stops = tables[I_STOPS]
+    first = g.size - 2 * stops.size
+    tank_events(t, y, handle, g[:first])
+    for k in range(stops.size):
+        x, _ = between(tables, y, stops[k]["from_body"], stops[k]["to_body"])
+        g[first + 2 * k], g[first + 2 * k + 1] = stops[k]["below"] + x, stops[k]["above"] - x

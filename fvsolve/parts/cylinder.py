@@ -1,0 +1,70 @@
+"""A piston between two chambers. Knows sizes and ports; computes no pressure and no force."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.chamber import Chamber
+from fvsolve.parts.link import Link, Ports
+from fvsolve.parts.value import Quantity, nonnegative, positive
+
+
+class Cylinder(Link, kind="cylinder"):
+    """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x), x = x_rod - x_case.
+
+    The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p from ambient,
+    and the case back by as much. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored energy: that
+    of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
+    joins: ClassVar[dict[str, str]] = {"rod": "translational", "case": "translational"}
+    owns: ClassVar[dict[str, str]] = {"A": "hydraulic", "B": "hydraulic"}
+    quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
+
+    ports: Annotated[dict[str, str], Ports(("rod", "case"))]
+    stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]")]
+    area_A: Annotated[float | None, Quantity("area", positive, "of the piston at A [m2]")] = None
+    area_B: Annotated[float | None, Quantity("area", positive, "of the piston at B, without the rod [m2]")] = None
+    piston_diameter: Annotated[float | None, Quantity("length", positive, "in place of area_A [m]")] = None
+    rod_diameter: Annotated[float | None, Quantity("length", nonnegative, "on B's side, in place of area_B [m]")] = None
+    dead_volume_A: Annotated[float, Quantity("volume", positive, "of A at x = 0 [m3]")]
+    dead_volume_B: Annotated[float, Quantity("volume", positive, "of B at x = stroke [m3]")]
+    initial_pressure_A: Annotated[
+        float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium with its links if left out")
+    ] = None
+    initial_pressure_B: Annotated[
+        float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium with its links if left out")
+    ] = None
+    leakage: Annotated[float, Quantity("leakage", nonnegative, "flow from A to B per pressure [m3/s/Pa]")] = 0.0
+    viscous_friction: Annotated[float, Quantity("damping", nonnegative, "of piston and rod [N s/m]")] = 0.0
+    elevation: Annotated[float | None, Quantity("length", about="of its chambers above datum [m]")] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given)
+        if "area_A" not in given and "piston_diameter" not in given:
+            faults.append(((), "wanted area_A or piston_diameter"))
+        if "area_B" not in given and "rod_diameter" not in given:
+            faults.append(((), "wanted area_B or rod_diameter"))
+        if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
+            faults.append((("rod_diameter",), "goes with piston_diameter; give area_B beside area_A"))
+        return faults
+
+    def areas(self) -> tuple[float, float]:
+        """Areas of the piston at A and at B [m2]."""
+        bore = self.area_A if self.area_A is not None else math.pi / 4.0 * self.piston_diameter**2
+        if self.area_B is not None:
+            return bore, self.area_B
+        return bore, math.pi / 4.0 * (self.piston_diameter**2 - self.rod_diameter**2)
+
+    def chambers(self, x: float) -> dict[str, Chamber]:
+        """Its two chambers with the piston at x [m]."""
+        a, b = self.areas()
+        volumes = {"A": self.dead_volume_A + a * x, "B": self.dead_volume_B + b * (self.stroke - x)}
+        given = {"A": self.initial_pressure_A, "B": self.initial_pressure_B}
+        return {
+            place: Chamber.model_construct(volume=volume, initial_pressure=given[place], elevation=self.elevation)
+            for place, volume in volumes.items()
+        }

@@ -1,0 +1,18 @@
+"""A viscous damper between two bodies. Knows its damping; computes no force."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fvsolve.parts.link import Coupling
+from fvsolve.parts.value import Quantity, positive
+
+
+class Damper(Coupling, kind="damper"):
+    """force = -damping (v_to - v_from).
+
+    Ports: from, to; the force pushes `to` forward. Stored energy: none. Dissipated power: damping
+    (v_to - v_from)^2 [W].
+    """
+
+    damping: Annotated[float, Quantity("damping", positive, "force per velocity [N s/m]")]

@@ -1,0 +1,26 @@
+"""What keeps two bodies within reach of one another. Knows where it touches; computes no force."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fvsolve.parts.link import Coupling
+from fvsolve.parts.table import at_least_one
+from fvsolve.parts.value import Quantity, nonnegative, positive
+
+
+class EndStop(Coupling, kind="end-stop"):
+    """Contact where x_to - x_from leaves [least, greatest], by a depth d: max(0, stiffness d + damping dd/dt) back.
+
+    Ports: from, to; the force pushes `to` forward, so it is negative at `greatest`; it never pulls. Stored energy:
+    stiffness d^2 / 2 [J]. Dissipated power: (force - stiffness d) dd/dt [W].
+    """
+
+    stiffness: Annotated[float, Quantity("stiffness", positive, "of the contact [N/m]")]
+    damping: Annotated[float, Quantity("damping", nonnegative, "of the contact [N s/m]")] = 0.0
+    least: Annotated[float | None, Quantity("position", about="x_to - x_from below which it pushes [m]")] = None
+    greatest: Annotated[float | None, Quantity("position", about="x_to - x_from above which it holds [m]")] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        return super().key_faults(given) + at_least_one(given, ("least", "greatest"))

@@ -1,0 +1,22 @@
+"""A body that moves along one axis. Knows its inertia; knows no force."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from fvsolve.parts.node import Node
+from fvsolve.parts.value import Quantity, positive
+
+
+class Mass(Node, kind="mass"):
+    """A rigid body on one axis, mass dv/dt = sum of the forces on it, dx/dt = v; two states.
+
+    Ports: those of the links that name it, velocity and force. Stored energy: mass v^2 / 2 [J]. Dissipated: none.
+    """
+
+    domain: ClassVar[str] = "translational"
+    quantities: ClassVar[dict[str, str]] = {"position": "position", "velocity": "velocity"}
+
+    mass: Annotated[float, Quantity("mass", positive, "of all that moves with it [kg]")]
+    initial_position: Annotated[float, Quantity("position", about="at the start, along the common axis [m]")] = 0.0
+    initial_velocity: Annotated[float, Quantity("velocity", about="at the start [m/s]")] = 0.0

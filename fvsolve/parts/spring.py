@@ -1,0 +1,25 @@
+"""A linear spring between two bodies. Knows its stiffness and where it is slack; computes no force."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.link import Coupling
+from fvsolve.parts.value import Quantity, nonnegative, positive
+
+
+class Spring(Coupling, kind="spring"):
+    """force = -stiffness (x_to - x_from - free_length) (81), or preload - stiffness (what the start's length grew by).
+
+    Ports: from, to; the force pushes `to` forward. Stored energy: force^2 / (2 stiffness) [J] (82). Dissipated: none.
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
+
+    stiffness: Annotated[float, Quantity("stiffness", positive, "force per length [N/m]")]
+    free_length: Annotated[float | None, Quantity("length", nonnegative, "without load [m]")] = None
+    preload: Annotated[float | None, Quantity("force", about="at the start, positive: compressed [N]")] = None
+
+    def model_post_init(self, _: Any) -> None:
+        if self.free_length is self.preload is None:
+            object.__setattr__(self, "free_length", 0.0)

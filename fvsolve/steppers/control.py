@@ -1,0 +1,91 @@
+"""How long the next step is. Knows errors and rates; takes no step."""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.steppers.orders import (
+    CONTROL,
+    COURANT,
+    END,
+    ERROR_OLD,
+    EXPLICIT,
+    KIND,
+    LAST,
+    N_MARK,
+    NEWTON_SOLVED,
+    ORDER,
+    SIZE,
+    STEP,
+    STEP_MAX,
+    STEPS,
+    T_MARK,
+    TOLERANCE,
+    T,
+)
+
+DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
+
+
+@njit(forceinline=True)
+def shortest(orders, memory):
+    """A step that no rate shortens further: a column behind a valve that shuts gets infinitely quick [s]."""
+    return 1e-13 * max(abs(memory[T]), abs(orders[END]))
+
+
+@njit(forceinline=True)
+def too_short(orders, memory, h):
+    """Whether a step would not move the time."""
+    return not h > 4e-16 * max(abs(memory[T]), abs(orders[END]))
+
+
+@njit
+def first_step(k, scale, orders, span):
+    """A cautious first step from the size of the rates [s]."""
+    total, tolerance = 0.0, orders[SIZE]
+    for i in range(scale.size):
+        total += (k[0, i] / scale[i]) ** 2
+    d = sqrt(total / max(scale.size, 1))
+    return min(span, 0.05 * tolerance ** (1.0 / (orders[ORDER] + 1.0)) / d) if d > 0.0 else 1e-3 * span
+
+
+@njit(forceinline=True)
+def next_step(orders, memory, out_rate, k, scale):
+    """Length of the step to try, before the end of the segment is looked at [s]."""
+    if orders[CONTROL] == TOLERANCE:
+        if memory[STEP] <= 0.0:
+            memory[STEP] = first_step(k, scale, orders, orders[END] - memory[T])
+        stable = orders[STEP_MAX]  # error control alone would chatter at the limit of an explicit method
+        if out_rate > 0.0 and orders[KIND] == EXPLICIT:
+            stable = 2.0 / out_rate
+        return min(memory[STEP], orders[STEP_MAX], max(stable, shortest(orders, memory)))
+    h = orders[SIZE]
+    if orders[CONTROL] == COURANT:
+        h = min(orders[SIZE] / out_rate, orders[STEP_MAX]) if out_rate > 0.0 else orders[STEP_MAX]
+        h = max(h, shortest(orders, memory))
+    if h != memory[STEP]:
+        memory[STEP], memory[T_MARK], memory[N_MARK] = h, memory[T], 0.0
+    return h
+
+
+@njit(forceinline=True)
+def reduced(orders, e):
+    """Factor on a step whose error e was too great."""
+    return max(0.1, 0.9 * e ** (-1.0 / orders[ORDER])) if e == e else 0.1
+
+
+@njit(forceinline=True)
+def grown(orders, memory, h, e):
+    """Factor on an accepted step of error e: PI control (Gustafsson 1991); predictive for implicit methods (1994)."""
+    e, old, order = max(e, 1e-10), max(memory[ERROR_OLD], 1e-4), orders[ORDER]
+    if orders[KIND] == EXPLICIT:
+        return min(5.0, max(0.2, 0.9 * e ** (-0.7 / order) * old ** (0.4 / order)))
+    grow = 0.9 * e ** (-1.0 / order)
+    if memory[ERROR_OLD] > 0.0 and memory[STEPS] > 0.0:
+        grow = min(grow, 0.9 * (h / memory[LAST]) * (old / (e * e)) ** (1.0 / order))
+    return min(8.0, max(0.2, grow))
+
+
+@njit(forceinline=True)
+def kept(orders, grow):
+    """Whether an implicit step that may grow so little keeps its length."""
+    return orders[KIND] == NEWTON_SOLVED and 1.0 <= grow <= DEAD_BAND

@@ -1,0 +1,47 @@
+"""A Jacobian by differences, a colour at a time, and its product with a vector. Knows a pattern; knows no physics."""
+
+from fvsolve.jit import njit
+from fvsolve.steppers.structure import COLOR_COLUMNS, COLOR_STARTS, COLORS, LEDGERS, ROWS, SIZE, STARTS
+
+ROOT = 2.0**-26  # the root of the rounding of a float64
+
+
+@njit(forceinline=True)
+def differences(rhs, handle, shape, where, t, y, f, supply0, scale, y_work, f_work, out, jacobian):
+    """jacobian <- d(f, supply)/dy by one-sided differences; returns the number of calls of rhs.
+
+    f, supply0 : float64[n], float64[m]  f(t, y) and out[where : where + m] at y, fresh: not a stage's derivative
+    scale : float64[n]  what counts as a small deviation is measured against; the increment is 2^-26 max(|y|, scale)
+    jacobian : float64[nnz]  in the order of the pattern, column by column
+    """
+    n = shape[SIZE]
+    starts, rows = shape[shape[STARTS] :], shape[shape[ROWS] :]
+    color_starts, columns = shape[shape[COLOR_STARTS] :], shape[shape[COLOR_COLUMNS] :]
+    for j in range(n):
+        y_work[j] = y[j]
+    for color in range(shape[COLORS]):
+        for e in range(color_starts[color], color_starts[color + 1]):
+            j = columns[e]
+            y_work[j] = y[j] + ROOT * max(abs(y[j]), scale[j])
+        rhs(t, y_work, f_work, out, handle)
+        for e in range(color_starts[color], color_starts[color + 1]):
+            j = columns[e]
+            per = 1.0 / (y_work[j] - y[j])  # what the sum has kept of the increment
+            for p in range(starts[j], starts[j + 1]):
+                i = rows[p]
+                change = f_work[i] - f[i] if i < n else out[where + i - n] - supply0[i - n]
+                jacobian[p] = change * per
+            y_work[j] = y[j]
+    return shape[COLORS]
+
+
+@njit
+def multiply(shape, jacobian, x, product):
+    """product <- J x : float64[n + m], states then ledger rows."""
+    n = shape[SIZE]
+    starts, rows = shape[shape[STARTS] :], shape[shape[ROWS] :]
+    for i in range(n + shape[LEDGERS]):
+        product[i] = 0.0
+    for j in range(n):
+        for p in range(starts[j], starts[j + 1]):
+            product[rows[p]] += jacobian[p] * x[j]

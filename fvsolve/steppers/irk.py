@@ -1,0 +1,307 @@
+"""One fully implicit Runge-Kutta step, all stages at once by simplified Newton. Knows arrays; controls nothing.
+
+Z are the increments of the q stages and K = (h A)^-1 (Z - h a_0 k_0) their slopes, with a_0 the weights of an explicit
+first stage. A^-1 = T L T^-1, L block diagonal with a real shift for every real eigenvalue and a complex one for every
+pair (Butcher 1976; Hairer and Wanner 1996, IV.8). With W = T^-1 Z Newton solves
+(L / h x I - I x J) dW = T^-1 (F - K), block by block.
+"""
+
+from __future__ import annotations
+
+import functools
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.jit import inner, njit
+from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
+from fvsolve.steppers.newton import (
+    CONVERGED,
+    FAILED,
+    HAS,
+    HEADER,
+    INCREMENT,
+    KNOWN,
+    MADE,
+    MOST,
+    RATE,
+    SHIFT,
+    STAGES,
+    STORE,
+    WEIGHTS,
+    begin,
+    book_increment,
+    find_worst,
+    renew,
+    size_of,
+    verdict,
+)
+from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
+from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.structure import SIZE as STATES
+from fvsolve.steppers.structure import STARTS
+from fvsolve.steppers.tableau import Method
+
+# Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
+T, BACK, BLOCKS, SLOPES, AHEAD, START = range(6)
+# Rows of `vectors` for all stages, from STAGES on, q at a time: W, F, residuals and what solves them.
+W, F, R = range(3)
+
+
+def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
+    """[T, T^-1, L, T L, T^-1 P, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
+
+    Pairs in L stand as [[a, -b], [b, a]], b > 0. P, ahead : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of
+    the j-th Lagrange polynomial on c: what the last step's slopes say of this one; zero where c repeats.
+    Raises LinAlgError for a singular A, ValueError for one without a basis of eigenvectors.
+    """
+    q = len(c)
+    inverse = np.linalg.inv(a)
+    values, vectors = np.linalg.eig(inverse)
+    t, blocks = np.zeros((q, q)), np.zeros((q, q))
+    real = np.abs(values.imag) <= 1e-12 * np.abs(values)
+    at = 0
+    for i in [*np.flatnonzero(real), *np.flatnonzero(~real & (values.imag > 0))]:
+        v = vectors[:, i] / np.abs(vectors[:, i]).max()
+        if real[i]:
+            t[:, at], blocks[at, at], at = v.real, values[i].real, at + 1
+        else:  # A^-1 (u - i w) = (a + i b) (u - i w): on the basis u, w it is [[a, -b], [b, a]]
+            t[:, at], t[:, at + 1] = v.real, -v.imag
+            blocks[at : at + 2, at : at + 2] = [[values[i].real, -values[i].imag], [values[i].imag, values[i].real]]
+            at += 2
+    if at < q or np.linalg.cond(t) > 1e8:
+        raise ValueError("no basis of eigenvectors")
+    back, ahead = np.linalg.inv(t), np.zeros((q, q))
+    if len(np.unique(c)) == q:
+        lagrange = np.linalg.inv(np.vander(c - 1.0, increasing=True))  # in x, by columns
+        ahead = (lagrange / (1.0 + np.arange(q))[:, None]).T
+    parts = (t, back, blocks, t @ blocks, ahead, back @ inverse @ a0, inverse @ a0)
+    return np.concatenate([part.ravel() for part in parts])
+
+
+@functools.cache
+def pairs_of(method: Method) -> int:
+    """Number of complex pairs among the eigenvalues of A^-1."""
+    a = method.a[1:, 1:] if not method.a[0].any() else method.a
+    return int(np.count_nonzero(np.linalg.eigvals(a).imag > 0))
+
+
+@njit(inline="always")
+def matrix(coefficients, s, which):
+    """One of the matrices of `transformed`, flat, and what follows it."""
+    return coefficients[s * s + 3 * s + which * (s - 1) * (s - 1) :]
+
+
+@njit
+def blend(keep, base, m, at, q, first, vectors, target):
+    """target = keep base + sum of m[at + j] vectors[first + j] over j < q; three terms a pass."""
+    n = target.size
+    for j in range(0, q, 3):
+        v0, v1, v2 = vectors[first + j], vectors[first + min(j + 1, q - 1)], vectors[first + min(j + 2, q - 1)]
+        c0, c1, c2 = m[at + j], m[at + j + 1] if j + 1 < q else 0.0, m[at + j + 2] if j + 2 < q else 0.0
+        if j > 0:
+            for e in range(n):
+                target[e] += c0 * v0[e] + (c1 * v1[e] + c2 * v2[e])
+        else:
+            for e in range(n):
+                target[e] = keep * base[e] + (c0 * v0[e] + (c1 * v1[e] + c2 * v2[e]))
+
+
+@inner
+def predict(coefficients, h, h_last, s, room, vectors):
+    """W <- T^-1 of the increments that the last step's slopes promise for this step's stages; room : float64[q q]."""
+    q, c = s - 1, nodes_of(coefficients, s)
+    back, ahead = matrix(coefficients, s, BACK), matrix(coefficients, s, AHEAD)
+    for e in range(q * q):
+        room[e] = 0.0
+    for k in range(q):
+        x = c[k + 1] * h / h_last
+        for j in range(q):
+            w = 0.0
+            for d in range(q - 1, -1, -1):
+                w = (w + ahead[j * q + d]) * x
+            for i in range(q):
+                room[i * q + j] += back[i * q + k] * w * h_last
+    for i in range(q):
+        blend(0.0, vectors[s + WEIGHTS], room, i * q, q, 1, vectors, vectors[s + STAGES + i])
+
+
+@inner
+def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n, memory):
+    """Factors for every block of L / h behind one another; False without a pivot."""
+    q, blocks, b, real, pair = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n
+    jacobian, size = work[HEADER:], int(work[STORE])
+    while b < q:
+        shift = blocks[b * q + b] / h
+        memory[FACTORS] += 1.0
+        if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
+            if factor_complex(shape, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), store_complex[pair:]) != 0:
+                return False
+            b, pair = b + 2, pair + size
+        else:
+            if factor(shape, jacobian, shift, store[real:]) != 0:
+                return False
+            b, real = b + 1, real + size
+    return True
+
+
+@inner
+def solve_blocks(solve, solve_complex, shape, coefficients, s, size, store, store_complex, vectors):
+    """(L / h x I - I x J) dW = R, in place of R."""
+    q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
+    first, pair, both = s + STAGES + R * q, n, store_complex[:n]
+    while b < q:
+        if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
+            u, v = vectors[first + b], vectors[first + b + 1]
+            for e in range(n):
+                both[e] = complex(u[e], v[e])
+            solve_complex(shape, store_complex[pair:], both)
+            for e in range(n):
+                u[e], v[e] = both[e].real, both[e].imag
+            b, pair = b + 2, pair + size
+        else:
+            solve(shape, store[real:], vectors[first + b])
+            b, real = b + 1, real + size
+
+
+@inner
+def iterate(
+    rhs, solve, solve_complex, handle, coefficients, shape, t, h, y, y_stage, k0, supply, where, out, orders, memory,
+    work, vectors, store, store_complex,
+):  # fmt: skip
+    """Newton on W; returns CONVERGED or FAILED."""
+    s, n = supply.shape[0], y.size
+    q, c, weights = s - 1, nodes_of(coefficients, s), vectors[s + WEIGHTS]
+    t_matrix, back, blocks = matrix(coefficients, s, T), matrix(coefficients, s, BACK), matrix(coefficients, s, BLOCKS)
+    start = matrix(coefficients, s, START)
+    w_at, f_at, r_at = s + STAGES + W * q, s + STAGES + F * q, s + STAGES + R * q
+    before, why = 0.0, FAILED
+    for turn in range(MOST):
+        for i in range(q):
+            blend(1.0, y, t_matrix, i * q, q, w_at, vectors, y_stage)
+            rhs(t + c[i + 1] * h, y_stage, vectors[f_at + i], out, handle)
+            for m in range(supply.shape[1]):
+                supply[i + 1, m] = out[where + m]
+        memory[CALLS] += q
+        memory[NEWTON] += 1.0
+        for i in range(q):
+            blend(start[i], k0, back, i * q, q, f_at, vectors, vectors[r_at + i])
+            j = i
+            if i + 1 < q and blocks[(i + 1) * q + i] != 0.0:
+                j = i + 1
+            elif i > 0 and blocks[i * q + i - 1] != 0.0:
+                j = i - 1
+            own, other = -blocks[i * q + i] / h, -blocks[i * q + j] / h if j != i else 0.0
+            r, wi, wj = vectors[r_at + i], vectors[w_at + i], vectors[w_at + j]
+            for e in range(n):
+                r[e] += own * wi[e] + other * wj[e]
+        solve_blocks(solve, solve_complex, shape, coefficients, s, int(work[STORE]), store, store_complex, vectors)
+        total = 0.0
+        for i in range(q):
+            r, wi = vectors[r_at + i], vectors[w_at + i]
+            for e in range(n):
+                wi[e] += r[e]
+            total += size_of(r, weights)
+        size = sqrt(total / (q * n))
+        done, why = verdict(turn, size, before, orders, work)
+        before = size
+        if done:
+            break
+    if why == FAILED:
+        find_worst(vectors[r_at], weights, memory)
+    return why
+
+
+@inner
+def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
+    """Slopes k of the stages from W; ledger rates of the stages from those of the last f and its last increment."""
+    s = k.shape[0]
+    q, d = s - 1, vectors[s + INCREMENT]
+    slopes, start, room = matrix(coefficients, s, SLOPES), matrix(coefficients, s, START), work[work.size - q * q :]
+    for e in range(q * q):
+        room[e] = slopes[e] / h
+    for i in range(q):
+        blend(-start[q + i], k[0], room, i * q, q, s + STAGES + W * q, vectors, k[i + 1])
+        if supply.shape[1] > 0:
+            blend(0.0, k[0], matrix(coefficients, s, T), i * q, q, s + STAGES + R * q, vectors, d)
+            book_increment(shape, nnz, d, supply, i + 1, work)
+
+
+@inner
+def filtered_error(
+    rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store
+):
+    """The embedded solution's difference, smoothed by the first factor; once more from there if it is great.
+
+    e = (I - h g J)^-1 h (e_0 f(t, y) + sum of e_i k_i), 1 / g the real eigenvalue of A^-1 (Hairer and Wanner IV.8).
+    """
+    s, n = k.shape
+    error, d, f = error_of(coefficients, s), vectors[s + INCREMENT], vectors[s + RATE]
+    shift, found = matrix(coefficients, s, BLOCKS)[0], 0.0
+    for turn in range(2):
+        for e in range(n):
+            total = error[0] * (f[e] if turn == 1 else k[0, e])
+            for j in range(1, s):
+                total += error[j] * k[j, e]
+            d[e] = total * shift
+        solve(shape, store, d)
+        found = 0.0
+        for e in range(n):
+            w = d[e] / (orders[SIZE] * (scale[e] + max(abs(y[now, e]), abs(y[new, e]))))
+            found += w * w
+        found = sqrt(found / n)
+        if found < 1.0 or turn == 1:
+            break
+        for e in range(n):
+            y[3, e] = y[now, e] + d[e]
+        rhs(t, y[3], f, out, handle)
+        memory[CALLS] += 1.0
+    return found
+
+
+@njit
+def attempt(
+    rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
+    where, out, scale, orders, memory, work, vectors, store, store_complex,
+):  # fmt: skip
+    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+
+    Returns NEWTON_FAILED where a fresh Jacobian does not help.
+    """
+    s, n = k.shape
+    nnz = shape[shape[STARTS] + shape[STATES]]
+    q, error = s - 1, error_of(coefficients, s)
+    begin(k, y[now], scale, orders, memory, work, vectors)
+    while True:
+        if work[HAS] == 0.0:
+            renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+        why = FAILED
+        if work[SHIFT] != 1.0 / h:
+            work[SHIFT] = 0.0
+            if factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n, memory):
+                work[SHIFT] = 1.0 / h
+        if work[SHIFT] != 0.0:
+            if work[KNOWN] == 1.0:
+                predict(coefficients, h, memory[LAST], s, work[work.size - q * q :], vectors)
+            else:
+                for i in range(q):
+                    for e in range(n):
+                        vectors[s + STAGES + i, e] = 0.0
+            why = iterate(
+                rhs, solve, solve_complex, handle, coefficients, shape, t, h, y[now], y[3], k[0], supply, where, out,
+                orders, memory, work, vectors, store, store_complex,
+            )  # fmt: skip
+        if why == CONVERGED:
+            break
+        if work[MADE] == memory[STEPS]:
+            return NEWTON_FAILED
+        work[HAS] = 0.0
+    finish(coefficients, shape, nnz, h, k, supply, work, vectors)
+    combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
+    if orders[CONTROL] != TOLERANCE:
+        return 0.0
+    if error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0:
+        return filtered_error(
+            rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store
+        )
+    return error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])

@@ -1,0 +1,121 @@
+"""What implicit steps share: Jacobian and factors and when to renew them, stopping of Newton. Knows no tableau.
+
+Kept between steps: `work`, a header and the Jacobian; the first rows of `vectors`, the last step's stages. A restart
+stores both and factors anew: factors follow from the Jacobian and the shift to the last bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.jit import inner
+from fvsolve.steppers.differences import differences, multiply
+from fvsolve.steppers.orders import CALLS, CONTROL, JACOBIANS, LAST, SIZE, STEPS, TOLERANCE, WORST
+from fvsolve.steppers.step import copy
+
+# The header of `work`: whether there is a Jacobian, the step it was made at, whether the last step's stages are known,
+# the step that the present stages belong to, the shift factored last (0: none), the worst ratio of two increments
+# of a step, the last such ratio / (1 - ratio), and the size of a factor.
+HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, STORE = range(8)
+HEADER = 8
+# Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
+# what a stage starts from; then, for fully implicit methods, transformed increments, f and residuals of all stages.
+FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, STAGES = range(7)
+
+MOST = 10  # iterations
+FIXED = 1e-13  # accuracy of a step that is given, relative
+STALLED = 1e-9  # below it an iteration that no longer gains has met rounding
+ENOUGH = 0.05  # of the tolerance
+STALE = 0.03  # a Jacobian that gains less than this in an iteration is made anew for the next step
+CONVERGED, FAILED = 0, 1
+
+
+def forget(work: np.ndarray) -> None:
+    """Keep nothing over a kink: no Jacobian, no stages to go on from."""
+    work[:STORE] = 0.0
+    work[SEEN], work[SURE] = -1.0, 1.0
+
+
+@inner
+def begin(k, y, scale, orders, memory, work, vectors):
+    """At the first try of a step: keep the last stages to go on from; judge the Jacobian by their iterations."""
+    s, n = k.shape
+    if work[SEEN] == memory[STEPS]:
+        return
+    tolerance = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
+    weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
+    for i in range(n):
+        weights[i] = 1.0 / (tolerance * (scale[i] + abs(y[i])))
+        last[i], first[i] = first[i], k[0, i]
+    for j in range(1, s):
+        copy(k[j], vectors[j])
+    work[KNOWN] = 1.0 if work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0 else 0.0
+    if work[RATIO] > STALE:
+        work[HAS] = 0.0
+    work[SEEN], work[RATIO] = memory[STEPS], 0.0
+
+
+@inner
+def renew(rhs, handle, shape, where, t, y, k, supply, scale, out, memory, work, vectors):
+    """The Jacobian at the start of the step, from the fresh f there."""
+    s = k.shape[0]
+    calls = differences(
+        rhs, handle, shape, where, t, y, k[0], supply[0], scale, vectors[s + MOVED], vectors[s + RATE], out,
+        work[HEADER:],
+    )  # fmt: skip
+    memory[CALLS] += calls
+    memory[JACOBIANS] += 1.0
+    work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, memory[STEPS], 0.0, 0.0
+
+
+@inner
+def size_of(d, weights):
+    """Sum of squares of an increment in units of the tolerance."""
+    total = 0.0
+    for i in range(weights.size):
+        total += (d[i] * weights[i]) * (d[i] * weights[i])
+    return total
+
+
+@inner
+def find_worst(d, weights, memory):
+    """Note the component that moves most against its tolerance, or that is no number."""
+    worst = -1.0
+    for i in range(weights.size):
+        e = abs(d[i] * weights[i])
+        if not e <= worst:
+            worst, memory[WORST] = e, i
+
+
+@inner
+def verdict(turn, size, before, orders, work):
+    """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
+    fixed = orders[CONTROL] != TOLERANCE
+    enough = 1.0 if fixed else max(1e-15 / orders[SIZE], ENOUGH)
+    if not size < np.inf:
+        return True, FAILED
+    if turn > 0:
+        ratio = size / before if before > 0.0 else 0.0
+        stalled = size * FIXED <= STALLED if fixed else size * orders[SIZE] <= 1e-14
+        if ratio >= 0.3 and stalled:
+            return True, CONVERGED
+        work[RATIO] = max(work[RATIO], ratio)
+        if ratio >= 0.99:
+            return True, FAILED
+        work[SURE] = ratio / (1.0 - ratio)
+        if work[SURE] * size * ratio ** (MOST - 1 - turn) > enough:
+            return True, FAILED
+    else:
+        work[SURE] = max(work[SURE], 1e-16) ** 0.8
+    if work[SURE] * size <= enough:
+        return True, CONVERGED
+    return turn == MOST - 1, FAILED
+
+
+@inner
+def book_increment(shape, nnz, d, supply, i, work):
+    """Add to the ledger rates of stage i what the last increment d of its state changes in them, by that Jacobian."""
+    n, product = d.size, work[HEADER + nnz :]
+    multiply(shape, work[HEADER : HEADER + nnz], d, product)
+    for m in range(supply.shape[1]):
+        supply[i, m] += product[n + m]

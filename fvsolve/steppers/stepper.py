@@ -1,0 +1,115 @@
+"""The arrays that one run of the time loop works on, for any method and any number of states. Knows no model."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+
+import numpy as np
+
+from fvsolve.jit import argument
+from fvsolve.steppers import orders as told
+from fvsolve.steppers.coefficients import coefficients
+from fvsolve.steppers.march import compiled, compiled_step, no_algebra
+from fvsolve.steppers.rosenbrock import Rosenbrock
+from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.tableau import Method
+
+
+class Stepper:
+    """Buffers of one run by one method, and the compiled functions that are the method's.
+
+    structure : of the Jacobian, for implicit methods; scale : float64[n], what small deviations are measured against;
+    ledgers : rows of rates beside dydt.
+    """
+
+    def __init__(self, method: Method, n: int, ledgers: int, structure: Structure | None, scale: np.ndarray) -> None:
+        self.method, self.scale = method, scale
+        self.coefficients, self.dense, s = coefficients(method)
+        self.march, self.attempt, self.algebra = compiled(), attempt_of(method), no_algebra()
+        self.shape, self.work, self.vectors = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, n))
+        self.store, self.store_complex = np.zeros(0), np.zeros(0, dtype=complex)
+        if not method.explicit:
+            self.solve_by(structure, s, n, ledgers)
+        self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
+        self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(2 * ledgers)
+        self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
+        self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
+        self.flags = np.array([told.FRESH, 0, 0, 1, 0], dtype=np.int64)
+        self.orders[told.ORDER] = method.control_order
+        self.orders[told.FSAL] = method.explicit and method.first_same_as_last
+        self.orders[told.KIND] = KINDS[kind_of(method)]
+        self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
+        self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
+        self.g = self.g_new = self.none
+        self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
+
+    def solve_by(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
+        """Room and functions for Newton's linear algebra."""
+        from fvsolve.steppers import newton
+
+        q = pairs = 0
+        if kind_of(self.method) == "irk":
+            from fvsolve.steppers.irk import pairs_of
+
+            q, pairs = s - 1, pairs_of(self.method)
+        reals = q - 2 * pairs if q else 1
+        size, self.shape = structure.store_size, structure.shape
+        self.work = np.zeros(newton.HEADER + structure.nnz + n + 2 * ledgers + q * q)
+        self.work[newton.STORE] = size
+        self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
+        self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
+        real = arguments(structure.functions()) if reals else no_algebra()[:2]
+        self.algebra = (*real, *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]))
+        newton.forget(self.work)
+
+    @property
+    def dense_order(self) -> int:
+        """Order of what stands between steps: of the method's polynomial, else of the cubic through both ends."""
+        return min(self.dense.shape[1], self.method.order) if self.dense.size else 3
+
+    def forget(self) -> None:
+        """Remember nothing over a kink but what has been counted."""
+        self.memory[told.STEP] = self.memory[told.ERROR_OLD] = 0.0
+        if self.work.size:
+            from fvsolve.steppers.newton import forget
+
+            forget(self.work)
+
+    def counts(self) -> dict[str, int]:
+        """How much work the run was."""
+        return {name: int(self.memory[at]) for name, at in told.COUNTS.items()}
+
+    def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
+        """March on; returns one of the codes of `steppers.orders`."""
+        return self.march(
+            self.attempt, leap, observe, record, events, rhs, *self.algebra, handle, self.coefficients, self.shape,
+            self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.supply,
+            where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
+            self.stored, self.carry, self.y_out, self.rows, self.work, self.vectors, self.store,
+            self.store_complex,
+        )  # fmt: skip
+
+
+@functools.cache
+def arguments(functions: tuple) -> tuple:
+    """Compiled functions as the loop takes them."""
+    return tuple(argument(function) for function in functions)
+
+
+# Files of steps, and what they are to the loop.
+KINDS = {"erk": told.EXPLICIT, "dirk": told.NEWTON_SOLVED, "irk": told.NEWTON_SOLVED, "ros": told.LINEARLY_IMPLICIT}
+
+
+@functools.cache
+def kind_of(method: Method) -> str:
+    """Which file of steps takes a method's: explicit, stages in turn, stages at once, or linearly implicit."""
+    if isinstance(method, Rosenbrock):
+        return "ros"
+    return "erk" if method.explicit else "dirk" if method.diagonally_implicit else "irk"
+
+
+@functools.cache
+def attempt_of(method: Method):
+    """The compiled step of a method; each kind is compiled only where it is used."""
+    return compiled_step(importlib.import_module(f"fvsolve.steppers.{kind_of(method)}").attempt)

@@ -1,0 +1,145 @@
+"""Where a Jacobian may differ from zero, how its columns are grouped for differences, and how it is factored.
+
+Knows one flat array of integers that every compiled function reads: a header of lengths and offsets, the pattern
+by columns, the columns by colour, and behind them what the kind of factorisation needs. Knows no physics.
+"""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError, nearest
+
+# The header: lengths, then offsets into the same array.
+SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
+STARTS, ROWS, COLOR_STARTS, COLOR_COLUMNS, OWN = 3, 4, 5, 6, 7  # pattern by columns; columns by colour; the kind's own
+HEADER = 8
+
+KINDS = ("dense", "banded", "sparse")
+SMALL = 24  # states up to which dense is chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A Jacobian's pattern and the linear algebra chosen for it.
+
+    pattern : bool[n + m, n], sparse by columns: n states, then m ledger rows that are no part of the factorisation
+    kind : "dense", "banded" or "sparse"; chosen by n and the pattern where None. Raises FvsolveError for another.
+    """
+
+    pattern: Any
+    kind: str | None = None
+
+    def __post_init__(self) -> None:
+        from scipy.sparse import csc_array
+
+        pattern = csc_array(self.pattern, dtype=bool)
+        pattern.sum_duplicates()
+        pattern.eliminate_zeros()
+        pattern.sort_indices()
+        if pattern.shape[0] < pattern.shape[1]:
+            raise FvsolveError(f"a pattern of shape {pattern.shape} has fewer rows than states")
+        if self.kind is not None and self.kind not in KINDS:
+            near = nearest(str(self.kind), KINDS)
+            hint = f'did you mean "{near}"?' if near else f"there are {', '.join(KINDS)}"
+            raise FvsolveError(f'no kind of structure named "{self.kind}"; {hint}')
+        object.__setattr__(self, "pattern", pattern)
+        if self.kind is None:
+            object.__setattr__(self, "kind", choose(pattern))
+
+    @classmethod
+    def full(cls, n: int, m: int = 0) -> Structure:
+        """The structure of a function of which nothing is known: dense, one colour a column."""
+        return cls(np.ones((n + m, n), dtype=bool), "dense")
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return self.pattern.shape[1]
+
+    @property
+    def m(self) -> int:
+        """Number of ledger rows below the states."""
+        return self.pattern.shape[0] - self.pattern.shape[1]
+
+    @property
+    def nnz(self) -> int:
+        """Number of entries of the pattern, ledger rows included."""
+        return int(self.pattern.indptr[-1])
+
+    @cached_property
+    def colors(self) -> np.ndarray:
+        """int64[n]: columns of one colour share no row, ledger rows included."""
+        from fvsolve.steppers.colors import colors
+
+        return colors(self.pattern)
+
+    @property
+    def color_count(self) -> int:
+        """Number of colours: what a Jacobian costs in evaluations."""
+        return int(self.colors.max(initial=-1)) + 1
+
+    @cached_property
+    def _own(self) -> tuple[np.ndarray, int]:
+        """(what the kind's compiled functions read behind the pattern, length of its store)."""
+        return kind_module(self.kind).prepare(self.pattern)
+
+    @cached_property
+    def shape(self) -> np.ndarray:
+        """int64[:] that every compiled function reads."""
+        counts = np.bincount(self.colors, minlength=self.color_count)
+        color_starts = np.concatenate(([0], np.cumsum(counts)))
+        parts = [self.pattern.indptr, self.pattern.indices, color_starts, np.argsort(self.colors, kind="stable")]
+        parts.append(self._own[0])
+        offsets = HEADER + np.cumsum([0] + [part.size for part in parts[:-1]])
+        header = [self.n, self.m, self.color_count, *offsets]
+        return np.concatenate([np.asarray(part, dtype=np.int64) for part in (header, *parts)])
+
+    @property
+    def store_size(self) -> int:
+        """Length of the array that holds a factor."""
+        return self._own[1]
+
+    def functions(self, complex: bool = False) -> tuple:
+        """(factor, solve) of this kind, compiled on first use for real or for complex shifts alone.
+
+        factor(shape, jacobian, shift, store) -> 0, or 1 + the state at which shift I - J has no good pivot;
+        solve(shape, store, x) -> None, in place.
+        """
+        return functions(self.kind, complex)
+
+
+def choose(pattern) -> str:
+    """The kind of factorisation that is quickest for a pattern, from its size and bandwidth."""
+    return "dense" if pattern.shape[1] <= SMALL else "sparse"
+
+
+def kind_module(kind: str):
+    """The file that knows one kind."""
+    return importlib.import_module(f"fvsolve.steppers.linear_{kind}")
+
+
+@cache
+def functions(kind: str, complex: bool) -> tuple:
+    """(factor, solve) of a kind, each compiled for one signature."""
+    from fvsolve.jit import njit
+
+    module = kind_module(kind)
+    factor, solve = njit(module.factor), njit(module.solve)
+    if hasattr(factor, "compile"):
+        from numba import types
+
+        shape, values = types.int64[::1], types.float64[::1]
+        number = types.complex128 if complex else types.float64
+        for function, signature in (
+            (factor, (shape, values, number, number[::1])),
+            (solve, (shape, number[::1], number[::1])),
+        ):
+            function.compile(signature)
+            function.disable_compile()
+    return factor, solve

@@ -1,0 +1,135 @@
+"""Factors, solutions and differences are those of the matrix they come from, whatever the kind of structure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array
+
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers.differences import differences, multiply
+from fvsolve.steppers.structure import Structure
+
+KINDS = ("dense", "banded", "sparse")
+
+
+def pattern_of(n: int, m: int = 0, density: float = 0.2, seed: int = 0) -> np.ndarray:
+    """A random pattern with a diagonal."""
+    found = np.random.default_rng(seed).random((n + m, n)) < density
+    found[np.arange(n), np.arange(n)] = True
+    return found
+
+
+def values_on(structure: Structure, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """(values by columns, the same as a dense matrix of n + m rows)."""
+    values = np.random.default_rng(seed).normal(size=structure.nnz)
+    pattern = structure.pattern
+    return values, csc_array((values, pattern.indices, pattern.indptr), shape=pattern.shape).toarray()
+
+
+def solved(structure: Structure, values: np.ndarray, shift, b: np.ndarray) -> np.ndarray:
+    """(shift I - J)^-1 b by the compiled functions."""
+    number = complex if isinstance(shift, complex) else float
+    factor, solve = structure.functions(number is complex)
+    store, x = np.full(structure.store_size, np.nan, dtype=number), b.astype(number)
+    assert factor(structure.shape, values, shift, store) == 0
+    solve(structure.shape, store, x)
+    return x
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("n, m", [(1, 0), (2, 1), (5, 0), (12, 3), (40, 2)])
+@pytest.mark.parametrize("shift", [30.0, 20.0 + 25.0j])
+def test_what_is_solved_is_the_shifted_matrix(kind, n, m, shift):
+    structure = Structure(pattern_of(n, m), kind)
+    values, dense = values_on(structure)
+    b = np.random.default_rng(1).normal(size=n)
+    x = solved(structure, values, shift, b)
+    assert (shift * np.eye(n) - dense[:n]) @ x == pytest.approx(b, rel=1e-11, abs=1e-11)
+
+
+def test_dense_exchanges_rows_where_a_pivot_is_zero():
+    structure = Structure.full(3)
+    j = np.array([[1.0, 2.0, 3.0], [4.0, 1.0, 6.0], [7.0, 8.0, 0.0]])  # shift 1 makes two pivots zero
+    b = np.array([1.0, -2.0, 0.5])
+    x = solved(structure, j.T.ravel().copy(), 1.0, b)
+    assert (np.eye(3) - j) @ x == pytest.approx(b, rel=1e-13)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("number", [float, complex])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_not_a_number_is_never_hidden(kind, number, bad):
+    structure = Structure(pattern_of(6, 1, density=0.5), kind)
+    factor, _ = structure.functions(number is complex)
+    store = np.zeros(structure.store_size, dtype=number)
+    for e in np.flatnonzero(structure.pattern.indices < 6):
+        values, _ = values_on(structure)
+        values[e] = bad
+        code = factor(structure.shape, values, number(50.0), store)
+        assert 1 <= code <= 6
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_singular_matrix_is_reported(kind):
+    structure = Structure(np.eye(4, dtype=bool), kind)
+    factor, _ = structure.functions()
+    store = np.zeros(structure.store_size)
+    assert factor(structure.shape, np.array([1.0, 2.0, 5.0, 3.0]), 5.0, store) == 3
+    assert factor(structure.shape, np.array([1.0, 2.0, 4.0, 3.0]), 5.0, store) == 0
+    whole = Structure.full(3)
+    rank_one = np.ones(9)
+    assert whole.functions()[0](whole.shape, rank_one, 3.0, np.zeros(whole.store_size)) > 0  # shift is its eigenvalue
+
+
+def test_a_kind_that_does_not_exist_is_refused():
+    with pytest.raises(FvsolveError, match='no kind of structure named "bandad"; did you mean "banded"'):
+        Structure(np.eye(2, dtype=bool), "bandad")
+    with pytest.raises(FvsolveError, match="fewer rows than states"):
+        Structure(np.ones((1, 2), dtype=bool))
+
+
+# differences ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n, m, density", [(1, 0, 1.0), (7, 2, 0.3), (60, 5, 0.05), (60, 5, 1.0)])
+def test_columns_of_one_color_share_no_row(n, m, density):
+    structure = Structure(pattern_of(n, m, density))
+    dense = structure.pattern.toarray()
+    assert structure.colors.min() == 0
+    for color in range(structure.color_count):
+        assert np.all(dense[:, structure.colors == color].sum(axis=1) <= 1)
+
+
+def test_a_band_needs_no_more_colors_than_its_width():
+    n = 300
+    distance = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    assert Structure(distance <= 2).color_count == 5
+
+
+@pytest.mark.parametrize("n, m, density", [(1, 0, 1.0), (7, 2, 0.3), (40, 4, 0.1)])
+def test_differences_meet_the_slopes(n, m, density):
+    """f = sin of a linear map, and the ledger likewise: the slope is known."""
+    structure = Structure(pattern_of(n, m, density))
+    _, a = values_on(structure)
+    where = 2
+
+    def rhs(t, y, dydt, out, handle):
+        found = np.sin(a @ y + t)
+        dydt[:], out[where : where + m] = found[:n], found[n:]
+
+    y = np.random.default_rng(2).normal(size=n)
+    f, f_work, y_work, out = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(where + m)
+    rhs(0.3, y, f, out, None)
+    supply = out[where:].copy()
+    jacobian = np.full(structure.nnz, np.nan)
+    python = getattr(differences, "py_func", differences)
+    calls = python(rhs, None, structure.shape, where, 0.3, y, f, supply, np.ones(n), y_work, f_work, out, jacobian)
+    assert calls == structure.color_count
+    slope = np.cos(a @ y + 0.3)[:, None] * a
+    pattern = structure.pattern
+    found = csc_array((jacobian, pattern.indices, pattern.indptr), shape=pattern.shape).toarray()
+    assert found == pytest.approx(slope, abs=2e-6)
+    x, product = np.random.default_rng(3).normal(size=n), np.zeros(n + m)
+    multiply(structure.shape, jacobian, x, product)
+    assert product == pytest.approx(found @ x, rel=1e-12, abs=1e-13)
