@@ -1,4 +1,4 @@
-"""Runge-Kutta methods as they are stepped: order, error control, what is refused."""
+"""`integrate`: what it accepts, and what it refuses. What its steps do is in test_stepped_methods.py."""
 
 from __future__ import annotations
 
@@ -12,36 +12,6 @@ import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.methods import METHODS
 from fvsolve.steppers.ode import integrate
-
-EXPLICIT = [
-    "euler", "improved-euler", "modified-euler", "heun", "rk4", "ssp-rk2", "ssp-rk3", "bogacki-shampine",
-    "dormand-prince",
-]  # fmt: skip
-
-
-@njit
-def pendulum(t, y):
-    """A nonlinear, non-autonomous system whose trees all count."""
-    return np.array([y[1], -np.sin(y[0]) + 0.3 * np.cos(t)])
-
-
-@pytest.fixture(scope="module")
-def truth() -> np.ndarray:
-    return integrate(pendulum, [1.0, 0.2], [0.0, 2.0], "dormand-prince", step=1e-3)[-1]
-
-
-@pytest.mark.parametrize("name", EXPLICIT)
-def test_the_compiled_stepper_shows_the_order(name, truth):
-    steps = np.array([0.1, 0.05, 0.025])
-    errors = [np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 2.0], name, step=h)[-1] - truth) for h in steps]
-    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(METHODS[name].order, abs=0.35)
-
-
-@pytest.mark.parametrize("name", ["bogacki-shampine", "dormand-prince"])
-@pytest.mark.parametrize("rtol", [1e-4, 1e-7])
-def test_error_control_keeps_near_its_tolerance(name, rtol, truth):
-    error = np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 2.0], name, rtol=rtol)[-1] - truth)
-    assert 1e-4 * rtol < error < 20 * rtol
 
 
 def test_a_function_that_numba_refuses_gives_the_same_steps():

@@ -150,6 +150,9 @@ def test_every_decimal_of_a_published_array_counts():
         ("0 |\n1 | 1)\n--+----\n | 1/2 1/2", '"1)": ")" does not fit'),
         ("0 |\n1 | 1/0\n--+----\n | 1/2 1/2", '"1/0" divides by zero'),
         ("0 |\n1 | sqrt(2)\n--+----\n | sqrt(3) 1", "sqrt(2) and sqrt(3) in one tableau"),
+        ("0 |\n1 | sqrt(1/2)\n--+--\n | 1/2 1/2", "wanted sqrt(n) of a whole number"),
+        ("0 |\n1 | sqrt(123456789012)\n--+--\n | 1/2 1/2", "wanted sqrt(n) of a whole number"),
+        ("0 |\n1e99 | 1e99\n--+--\n | 1/2 1/2", '"1e99" is beyond 1e+30'),
         ("0 |", "wanted rows, a ruled line and weights"),
         ("", "wanted rows, a ruled line and weights"),
         ("0\n--+--\n | 1", 'has no "|"'),
@@ -179,6 +182,12 @@ def test_published_digits_hold_to_their_precision():
     text = "0 |\n0.66666666666667 | 0.66666666666667\n--+--\n | 1/4 3/4"
     assert tableau_order(text) == 2
     assert tableau_order(text.replace("0.66666666666667", "0.666666")) == 1
+
+
+def test_digits_too_few_to_tell_prove_no_order():
+    """The pair of order 6 has entries beyond 100: with seven digits of them its own conditions cannot be seen."""
+    big = "0 |\n1/2 | 1/2\n1 | -1234567.8 1234568.8\n--+--\n | 1/6 2/3 1/6"
+    assert tableau_order(big) <= 3
 
 
 def test_a_named_number_is_the_root_that_was_asked_for():

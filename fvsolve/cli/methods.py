@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fvsolve.cli import terminal
+from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.exact.polynomial import Polynomial, sign
 
+PICTURES = (".png", ".svg", ".pdf")
 LONG = 28  # characters of an entry that is shown whole
 SHORT = 14  # digits that stand for a longer one
 TERM = 40  # characters of a coefficient of R that is shown exactly
@@ -38,6 +40,8 @@ def one(name: str, out: Path | None) -> Said:
     method = method_named(name)
     facts = analyse(method)
     path = out or Path(f"{name}.png")
+    if path.suffix.lower() not in PICTURES:
+        raise FvsolveError(f"{path}: pictures end in {' or '.join(PICTURES)}")
     path.parent.mkdir(parents=True, exist_ok=True)
     region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}

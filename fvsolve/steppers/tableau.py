@@ -16,6 +16,7 @@ from fvsolve.steppers.exact.algebraic import MIXED, Algebraic
 from fvsolve.steppers.exact.expression import digits, root, value_of
 
 METHODS: dict[str, Method] = {}  # some under two names: `gauss-2` is `implicit-midpoint`
+LARGEST = 10**30  # entry
 EXACT_DECIMALS = 6  # decimals no longer than this are meant as they stand
 
 
@@ -229,6 +230,8 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
         for word in right.split() if below else [left.strip(), *right.split()]:
             try:
                 row.append(value_of(word, numbers))
+                if abs(row[-1]) > LARGEST:
+                    raise ValueError(f'"{word}" is beyond {LARGEST:.0e}')
             except ValueError as error:
                 faults.append(f'row "{line}": {error}')
         (weights if below else head).append(row)

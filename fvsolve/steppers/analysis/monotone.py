@@ -17,21 +17,21 @@ def ssp_radius(method: Method) -> float:
     Steps up to r times the greatest Euler step that keeps a norm from growing keep it too; inf where all do.
     """
     k = _used(method)
-    if any(_negative(x, method) for row in k for x in row) or not _fills_in(k):
+    if any(x < 0 for row in k for x in row) or not _fills_in(k):
         return 0.0
-    if _monotone(k, LONGEST, method):
+    if _monotone(k, LONGEST):
         return math.inf
     low, high = Fraction(0), Fraction(1)
-    while _monotone(k, high, method):
+    while _monotone(k, high):
         low, high = high, 2 * high
     for _ in range(BITS):
         middle = (low + high) / 2
-        if _monotone(k, middle, method):
+        if _monotone(k, middle):
             low = middle
         else:
             high = middle
     simple = low.limit_denominator(1000)
-    return float(simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple, method) else low)
+    return float(simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple) else low)
 
 
 def _used(method: Method) -> list[list]:
@@ -53,7 +53,7 @@ def _fills_in(k: list[list]) -> bool:
     )
 
 
-def _monotone(k: list[list], r: Fraction, method: Method) -> bool:
+def _monotone(k: list[list], r: Fraction) -> bool:
     """Whether the two conditions hold at r, decided: X = (I + r K)^-1 [1, r K] has no negative entry."""
     n = len(k)
     rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
@@ -67,8 +67,4 @@ def _monotone(k: list[list], r: Fraction, method: Method) -> bool:
             if m != i and rows[m][i] != 0:
                 factor = rows[m][i]
                 rows[m] = [x - factor * y if y != 0 else x for x, y in zip(rows[m], top, strict=True)]
-    return not any(_negative(x, method) for row in rows for x in row[n:])
-
-
-def _negative(x, method: Method) -> bool:
-    return x < -1000 * method.rounding if method.rounding else x < 0
+    return all(x >= 0 for row in rows for x in row[n:])

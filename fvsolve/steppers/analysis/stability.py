@@ -11,16 +11,13 @@ from fvsolve.steppers.analysis.stability_function import StabilityFunction, chop
 from fvsolve.steppers.exact.polynomial import Polynomial, sign
 from fvsolve.steppers.exact.sturm import first_sign_change, nowhere_negative, roots_right
 
-ANGLE_BITS = 44  # of the cosine of the angle of A(alpha)
+ANGLE_BITS = 36  # of the cosine of the angle of A(alpha)
 
 
 def e_polynomial(r: StabilityFunction) -> Polynomial:
     """E(x) = |D(iy)|^2 - |N(iy)|^2 with x = y^2 (Norsett 1975): |R(iy)| <= 1 where E >= 0."""
-    found = _modulus(r.denominator) - _modulus(r.numerator)
-    if not r.doubt:
-        return found
-    size = [sum(abs(x) for x in p.coefficients) for p in (r.numerator, r.denominator)]
-    return chopped(found, (4 * max(size) * max(r.doubt),))
+    doubt = Polynomial(_square_doubt(r).coefficients[0::2])
+    return chopped(_modulus(r.denominator) - _modulus(r.numerator), doubt)
 
 
 def i_stable(r: StabilityFunction) -> bool:
@@ -40,11 +37,10 @@ def l_stable(r: StabilityFunction) -> bool:
 
 def real_interval(r: StabilityFunction) -> float:
     """The greatest x with |R| <= 1 on [-x, 0]; inf where there is no end, 0 where not even a short one is."""
-    mirrored = [
+    down, up = (
         Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
-    ]
-    edges = [mirrored[0] - mirrored[1], mirrored[0] + mirrored[1]]
-    edges = [chopped(p, r.doubt) for p in edges]
+    )
+    edges = [chopped(p, r.doubts[0] + r.doubts[1]) for p in (down - up, down + up)]
     if any(_starts_negative(p) for p in edges):
         return 0.0
     return min((x for p in edges if (x := first_sign_change(p)) is not None), default=math.inf)
@@ -80,7 +76,7 @@ def angle(r: StabilityFunction) -> float | None:
 
 def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
     """|R| <= 1 along s = -x exp(i phi), x >= 0, and no pole between this ray and the negative axis."""
-    if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), r.doubt)):
+    if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))):
         poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
         return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
     return False
@@ -96,6 +92,12 @@ def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
         for k, y in enumerate(p.coefficients):
             found[j + k] = found[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
     return Polynomial(found)
+
+
+def _square_doubt(r: StabilityFunction) -> Polynomial:
+    """What the sums over j + k = n of N_j N_k and D_j D_k may be off by."""
+    pairs = zip((r.numerator, r.denominator), r.doubts, strict=True)
+    return sum((2 * Polynomial(map(abs, p.coefficients)) * doubt for p, doubt in pairs), Polynomial([]))
 
 
 def _modulus(p: Polynomial) -> Polynomial:

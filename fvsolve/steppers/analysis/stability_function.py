@@ -6,7 +6,6 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import comb
 
 import numpy as np
 
@@ -15,17 +14,19 @@ from fvsolve.steppers.analysis.trees import short
 from fvsolve.steppers.exact.polynomial import Polynomial
 from fvsolve.steppers.tableau import Method
 
+NOTHING = Polynomial([])
+
 
 @dataclass(frozen=True)
 class StabilityFunction:
     """numerator / denominator in lowest terms, denominator(0) = 1.
 
-    doubt : what a coefficient may be off by where the source rounds, lowest power first; zeros where it does not.
+    doubts : for both, what each coefficient may be off by where the source rounds; zero where it does not.
     """
 
     numerator: Polynomial
     denominator: Polynomial
-    doubt: tuple[Fraction, ...] = ()
+    doubts: tuple[Polynomial, Polynomial] = (NOTHING, NOTHING)
 
     def __call__(self, s):
         """R(s) in floating point, s a complex number or an array of them."""
@@ -37,32 +38,33 @@ class StabilityFunction:
     def pade(self) -> tuple[int, int] | None:
         """Degrees (k, m) where R is the Pade approximation P^k_m of e^s, else None; decided by comparison."""
         k, m = self.numerator.degree, self.denominator.degree
-        pairs = zip((self.numerator, self.denominator), pade(k, m), strict=True)
-        return (k, m) if all(chopped(x - y, self.doubt).degree < 0 for x, y in pairs) else None
+        pairs = zip((self.numerator, self.denominator), pade(k, m), self.doubts, strict=True)
+        return (k, m) if all(chopped(x - y, doubt).degree < 0 for x, y, doubt in pairs) else None
 
     @functools.cached_property
     def error_constant(self) -> tuple[int, object]:
         """(q, C) of R(s) - e^s = C s^(q+1) + ...: order q on the test system, exact."""
-        k, q = self.numerator.degree, self.denominator.degree
+        last = self.numerator.degree + self.denominator.degree + 1
         series = [Fraction(1)]  # of e^s
-        for j in range(1, k + q + 2):
+        for j in range(1, last + 1):
             series.append(series[-1] / j)
-        rest = chopped(self.numerator - self.denominator * Polynomial(series), self.doubt).coefficients[: k + q + 2]
-        return next((j - 1, x) for j, x in enumerate(rest) if x != 0)
+        doubt = self.doubts[0] + self.doubts[1] * Polynomial(series)
+        rest = chopped(self.numerator - self.denominator * Polynomial(series), doubt).coefficients[: last + 1]
+        return next(((j - 1, x) for j, x in enumerate(rest) if x != 0), (last, Fraction(0)))
 
 
 def stability_function(method: Method) -> StabilityFunction:
     """R of a method by the determinants of (26), which is (16) for explicit ones, in lowest terms."""
     numerator, denominator = by_determinants(method.exact.a, method.exact.b)
-    s, size = method.stages, max(np.abs(method.a).sum(axis=1).max() + np.abs(method.b).sum(), 1.0)
-    doubt = tuple(4 * s * method.rounding * comb(s, k) * Fraction(size) ** k for k in range(s + 1))
+    doubts = (NOTHING, NOTHING)
     if method.rounding:
-        numerator, denominator = (Polynomial(map(short, p.coefficients)) for p in (numerator, denominator))
-        numerator, denominator = chopped(numerator, doubt), chopped(denominator, doubt)
+        doubts = _doubts(method)
+        pair = (Polynomial(map(short, p.coefficients)) for p in (numerator, denominator))
+        numerator, denominator = (chopped(p, doubt) for p, doubt in zip(pair, doubts, strict=True))
     common = numerator.gcd(denominator)
     numerator, denominator = numerator // common, denominator // common
     one = denominator.coefficients[0]
-    return StabilityFunction(numerator / one, denominator / one, doubt if method.rounding else ())
+    return StabilityFunction(numerator / one, denominator / one, doubts)
 
 
 def by_determinants(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Polynomial]:
@@ -82,12 +84,30 @@ def determinant(m: Sequence[Sequence]) -> Polynomial:
     return Polynomial(_leverrier(m)[0])
 
 
-def chopped(p: Polynomial, doubt: Sequence[Fraction]) -> Polynomial:
+def chopped(p: Polynomial, doubt: Polynomial) -> Polynomial:
     """p without the coefficients that are no larger than what they may be off by."""
-    if not doubt:
-        return p
-    bounds = [*doubt, *[doubt[-1]] * len(p.coefficients)]
+    bounds = [*doubt.coefficients, *[Fraction(0)] * len(p.coefficients)]
     return Polynomial(x if abs(x) > bound else Fraction(0) for x, bound in zip(p.coefficients, bounds, strict=False))
+
+
+def _doubts(method: Method) -> tuple[Polynomial, Polynomial]:
+    """Bounds of what rounded coefficients do to numerator and denominator, to first order.
+
+    The same sums with all terms positive: 1 / det(I - s |A|) for the denominator, that times 1 + s |b| ... for both.
+    """
+    a, b, s = np.abs(method.a), np.abs(method.b), method.stages
+    traces, moments, power = [], [1.0], np.ones(s)
+    for k in range(s):
+        moments.append(float(b @ power))
+        power = a @ power
+        traces.append(float(np.trace(np.linalg.matrix_power(a, k + 1))))
+    sums = [1.0]
+    for k in range(1, s + 1):
+        sums.append(sum(traces[i] * sums[k - 1 - i] for i in range(k)) / k)
+    both = np.convolve(sums, moments)[: s + 1]
+    return tuple(
+        Polynomial(4 * k * method.rounding * Fraction(float(x)) for k, x in enumerate(one)) for one in (both, sums)
+    )
 
 
 def _leverrier(a: Sequence[Sequence]) -> tuple[list, list]:

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 Tree = tuple  # (nodes, which of them): a name that says the size first, so that trees are in order
 
+ORDER_MOST = 12  # that is looked for: there are 4766 trees of 12 nodes, 12486 of 13
 BITS = 256  # kept of rounded coefficients on the way
 
 
@@ -54,12 +55,16 @@ class Conditions:
         self.known: dict[tuple[Tree, bool], list] = {}
 
     def residual(self, tree: Tree, b: Sequence):
-        """What a condition lacks: an exact number, 0 where it holds to the precision of the coefficients."""
+        """What a condition lacks: an exact number, 0 where it holds to the precision of the coefficients.
+
+        Where that precision cannot tell 1 / gamma from 0, nothing holds.
+        """
         left = sum((x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0))
         found = left - Fraction(1, density(tree))
         if self.rounding and found != 0:
             size = sum(short(abs(x)) * y for x, y in zip(b, self._phi(tree, True), strict=True))
-            if abs(found) <= 2 * tree[0] * self.rounding * size:
+            doubt = 2 * tree[0] * self.rounding * size
+            if abs(found) <= doubt < Fraction(1, density(tree)):
                 return Fraction(0)
         return found
 
@@ -69,8 +74,8 @@ class Conditions:
 
     def order(self, b: Sequence) -> int:
         """The greatest p such that all conditions up to p nodes hold; at most twice the stages (Butcher 1964)."""
-        p = 0
-        while p < 2 * len(self.a) and self.holds(p + 1, b):
+        p, most = 0, min(2 * len(self.a), ORDER_MOST)
+        while p < most and self.holds(p + 1, b):
             p += 1
         return p
 

@@ -10,7 +10,7 @@ from fvsolve.steppers.exact.algebraic import Field, square_root
 from fvsolve.steppers.exact.polynomial import Polynomial
 
 TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}(?!\d))?|[A-Za-z_]\w*|[-+*/^()]")
-POWER_MOST = 64
+POWER_MOST, ROOT_MOST = 64, 10**9
 
 
 def value_of(text: str, names: Mapping | None = None):
@@ -88,8 +88,8 @@ class _Reader:
             return inside
         if token == "sqrt":
             n = self.atom() if self.rest and self.rest[-1] == "(" else None
-            if not isinstance(n, Fraction) or n.denominator != 1 or n < 0:
-                raise ValueError(f'"{self.text}": wanted sqrt(n) of a whole number')
+            if not isinstance(n, Fraction) or n.denominator != 1 or not 0 <= n <= ROOT_MOST:
+                raise ValueError(f'"{self.text}": wanted sqrt(n) of a whole number n up to {ROOT_MOST:.0e}')
             return square_root(int(n))
         if token and (token[0].isdigit() or token[0] == "."):
             return Fraction(token)

@@ -63,7 +63,9 @@ def first_sign_change(p: Polynomial) -> float | None:
             low = middle
         else:
             high = middle
-    rising = sign(p(high)) or 1
+    rising = sign(p(high))
+    if rising == 0:
+        return float(high)
     while high - low > high * DIGITS:
         middle = (low + high) / 2
         now = sign(p(middle))

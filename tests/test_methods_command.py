@@ -1,0 +1,122 @@
+"""`fvsolve methods`: one table, one object, one method with its picture; a wrong name is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from fvsolve.cli import main
+from fvsolve.steppers import METHODS, Facts, analyse
+
+DOCS = (Path(__file__).parent.parent / "docs" / "choosing-a-method.md").read_text(encoding="utf-8")
+NAMES = [name for name, method in METHODS.items() if name == method.name]
+ASKED = {
+    "order", "stage_order", "stages", "explicit", "a_stable", "l_stable", "real_interval", "imaginary_interval",
+    "ssp_radius", "pade", "numerator", "denominator",
+}  # fmt: skip
+
+
+@pytest.fixture
+def said(monkeypatch, capsys, tmp_path):
+    """Runs a command in an empty directory; gives exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fvsolve", *words])
+        with pytest.raises(SystemExit) as end:
+            main()
+        found = capsys.readouterr()
+        return end.value.code or 0, found.out, found.err
+
+    return run
+
+
+def test_the_table_names_every_method(said):
+    code, out, _ = said("methods")
+    lines = out.splitlines()
+    assert code == 0 and lines[0].split()[:3] == ["method", "order", "error"]
+    assert [name for name in METHODS if not any(line.startswith(f"{name} ") for line in lines)] == []
+
+
+def test_json_is_one_object_with_every_method_and_null_for_infinity(said):
+    code, out, err = said("methods", "--json")
+    found = json.loads(out)
+    assert code == 0 and err == "" and list(found) == list(METHODS)
+    assert all(one.keys() >= ASKED for one in found.values())
+    assert all(one["denominator"][0] == 1.0 and one["numerator"][0] == 1.0 for one in found.values())
+    assert found["radau-iia-5"]["real_interval"] is found["implicit-euler"]["ssp_radius"] is None
+    assert found["radau-iia-5"]["pade"] == [2, 3] and found["alexander-2"]["pade"] is None
+    assert found["rk4"]["real_interval"] == pytest.approx(2.785293563405282, rel=1e-13)
+
+
+def test_one_method_is_shown_with_tableau_r_and_picture(said, tmp_path):
+    code, out, _ = said("methods", "radau-iia-5")
+    assert code == 0 and (tmp_path / "radau-iia-5.png").read_bytes().startswith(b"\x89PNG")
+    assert "R(s) = (1 + 2/5 s + 1/20 s^2) / (1 - 3/5 s + 3/20 s^2 - 1/60 s^3)" in out
+    assert "(4-sqrt(6))/10 | (88-7sqrt(6))/360" in out and "A-stable: yes; L-stable: yes" in out
+
+
+def test_the_picture_goes_where_it_is_wanted(said, tmp_path):
+    code, out, _ = said("methods", "alexander-3", "--out", "pictures/a.png", "--json")
+    found = json.loads(out)
+    assert code == 0 and (tmp_path / "pictures" / "a.png").exists() and found["picture"] == "pictures/a.png"
+    assert found["a"][0][0] == pytest.approx(0.435866521508459) and len(found["numerator"]) == 3
+
+
+@pytest.mark.parametrize("name", ["verner-7", "crouzeix-4", "esdirk-5", "euler"])
+def test_long_and_short_tableaux_are_both_shown(said, name):
+    code, out, _ = said("methods", name)
+    assert code == 0 and out.startswith(name) and re.search(r"^R\(s\) = ", out, re.MULTILINE)
+
+
+def test_a_name_that_no_method_has(said, tmp_path):
+    code, out, err = said("methods", "radau-iia-50")
+    assert (code, out) == (2, "") and 'no method named "radau-iia-50"; did you mean "radau-iia-5"?' in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_of_all_methods_is_refused(said):
+    code, _, err = said("methods", "--out", "all.png")
+    assert code == 2 and "give its NAME" in err
+
+
+def test_a_picture_of_a_kind_that_nobody_can_draw_is_refused(said):
+    code, _, err = said("methods", "rk4", "--out", "rk4.xyz")
+    assert code == 2 and "rk4.xyz" in err and ".png" in err
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_says_what_the_program_says(name):
+    one = analyse(name)
+    pade = f"{one.pade[0]}/{one.pade[1]}" if one.pade else "-"
+    kind = "explicit" if one.explicit else "diagonal" if one.diagonally_implicit else "full"
+    row = [
+        f"`{name}`", one.order, one.error_order or "-", one.stage_order, one.stages, kind, stable(one),
+        *map(cell, (one.real_interval, one.imaginary_interval, one.ssp_radius)), pade, one.source,
+    ]  # fmt: skip
+    assert f"| {' | '.join(map(str, row))} |" in DOCS.splitlines()
+
+
+def stable(one: Facts) -> str:
+    return "L" if one.l_stable else "A" if one.a_stable else "-"
+
+
+def cell(value: float) -> str:
+    return "∞" if math.isinf(value) else f"{value:.5g}"
+
+
+def test_the_page_has_no_other_rows_and_its_examples_run():
+    rows = re.findall(r"^\| `([\w-]+)` \| \d", DOCS, re.MULTILINE)
+    assert rows == NAMES
+    found = {}
+    try:
+        for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
+            exec(example, found)
+    finally:
+        METHODS.pop("mine", None)
+    assert found["seen"] == pytest.approx(137.3, abs=0.05)

@@ -1,0 +1,89 @@
+"""What is known of a method is what its compiled steps do: R(h lambda), orders, aliasing; for every method there is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+
+from fvsolve.steppers import METHODS, analyse, integrate, seen_frequency
+
+NAMES = [name for name, method in METHODS.items() if name == method.name]
+ADAPTIVE = [name for name in NAMES if METHODS[name].adaptive]
+
+RANDOM = np.random.default_rng(59)
+RADIUS, TURN = 2.5 * np.sqrt(RANDOM.random(200)), 2.0 * np.pi * RANDOM.random(200)
+LAMBDA = -np.abs(RADIUS * np.cos(TURN)) + 1j * RADIUS * np.sin(TURN)  # the left half plane, where no R has a pole
+GROWTH, TURNING = LAMBDA.real.copy(), LAMBDA.imag.copy()
+
+
+@njit
+def test_system(t, y):
+    """y' = lambda y for 200 lambda at once, real parts first."""
+    x, z = y[:200], y[200:]
+    return np.concatenate((GROWTH * x - TURNING * z, TURNING * x + GROWTH * z))
+
+
+test_system.__test__ = False
+
+
+@njit
+def pendulum(t, y):
+    """A nonlinear, non-autonomous system whose trees all count."""
+    return np.array([y[1], -np.sin(y[0]) + 0.3 * np.cos(t)])
+
+
+@pytest.fixture(scope="module")
+def truth() -> np.ndarray:
+    return integrate(pendulum, [1.0, 0.2], [0.0, 4.0], "dormand-prince", step=1e-3)[-1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_step_of_the_test_system_is_the_stability_function(name):
+    start = np.concatenate((np.ones(200), np.zeros(200)))
+    end = integrate(test_system, start, [0.0, 1.0], name, step=1.0)[-1]
+    wanted = analyse(name).stability_function(LAMBDA)
+    assert end[:200] + 1j * end[200:] == pytest.approx(wanted, rel=1e-13, abs=1e-13)
+
+
+# Steps over four seconds, small enough for the leading term to rule and large enough for round-off not to.
+STEPS = {1: (160, 320), 2: (40, 80), 3: (40, 80), 4: (40, 80), 5: (48, 96), 6: (16, 32), 7: (24, 40), 9: (5, 8)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fixed_steps_show_the_order(name, truth):
+    p = METHODS[name].order
+    steps = 4.0 / np.array(STEPS[p])
+    errors = [np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, step=h)[-1] - truth) for h in steps]
+    assert math.log(errors[0] / errors[1]) / math.log(steps[0] / steps[1]) == pytest.approx(p, abs=0.1 * p)
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_error_control_keeps_near_its_tolerance(name, truth):
+    loose, tight = (
+        np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, rtol=rtol)[-1] - truth)
+        for rtol in (1e-4, 1e-8)
+    )
+    assert loose < 50e-4 and tight < 50e-8
+    assert loose > 100.0 * tight
+
+
+@pytest.mark.parametrize("name", ["rk4", "ssp-rk3", "implicit-midpoint", "trapezoid", "gauss-4", "lobatto-iiia-6"])
+@pytest.mark.parametrize("fast", [1.5, 40.0, 1000.0])
+def test_a_fast_oscillation_is_seen_at_the_predicted_frequency(name, fast):
+    """omega h from a rate that is resolved to one far beyond the Nyquist frequency pi / h."""
+    h, n = 0.1, 60
+    omega = min(fast, 0.9 * analyse(name).imaginary_interval) / h
+
+    @njit
+    def oscillator(t, y):
+        return np.array([-omega * y[1], omega * y[0]])
+
+    y = integrate(oscillator, [1.0, 0.0], h * np.arange(n + 1), name, step=h)
+    turned = np.unwrap(np.angle(y[:, 0] + 1j * y[:, 1]))
+    seen = abs(turned[-1] - turned[0]) / (n * h)
+    assert seen == pytest.approx(seen_frequency(name, omega, h), rel=1e-9)
+    if analyse(name).a_stable and fast > math.pi:
+        assert seen < math.pi / h < omega
