@@ -19,6 +19,7 @@ import networks
 import numpy as np
 import peer_moc
 from exact import exact_heads, impulse_response
+from price import price
 
 import fvsolve
 
@@ -95,25 +96,6 @@ def fitting_step(network, dt):
     return steps[bend.argmin()]
 
 
-def price(runs, error, target):
-    """CPU time at which `runs` reach an error, and how it was found.
-
-    "": log-log between the two runs about it, counting only runs that beat all cheaper ones; "<": the
-    cheapest run is better already; "~": beyond the best run, along the least-squares line of the logarithms.
-    """
-    runs = sorted(runs, key=lambda r: r.cpu)
-    front = [r for k, r in enumerate(runs) if all(error(r) < error(q) for q in runs[:k])]
-    if error(front[0]) <= target:
-        return front[0].cpu, "<"
-    for a, b in zip(front, front[1:], strict=False):
-        if error(b) <= target:
-            part = np.log(error(a) / target) / np.log(error(a) / error(b))
-            return a.cpu * (b.cpu / a.cpu) ** part, ""
-    slope, level = np.polyfit(np.log([r.cpu for r in runs]), np.log([error(r) for r in runs]), 1)
-    start = max(front[-1].cpu, np.exp((np.log(target) - level) / slope))
-    return start, "~"
-
-
 def table(title, runs, unit):
     """Print one program's runs."""
     print(f"  {title}")
@@ -133,7 +115,7 @@ def verdict(name, own, peer):
     for target, goal in GOALS[name]:
         print(f"  error {target:.0e}, goal {goal}:")
         for title, ours, theirs in zip(("halved", "picked to fit"), own, peer, strict=True):
-            (a, how), (b, mark) = price(ours, error, target), price(theirs, error, target)
+            (a, how), (b, mark) = (price([(r.cpu, error(r)) for r in runs], target) for runs in (ours, theirs))
             row = f"fvsolve {how or ' '}{a * 1e3:9.2f} ms, rthym-moc {mark or ' '}{b * 1e3:11.1f} ms"
             print(f"    {title:>13}: {row}, {b / a:9.1f} times less")
 

@@ -10,7 +10,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.structure import Structure
 
-KINDS = ("dense",)
+KINDS = ("dense", "banded", "sparse")
 
 
 def pattern_of(n: int, m: int = 0, density: float = 0.2, seed: int = 0) -> np.ndarray:

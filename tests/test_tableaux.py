@@ -42,6 +42,7 @@ PUBLISHED = {
     "radau-ia-5": (3, 5, 0, 2),
     "radau-iia-3": (2, 3, 0, 2),
     "radau-iia-5": (3, 5, 3, 3),
+    "radau-iia-9": (5, 9, 5, 5),
     "alexander-2": (2, 2, 0, 1),
     "alexander-3": (3, 3, 0, 1),
     "crouzeix-3": (2, 3, 0, 1),

@@ -102,6 +102,24 @@ def schema() -> None:
 
 
 @app.command()
+def methods(
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="all methods by default")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="of NAME's picture (default NAME.png)")] = None,
+    as_json: Json = False,
+) -> None:
+    """Runge-Kutta methods: order, stability, cost; of one NAME its tableau, R(s) and stability region too."""
+    from fvsolve.cli import methods
+
+    if name is None and out is not None:
+        raise FvsolveError("--out is for the picture of one method; give its NAME")
+    said = methods.table() if name is None else methods.one(name, out)
+    if as_json:
+        _json(said.plain)
+    else:
+        said.show()
+
+
+@app.command()
 def compare(
     run_a: Annotated[Path, typer.Argument(metavar="RUN_A")],
     run_b: Annotated[Path, typer.Argument(metavar="RUN_B")],

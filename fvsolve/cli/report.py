@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
+from fvsolve.cli.terminal import console as _console
+from fvsolve.cli.terminal import line as _line
+from fvsolve.cli.terminal import table as _table
 
 ROWS = 20  # of a table at most; the rest is on disk
-WIDTH = 140  # of output that goes to no terminal
 PIPE = {
     "length": "length [m]",
     "cells": "cells",
@@ -136,36 +137,3 @@ def _cost(said: dict) -> str:
 
 def _number(value) -> str:
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _line(console, text: str, style: str | None = None) -> None:
-    console.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
-
-
-def _table(headers: list[str], rows: list[list[str]], console=None) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
-    for i, header in enumerate(headers):
-        text = all(not _numeric(row[i]) for row in rows)
-        table.add_column(Text(header), justify="left" if text else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    (console or _console()).print(table)
-
-
-def _numeric(text: str) -> bool:
-    if text == "-":
-        return True
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _console():
-    from rich.console import Console
-
-    return Console() if sys.stdout.isatty() else Console(width=WIDTH, no_color=True)

@@ -10,12 +10,12 @@ WIDTH = 9.0  # of a picture [inch]
 DPI = 150
 
 
-def figure(height: float):
+def figure(height: float, width: float = WIDTH):
     """An empty Figure with an Agg canvas; pyplot and its windows are never imported."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white", layout="constrained")
+    made = Figure(figsize=(width, height), dpi=DPI, facecolor="white", layout="constrained")
     FigureCanvasAgg(made)
     return made
 

@@ -10,6 +10,7 @@ import functools
 
 import numpy as np
 
+from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
 from fvsolve.steppers.tableau import Method
 
@@ -27,7 +28,11 @@ def coefficients(method: Method) -> tuple[np.ndarray, np.ndarray, int]:
     if not (method.explicit or method.diagonally_implicit):
         from fvsolve.steppers.irk import transformed
 
-        flat.append(transformed(a[1:, 1:], c[1:]))
+        try:
+            flat.append(transformed(a[1:, 1:], c[1:], a[1:, 0]))
+        except (np.linalg.LinAlgError, ValueError):
+            raise FvsolveError(f"{method.name} cannot be stepped: A, less an explicit first stage, has no inverse with "
+                               "a basis of eigenvectors; diagonally implicit arrays need none") from None  # fmt: skip
     return np.concatenate(flat), np.ascontiguousarray(dense), len(b)
 
 

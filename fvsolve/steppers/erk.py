@@ -9,7 +9,7 @@ from fvsolve.steppers.step import combine, error_norm
 @njit
 def attempt(
     rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
-    where, out, scale, orders, memory, work, work_complex,
+    where, out, scale, orders, memory, work, vectors, store, store_complex,
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 

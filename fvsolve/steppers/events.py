@@ -42,7 +42,7 @@ def nearness(g, g_new):
 @njit
 def locate(
     attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y, now, new, k,
-    supply, where, out, scale, orders, memory, work, work_complex, g, g_new,
+    supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
 ):  # fmt: skip
     """The step that ends just past the first event, by the Illinois rule on its length; y[new] belongs to it."""
     t, low, high, at_low, at_high = memory[T], 0.0, h, 1.0, nearness(g, g_new)
@@ -59,7 +59,7 @@ def locate(
             guess = high
         attempt(
             rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, guess, y, now, new, k,
-            supply, where, out, scale, orders, memory, work, work_complex,
+            supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
         )  # fmt: skip
         events(t + guess, y[new], handle, g_new)
         if done:

@@ -6,27 +6,14 @@ The store holds the rows of L and U, 1 / U_ii on the diagonal, and behind them t
 import numpy as np
 
 from fvsolve.jit import njit
+from fvsolve.steppers.pivots import LEAST, reciprocal, size_of
 from fvsolve.steppers.structure import ROWS, SIZE, STARTS
-
-LEAST = 1e-150  # a pivot whose square is still a number
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
     """(nothing that the functions need beyond the pattern, length of the store)."""
     n = pattern.shape[1]
     return np.zeros(0, dtype=np.int64), n * n + n
-
-
-@njit(forceinline=True)
-def size_of(x):
-    """|Re x| + |Im x|, quicker than the modulus."""
-    return abs(x.real) + abs(x.imag)
-
-
-@njit(forceinline=True)
-def reciprocal(x):
-    """1 / x of what is neither zero nor so large that its square overflows."""
-    return x.conjugate() / (x.real * x.real + x.imag * x.imag)
 
 
 @njit(forceinline=True)

@@ -92,7 +92,7 @@ def attempt_arguments(*functions):
 
     f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
     ints = types.int64[::1]
-    return (*functions, ints, v, ints, f, f, w, i, i, w, w, i, v, v, v, v, v, types.complex128[::1])
+    return (*functions, ints, v, ints, f, f, w, i, i, w, w, i, v, v, v, v, v, w, v, types.complex128[::1])
 
 
 def no_factor(shape, jacobian, shift, store):
@@ -173,7 +173,7 @@ def emit(
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
     coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
-    values, g, g_new, armed, stored, carry, y_out, rows, work, work_complex,
+    values, g, g_new, armed, stored, carry, y_out, rows, work, vectors, store, store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -183,7 +183,7 @@ def march(
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[2 m], sums of out[where:] with the step's own weights, and their carries; stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
-    work, work_complex : what an implicit step keeps.
+    work, vectors, store, store_complex : what an implicit step keeps.
     """
     s, reuse = k.shape[0], False
     b = weights_of(coefficients, s)
@@ -248,7 +248,7 @@ def march(
                 return failed
             e = attempt(
                 rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, memory[T], h, y, now,
-                new, k, supply, where, out, scale, orders, memory, work, work_complex,
+                new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
             )  # fmt: skip
             if e == NEWTON_FAILED:
                 failed = NEWTON_STUCK
@@ -271,7 +271,7 @@ def march(
         if fallen(g, g_new):
             h = locate(
                 attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y,
-                now, new, k, supply, where, out, scale, orders, memory, work, work_complex, g, g_new,
+                now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
             )  # fmt: skip
             last = last and memory[T] + h >= orders[END]
             if orders[CONTROL] != TOLERANCE:
@@ -322,7 +322,7 @@ def compiled():
     i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
     march.compile(
         (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, v,
-         types.complex128[::1])
+         w, v, types.complex128[::1])
     )  # fmt: skip
     march.disable_compile()
     return march

@@ -26,8 +26,8 @@ class Stepper:
         self.method, self.scale = method, scale
         self.coefficients, self.dense, s = coefficients(method)
         self.march, self.attempt, self.algebra = compiled(), attempt_of(method), no_algebra()
-        self.shape, self.work, self.kept = np.zeros(0, dtype=np.int64), np.zeros(0), 0
-        self.work_complex = np.zeros(0, dtype=complex)
+        self.shape, self.work, self.vectors = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, n))
+        self.store, self.store_complex = np.zeros(0), np.zeros(0, dtype=complex)
         if not method.explicit:
             self.solve_by(structure, s, n, ledgers)
         self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
@@ -45,19 +45,22 @@ class Stepper:
 
     def solve_by(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
         """Room and functions for Newton's linear algebra."""
-        from fvsolve.steppers.newton import new_work
+        from fvsolve.steppers import newton
 
-        pairs = 0
+        q = pairs = 0
         if not self.method.diagonally_implicit:
             from fvsolve.steppers.irk import pairs_of
 
-            pairs = pairs_of(self.coefficients, s)
-        reals = 1 if self.method.diagonally_implicit else s - 1 - 2 * pairs
-        self.shape = structure.shape
-        self.work, self.kept = new_work(n, ledgers, structure.nnz, s, reals, structure.store_size)
+            q, pairs = s - 1, pairs_of(self.coefficients, s)
+        reals = q - 2 * pairs if q else 1
+        size, self.shape = structure.store_size, structure.shape
+        self.work = np.zeros(newton.HEADER + structure.nnz + n + ledgers + q * q)
+        self.work[newton.STORE] = size
+        self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
+        self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
         real = arguments(structure.functions()) if reals else no_algebra()[:2]
         self.algebra = (*real, *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]))
-        self.work_complex = np.zeros(n + pairs * structure.store_size, dtype=complex)
+        newton.forget(self.work)
 
     @property
     def dense_order(self) -> int:
@@ -82,7 +85,8 @@ class Stepper:
             self.attempt, leap, observe, record, events, rhs, *self.algebra, handle, self.coefficients, self.shape,
             self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.supply,
             where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
-            self.stored, self.carry, self.y_out, self.rows, self.work, self.work_complex,
+            self.stored, self.carry, self.y_out, self.rows, self.work, self.vectors, self.store,
+            self.store_complex,
         )  # fmt: skip
 
 

@@ -116,7 +116,7 @@ class Structure:
 
 def choose(pattern) -> str:
     """The kind of factorisation that is quickest for a pattern, from its size and bandwidth."""
-    return "dense"
+    return "dense" if pattern.shape[1] <= SMALL else "sparse"
 
 
 def kind_module(kind: str):

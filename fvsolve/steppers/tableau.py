@@ -84,7 +84,7 @@ class Method:
 
     @functools.cached_property
     def start_error(self) -> float:
-        return -float(self.exact.start)
+        return 0.0 - float(self.exact.start)
 
     @functools.cached_property
     def dense(self) -> np.ndarray:

@@ -40,7 +40,9 @@ def l_stable(r: StabilityFunction) -> bool:
 
 def real_interval(r: StabilityFunction) -> float:
     """The greatest x with |R| <= 1 on [-x, 0]; inf where there is no end, 0 where not even a short one is."""
-    mirrored = [Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)]
+    mirrored = [
+        Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
+    ]
     edges = [mirrored[0] - mirrored[1], mirrored[0] + mirrored[1]]
     edges = [chopped(p, r.doubt) for p in edges]
     if any(_starts_negative(p) for p in edges):

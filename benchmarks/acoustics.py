@@ -1,0 +1,109 @@
+"""A pulse in a lossless pipe of cells between a reservoir and a closed end, and the ordinary differential equations
+that fvsolve makes of it, for other solvers. Knows fvsolve's models; steps nothing.
+"""
+
+from functools import cached_property
+
+import networks
+import numba
+import numpy as np
+from numbalsoda import address_as_void_pointer
+from scipy.sparse import csc_array, hstack
+from scipy.sparse.linalg import expm_multiply
+
+from fvsolve.case import load
+from fvsolve.model import State, build
+
+LENGTH = SPEED = 1000.0  # [m, m/s]
+END = 2.0  # [s] there and back
+WIDTH = 0.08  # of the pulse, exp(-((x - 1/2) / WIDTH)^2), in lengths
+
+
+def case(cells: int, scheme: str = "upwind5", **numerics) -> dict:
+    """The pipe at rest."""
+    main = {"type": "pipe", "from": "lake", "to": "end", "length": LENGTH, "diameter": 0.5, "wave_speed": SPEED}
+    return {
+        "schema": 1,
+        "title": "a pulse in a pipe",
+        "fluid": dict(networks.WATER),
+        "nodes": {"lake": {"type": "reservoir", "head": 100.0}, "end": {"type": "junction"}},
+        "links": {"main": main | {"friction": {"model": "none"}, "cells": cells}},
+        "numerics": {"end": END, "scheme": scheme, **numerics},
+        "output": {"fields": 0, "probes": ["end.head"]},
+    }
+
+
+class Acoustics:
+    """The pipe as y' = L y from a pulse: states as fvsolve keeps them, or interleaved so that L has a narrow band."""
+
+    def __init__(self, cells: int) -> None:
+        self.cells = cells
+        self.model = self.build(method="rk4", courant=1.0)
+        self.mixed = np.arange(2 * cells).reshape(2, cells).T.ravel()  # interleaved place -> fvsolve's place
+        self.rhs = self._rhs()
+        self.rhs_mixed = self._rhs_mixed()
+
+    def build(self, **numerics):
+        """fvsolve's model with these numerics."""
+        return build(load(case(self.cells, **numerics)))
+
+    @cached_property
+    def start(self) -> State:
+        """Half of a pulse, on its way to the end."""
+        x = (np.arange(self.cells) + 0.5) / self.cells
+        return State(0.0, np.concatenate([np.exp(-(((x - 0.5) / WIDTH) ** 2)), np.zeros(self.cells)]))
+
+    @cached_property
+    def matrix(self) -> csc_array:
+        """L : float64[n, n] [1/s], column by column: f is linear."""
+        rate, columns = np.empty(2 * self.cells), []
+        for j in range(2 * self.cells):
+            unit = np.zeros(2 * self.cells)
+            unit[j] = 1.0
+            self.rhs(0.0, unit, rate)
+            columns.append(csc_array(rate[:, None]))
+        return hstack(columns, format="csc")
+
+    @cached_property
+    def exact(self) -> np.ndarray:
+        """exp(L END) y0."""
+        return expm_multiply(self.matrix * END, self.start.y)
+
+    def distance(self, y: np.ndarray) -> float:
+        """Greatest error of a state at END, in the pulse's height."""
+        return np.abs(y - self.exact).max()
+
+    @property
+    def band(self) -> tuple[int, int]:
+        """(lower, upper) bandwidth of L interleaved."""
+        found = self.matrix[self.mixed][:, self.mixed].tocoo()
+        return int((found.row - found.col).max()), int((found.col - found.row).max())
+
+    def _rhs(self):
+        """fvsolve's own compiled rhs as f(t, y, dydt); its tables and `out` by their addresses."""
+        rhs, handle, out = self.model.functions()[0], self.model.handle, self.model.new_out()
+        self._kept = handle, out
+        handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
+
+        @numba.njit(error_model="numpy")
+        def function(t, y, dydt):
+            tables = numba.carray(address_as_void_pointer(handle_at), handle_size, np.int64)
+            beside = numba.carray(address_as_void_pointer(out_at), out_size, np.float64)
+            rhs(t, y, dydt, beside, tables)
+
+        return function
+
+    def _rhs_mixed(self):
+        """The same for interleaved states."""
+        rhs, cells = self.rhs, self.cells
+
+        @numba.njit(error_model="numpy")
+        def function(t, y, dydt):
+            straight, rate = np.empty(2 * cells), np.empty(2 * cells)
+            for i in range(cells):
+                straight[i], straight[cells + i] = y[2 * i], y[2 * i + 1]
+            rhs(t, straight, rate)
+            for i in range(cells):
+                dydt[2 * i], dydt[2 * i + 1] = rate[i], rate[cells + i]
+
+        return function

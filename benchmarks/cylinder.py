@@ -1,0 +1,84 @@
+"""A valve-controlled cylinder with mass and spring as y' = f(t, y), in numba. Knows no solver.
+
+A four-port valve of small underlap sends oil through two short hoses of a few cubic centimetres to both sides of
+a double-acting cylinder, whose rod moves a mass on a spring. Two strokes: the valve moves as sin(2 pi t / PERIOD).
+Six states, each in a unit that makes it of order one (LSODA in numbalsoda takes one absolute tolerance for all):
+pressures in 10 MPa at the valve's ports A and B and in the chambers A and B, stroke in 0.1 m, velocity in 1 m/s.
+
+Orifices: q = C sign(dp) |dp| / (dp^2 + d^2)^(1/4), C = Cd A sqrt(2/rho), whose slope at dp = 0 is finite.
+"""
+
+from math import pi, sin, sqrt
+
+import numba
+import numpy as np
+
+UNITS = np.array([1e7, 1e7, 1e7, 1e7, 0.1, 1.0])  # [Pa, Pa, Pa, Pa, m, m/s]
+NAMES = ("hose A", "hose B", "chamber A", "chamber B", "stroke", "velocity")
+PERIOD, END = 0.2, 0.2  # [s]
+SUPPLY, TANK = 1.5e7, 1e5  # [Pa]
+BETA, RHO = 1.2e9, 860.0  # bulk modulus [Pa], density [kg/m3]
+VALVE = 0.61 * 1.0e-5 * sqrt(2.0 / RHO)  # of one metering edge, wide open [m3/s/sqrt(Pa)]
+HOSE = 0.61 * 1.5e-5 * sqrt(2.0 / RHO)  # of the port of a chamber [m3/s/sqrt(Pa)]
+SOFT = 2e4  # [Pa] below it orifices are laminar
+UNDERLAP = 0.02  # of the valve's stroke
+HOSE_VOLUME, DEAD_VOLUME = 3e-7, 1e-5  # [m3]
+AREA_A, AREA_B, STROKE = 8e-4, 5e-4, 0.1  # [m2, m2, m]
+LEAKAGE = 1e-13  # from chamber to chamber [m3/s/Pa]
+MASS, STIFFNESS, DAMPING = 20.0, 2e4, 400.0  # [kg, N/m, N s/m]
+START = 0.02  # where the spring is slack [m]
+P_A = 5e6  # [Pa] at the start; P_B holds it in balance
+
+
+@numba.njit(error_model="numpy")
+def orifice(c, dp):
+    """Flow [m3/s] through an orifice of coefficient c under a pressure drop [Pa]."""
+    return c * dp / sqrt(sqrt(dp * dp + SOFT * SOFT))
+
+
+@numba.njit(error_model="numpy")
+def edge(s):
+    """Opening of a metering edge whose spool stands s open: s where open, 0 where shut, round between."""
+    return 0.5 * (s + sqrt(s * s + UNDERLAP * UNDERLAP))
+
+
+@numba.njit(error_model="numpy")
+def rhs(t, y, dydt):
+    """dydt = f(t, y), states as UNITS says."""
+    a, b, p_a, p_b = 1e7 * y[0], 1e7 * y[1], 1e7 * y[2], 1e7 * y[3]
+    x, v = 0.1 * y[4], y[5]
+    s = sin(2.0 * pi / PERIOD * t)
+    up, down = VALVE * edge(s), VALVE * edge(-s)
+    into_a = orifice(up, SUPPLY - a) - orifice(down, a - TANK)
+    into_b = orifice(down, SUPPLY - b) - orifice(up, b - TANK)
+    hose_a, hose_b = orifice(HOSE, a - p_a), orifice(HOSE, b - p_b)
+    leak = LEAKAGE * (p_a - p_b)
+    dydt[0] = 1e-7 * BETA / HOSE_VOLUME * (into_a - hose_a)
+    dydt[1] = 1e-7 * BETA / HOSE_VOLUME * (into_b - hose_b)
+    dydt[2] = 1e-7 * BETA / (DEAD_VOLUME + AREA_A * x) * (hose_a - leak - AREA_A * v)
+    dydt[3] = 1e-7 * BETA / (DEAD_VOLUME + AREA_B * (STROKE - x)) * (hose_b + leak + AREA_B * v)
+    dydt[4] = 10.0 * v
+    dydt[5] = (AREA_A * p_a - AREA_B * p_b - STIFFNESS * (x - START) - DAMPING * v) / MASS
+
+
+def start():
+    """y at t = 0: at rest, forces in balance : float64[6]."""
+    p_b = P_A * AREA_A / AREA_B
+    return np.array([P_A, p_b, P_A, p_b, START, 0.0]) / UNITS
+
+
+def jacobian(t, y):
+    """df/dy by central differences : float64[6, 6] [1/s]."""
+    found, high, low = np.empty((6, 6)), np.empty(6), np.empty(6)
+    for j in range(6):
+        step = np.zeros(6)
+        step[j] = 1e-7
+        rhs(t, y + step, high)
+        rhs(t, y - step, low)
+        found[:, j] = (high - low) / 2e-7
+    return found
+
+
+def greatest_eigenvalue(times, states):
+    """Largest modulus of an eigenvalue of df/dy along a trajectory [1/s]."""
+    return max(np.abs(np.linalg.eigvals(jacobian(t, y))).max() for t, y in zip(times, states, strict=True))

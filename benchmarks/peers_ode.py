@@ -1,0 +1,207 @@
+"""Solvers of y' = f(t, y) from elsewhere, each in its fastest form from Python: numbalsoda, scikit-sundae, SciPy.
+
+Every one is given the same compiled f(t, y, dydt) and one tolerance, relative and absolute. Knows no problem.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numba
+import numpy as np
+from measure import Solver
+from numba import types
+from numbalsoda import address_as_void_pointer, dop853, lsoda, lsoda_sig
+from scipy import sparse
+from scipy.integrate import odeint, solve_ivp
+from sksundae.cvode import CVODE
+
+MANY = 10**8  # steps allowed between two times
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """y' = f(t, y) from y0 at t[0], wanted at the times t.
+
+    rhs : compiled f(t, y, dydt); band : (lower, upper) bandwidth of df/dy, or None where it is full
+    """
+
+    rhs: Callable
+    y0: np.ndarray
+    t: np.ndarray
+    band: tuple[int, int] | None = None
+
+
+def peers(problem: Problem) -> list[Solver]:
+    """All that are made for stiff problems."""
+    found = [numba_lsoda(problem), *cvodes(problem)]
+    return found + [scipy_ivp(problem, name) for name in ("Radau", "BDF", "LSODA")] + [scipy_odeint(problem)]
+
+
+# numbalsoda ---------------------------------------------------------------------------------------------------
+
+
+def address(problem: Problem):
+    """f as the C function that numbalsoda calls; it counts calls in data[0]."""
+    rhs, n = problem.rhs, problem.y0.size
+
+    def function(t, u, du, data):
+        data[0] += 1.0
+        rhs(t, numba.carray(u, (n,)), numba.carray(du, (n,)))
+
+    return numba.cfunc(lsoda_sig)(function)
+
+
+def numba_lsoda(problem: Problem) -> Solver:
+    """LSODA in C++, compiled f. It knows full matrices only."""
+    function = address(problem)
+    counter = np.zeros(1)
+
+    def solve(tolerance):
+        counter[0] = 0.0
+        y, well = lsoda(function.address, problem.y0, problem.t, counter, tolerance, tolerance, MANY)
+        return y if well else np.full_like(y, np.nan)
+
+    def count(tolerance):
+        solve(tolerance)
+        return np.nan, counter[0]
+
+    return Solver("numbalsoda LSODA", solve, count)
+
+
+def numba_dop853(problem: Problem) -> Solver:
+    """DOP853 in Fortran, compiled f."""
+    function = address(problem)
+    counter = np.zeros(1)
+
+    def solve(tolerance):
+        counter[0] = 0.0
+        y, well = dop853(function.address, problem.y0, problem.t, counter, tolerance, tolerance, MANY)
+        return y if well else np.full_like(y, np.nan)
+
+    def count(tolerance):
+        solve(tolerance)
+        return np.nan, counter[0]
+
+    return Solver("numbalsoda DOP853", solve, count)
+
+
+def explicit_reference(problem: Problem, tolerance: float = 1e-13) -> np.ndarray:
+    """y at all times by DOP853, whose steps stability keeps short."""
+    return numba_dop853(problem).solve(tolerance)
+
+
+# scikit-sundae ------------------------------------------------------------------------------------------------
+
+READ = types.Array(types.float64, 1, "C", readonly=True)
+WRITE = types.float64[::1]
+
+
+def cvodes(problem: Problem) -> list[Solver]:
+    """CVODE's BDF, df/dy by its own differences and by compiled ones."""
+    own = cvode_options(problem)
+    other = own | {"jacfn": differences(problem)}
+    return [
+        cvode(problem, "scikit-sundae CVODE", own),
+        cvode(problem, "scikit-sundae CVODE, compiled df/dy", other),
+    ]
+
+
+def cvode_options(problem: Problem) -> dict:
+    """BDF with a dense matrix, or a band where the problem has one."""
+    if problem.band is None:
+        return {"method": "BDF", "linsolver": "dense"}
+    return {"method": "BDF", "linsolver": "band", "lband": problem.band[0], "uband": problem.band[1]}
+
+
+def cvode(problem: Problem, name: str, options: dict) -> Solver:
+    """CVODE with a compiled f."""
+    rhs = problem.rhs
+
+    @numba.njit(types.void(types.float64, READ, WRITE), error_model="numpy")
+    def function(t, y, yp):  # y is read-only there, which is another type to numba
+        rhs(t, numba.carray(address_as_void_pointer(y.ctypes.data), y.size, np.float64), yp)
+
+    def solver(tolerance):
+        return CVODE(function, rtol=tolerance, atol=tolerance, max_num_steps=MANY, **options)
+
+    def solve(tolerance):
+        return solver(tolerance).solve(problem.t, problem.y0).y
+
+    def count(tolerance):
+        steps = solver(tolerance).solve(problem.t[[0, -1]], problem.y0).t.size - 1
+        return steps, solver(tolerance).solve(problem.t, problem.y0).nfev
+
+    return Solver(name, solve, count)
+
+
+def differences(problem: Problem):
+    """df/dy : float64[n, n] by one-sided differences, compiled, as CVODE calls it."""
+    rhs = problem.rhs
+
+    @numba.njit(types.void(types.float64, READ, READ, types.float64[:, :]), error_model="numpy")
+    def jacobian(t, y, yp, found):
+        moved, rate = np.empty(y.size), np.empty(y.size)
+        for i in range(y.size):
+            moved[i] = y[i]
+        for j in range(y.size):
+            moved[j] = y[j] + 1.5e-8 * max(abs(y[j]), 1e-3)
+            rhs(t, moved, rate)
+            for i in range(y.size):
+                found[i, j] = (rate[i] - yp[i]) / (moved[j] - y[j])
+            moved[j] = y[j]
+
+    return jacobian
+
+
+# SciPy --------------------------------------------------------------------------------------------------------
+
+
+def returning(problem: Problem):
+    """f(t, y) -> dydt, compiled."""
+    rhs = problem.rhs
+
+    @numba.njit(error_model="numpy")
+    def function(t, y):
+        dydt = np.empty(y.size)
+        rhs(t, y, dydt)
+        return dydt
+
+    return function
+
+
+def scipy_ivp(problem: Problem, method: str) -> Solver:
+    """solve_ivp with a compiled f and, where there is a band, its pattern."""
+    function = returning(problem)
+    options = {}
+    if problem.band and method == "LSODA":
+        options = {"lband": problem.band[0], "uband": problem.band[1]}
+    elif problem.band and method in ("Radau", "BDF"):
+        n, (low, up) = problem.y0.size, problem.band
+        options = {"jac_sparsity": sparse.diags([np.ones(n)] * (low + up + 1), range(-low, up + 1), shape=(n, n))}
+    span = problem.t[[0, -1]]
+    run = partial(solve_ivp, function, span, problem.y0, method, **options)
+
+    def solve(tolerance):
+        return run(t_eval=problem.t, rtol=tolerance, atol=tolerance).y.T
+
+    def count(tolerance):
+        found = run(rtol=tolerance, atol=tolerance)
+        return found.t.size - 1, found.nfev
+
+    return Solver(f"SciPy {method}", solve, count)
+
+
+def scipy_odeint(problem: Problem) -> Solver:
+    """The same LSODA without solve_ivp's Python between steps."""
+    options = {"ml": problem.band[0], "mu": problem.band[1]} if problem.band else {}
+    run = partial(odeint, returning(problem), problem.y0, problem.t, tfirst=True, mxstep=10**6, **options)
+
+    def solve(tolerance):
+        return run(rtol=tolerance, atol=tolerance)
+
+    def count(tolerance):
+        numbers = run(rtol=tolerance, atol=tolerance, full_output=True)[1]
+        return numbers["nst"][-1], numbers["nfe"][-1]
+
+    return Solver("SciPy odeint (LSODA)", solve, count)

@@ -1,0 +1,106 @@
+"""The stiff cylinder: error of the trajectory against wall time, fvsolve beside its peers, printed and drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cylinder
+import numba
+import numpy as np
+from measure import Run, Solver, against, measured
+from peers_ode import Problem, explicit_reference, peers
+from price import price
+
+import fvsolve
+from fvsolve.steppers.methods import METHODS
+
+TARGETS = (1e-3, 1e-6, 1e-9)
+DEFAULT = "radau-iia-5"
+GOALS = {"scikit-sundae CVODE": 15.0, "SciPy Radau": 90.0, "numbalsoda LSODA": 1 / 1.5}  # times slower, at 1e-6
+PICTURE = Path(__file__).with_name("stiff.png")
+
+
+def cylinder_table(quick: bool) -> None:
+    """Work against precision, and the goals."""
+    problem = Problem(cylinder.rhs, cylinder.start(), np.linspace(0.0, cylinder.END, 201))
+    truth = explicit_reference(problem)
+    size = np.abs(truth).max(axis=0)
+
+    def distance(found):
+        return np.abs((found - truth) / size).max()
+
+    own = returning(problem.rhs)
+    other = fvsolve.integrate(own, problem.y0, problem.t, method="dormand-prince", rtol=1e-12)
+    print(f"\nStiff cylinder, 6 states, {cylinder.END} s, greatest eigenvalue ", end="")
+    print(f"{cylinder.greatest_eigenvalue(problem.t, truth):.1e} 1/s; ", end="")
+    print(f"the reference (DOP853, 1e-13) and Dormand-Prince at 1e-12 differ by {distance(other):.0e}")
+    tolerances = 10.0 ** -(np.array([3.0, 5, 7, 9]) if quick else np.arange(3.0, 11.0))
+    solvers = [fvsolve_solver(problem, name) for name in implicit_methods()] + peers(problem)
+    charts = {s.name: measured(s, tolerances, distance, 0.05 if quick else 0.3) for s in solvers}
+    for target in TARGETS:
+        verdict(charts, target)
+    draw(charts)
+
+
+def implicit_methods() -> list[str]:
+    """Implicit methods with an error estimate."""
+    return [m.name for m in METHODS.values() if m.adaptive and not m.explicit]
+
+
+def fvsolve_solver(problem: Problem, method: str) -> Solver:
+    """fvsolve.integrate by one method."""
+
+    def solve(tolerance, counts=None):
+        options = {"rtol": tolerance, "atol": tolerance, "counts": counts}
+        return fvsolve.integrate(problem.rhs, problem.y0, problem.t, method=method, **options)
+
+    def count(tolerance):
+        counts = {}
+        solve(tolerance, counts)
+        return counts["steps"], counts["rhs"]
+
+    return Solver(f"fvsolve {method}", solve, count)
+
+
+def verdict(charts: dict[str, list[Run]], target: float) -> None:
+    """Print what an error costs, each peer beside fvsolve's best method and its default."""
+    prices = {name: price([(r.wall, r.error) for r in runs], target) for name, runs in charts.items() if runs}
+    ours = {name: cost for name, (cost, _) in prices.items() if name.startswith("fvsolve")}
+    quickest = min(ours, key=ours.get) if ours else "fvsolve"
+    least, default = ours.get(quickest, np.nan), ours.get(f"fvsolve {DEFAULT}", np.nan)
+    print(f"\n  error {target:.0e}: wall time, and how many times that of {quickest} and of {DEFAULT}")
+    for name, (cost, how) in sorted(prices.items(), key=lambda item: item[1]):
+        said = against(GOALS[name], cost / least) if target == 1e-6 and name in GOALS else ""
+        print(f"    {name:36} {how or ' '}{cost * 1e3:9.3f} ms {cost / least:8.2f} {cost / default:8.2f}  {said}")
+
+
+def draw(charts: dict[str, list[Run]]) -> None:
+    """Wall time against error of all solvers, into PICTURE."""
+    from fvsolve.draw import style
+
+    made = style.figure(4.6)
+    axes = made.subplots()
+    for k, (name, runs) in enumerate(charts.items()):
+        line = "-" if name.startswith("fvsolve") else "--"
+        where = [r.error for r in runs], [r.wall * 1e3 for r in runs]
+        axes.loglog(*where, line, marker=".", lw=1.3, color=style.COLOURS[k % len(style.COLOURS)], label=name)
+    axes.set_xlabel("greatest error of the trajectory, in each state's range", fontsize=8.5, color=style.INK)
+    axes.set_ylabel("wall time [ms]", fontsize=8.5, color=style.INK)
+    axes.grid(True, color=style.HAIR, linewidth=0.5)
+    axes.invert_xaxis()
+    style.legend(axes)
+    style.title(made, "Stiff cylinder: what an error costs")
+    made.savefig(PICTURE)
+    print(f"\n  drawn: {PICTURE.name}")
+
+
+def returning(rhs):
+    """f(t, y) -> dydt around f(t, y, dydt), compiled."""
+
+    @numba.njit(error_model="numpy")
+    def function(t, y):
+        dydt = np.empty(y.size)
+        rhs(t, y, dydt)
+        return dydt
+
+    return function

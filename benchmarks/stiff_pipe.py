@@ -1,0 +1,108 @@
+"""Acoustics of a pipe of 1 000 cells: fvsolve beside its peers on the very same ordinary differential equations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+from acoustics import END, Acoustics
+from measure import Solver, against, best, measured
+from peers_ode import Problem, cvode, cvode_options, numba_dop853, numba_lsoda, scipy_ivp, scipy_odeint
+from price import price
+from stiff_cylinder import implicit_methods
+
+import fvsolve
+
+TARGET = 1e-6
+GOALS = {"explicit": 7.0, "implicit": 1.0}  # times faster than every peer; than CVODE with a band matrix
+BEYOND = "numbalsoda DOP853"  # no peer of the goals: explicit, compiled, and with the same f
+COURANTS = {"rk4": (0.7, 1.0, 1.2, 1.4), "dormand-prince": (1.0, 1.4)}  # upwind5 and RK4 are stable up to 1.43
+
+
+def pipe_table(quick: bool) -> None:
+    """Error of the end state to the exact one of the semi-discrete equations, against wall time."""
+    pulse = Acoustics(1000)
+    low, up = pulse.band
+    print(
+        f"\nA pulse in a pipe of {pulse.cells} cells, there and back; upwind5, band {low} + 1 + {up}; a call of f: ",
+        end="",
+    )
+    print(f"{call_time(pulse.rhs, pulse.start.y):.2f} us, interleaved {call_time(pulse.rhs_mixed, pulse.start.y):.2f}")
+    budget = 0.1 if quick else 0.5
+    tolerances = (1e-5, 1e-7) if quick else 10.0 ** -np.arange(4.0, 10.0)
+    charts = {"explicit": {}, "implicit": {}, "peers": {}}
+    for method, courants in COURANTS.items():
+        solver = stepped(pulse, method, "courant")
+        charts["explicit"][solver.name] = measured(solver, courants, pulse.distance, budget)
+    for method in implicit_methods():
+        solver = stepped(pulse, method, "rtol")
+        charts["implicit"][solver.name] = measured(solver, tolerances, pulse.distance, budget)
+    for solver in pipe_peers(pulse):
+        charts["peers"][solver.name] = measured(solver, tolerances, pulse.distance, budget)
+    verdict(charts)
+
+
+def call_time(rhs, y) -> float:
+    """Wall time of one compiled call [us]."""
+
+    @numba.njit
+    def many(times, y, dydt):
+        for _ in range(times):
+            rhs(0.0, y, dydt)
+
+    many(1, y, np.empty(y.size))
+    return best(lambda: many(1000, y, np.empty(y.size)), 0.05) * 1e3
+
+
+def stepped(pulse: Acoustics, method: str, control: str) -> Solver:
+    """fvsolve.advance through the scene; the setting is a Courant number or a tolerance."""
+    models = {}
+
+    def solve(setting):
+        if setting not in models:
+            models[setting] = pulse.build(method=method, **{control: float(setting)})
+        return fvsolve.advance(models[setting], pulse.start, END).y
+
+    return Solver(f"fvsolve {method}, {control}", solve)
+
+
+def pipe_peers(pulse: Acoustics) -> list[Solver]:
+    """Peers on the same equations: interleaved where they know a band, else as fvsolve keeps the states."""
+    t = np.array([0.0, 0.5 * END, END])
+    straight = Problem(pulse.rhs, pulse.start.y, t)
+    mixed = Problem(pulse.rhs_mixed, pulse.start.y[pulse.mixed], t, pulse.band)
+    back = np.argsort(pulse.mixed)
+    found = [at_end(solver, slice(None)) for solver in (numba_dop853(straight), numba_lsoda(straight))]
+    banded = [
+        cvode(mixed, "scikit-sundae CVODE, band", cvode_options(mixed)),
+        cvode(mixed, "scikit-sundae CVODE Adams, band", cvode_options(mixed) | {"method": "Adams"}),
+        scipy_odeint(mixed),
+    ]
+    return found + [at_end(solver, back) for solver in (*banded, scipy_ivp(mixed, "BDF"), scipy_ivp(mixed, "Radau"))]
+
+
+def at_end(solver: Solver, order) -> Solver:
+    """The same, with the end state alone, in fvsolve's order."""
+    return replace(solver, solve=lambda setting: solver.solve(setting)[-1][order])
+
+
+def verdict(charts) -> None:
+    """Print prices at end error TARGET beside fvsolve's best explicit and best implicit run."""
+    prices = {
+        name: (*price([(r.wall, r.error) for r in runs], TARGET), group)
+        for group, solvers in charts.items()
+        for name, runs in solvers.items()
+        if runs
+    }
+    least = {of: min((cost for cost, _, g in prices.values() if g == of), default=np.nan) for of in GOALS}
+    print(f"\n  end error {TARGET:.0e}: wall time, and how many times that of fvsolve's best explicit and implicit")
+    for name, (cost, how, group) in sorted(prices.items(), key=lambda item: item[1][0]):
+        factors = {of: cost / least[of] for of in GOALS}
+        said = []
+        if group == "peers" and name != BEYOND:
+            said.append(f"explicit, {against(GOALS['explicit'], factors['explicit'])}")
+        if "band" in name:
+            said.append(f"implicit, {against(GOALS['implicit'], factors['implicit'])}")
+        row = f"{name:36} {how or ' '}{cost * 1e3:9.2f} ms {factors['explicit']:8.2f} {factors['implicit']:8.2f}"
+        print(f"    {row}  {'; '.join(said)}")

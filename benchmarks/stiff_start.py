@@ -1,0 +1,96 @@
+"""What an implicit run takes longer than an explicit one of the same scene, as whole processes.
+
+This file runs itself, `python benchmarks/stiff_start.py KIND METHOD`, with a cache folder of its own. Cold is the
+first run in an empty cache; `after` the first implicit run where the explicit one has been before; warm every run
+from then on.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from networks import WATER
+
+EXPLICIT, IMPLICIT = "ssp-rk3", ("radau-iia-5", "esdirk-4")
+GOALS = {"cold": 8.0, "warm": 0.8}  # [s] more than the explicit run
+SCENES = {"dense": (1, 5), "banded": (1, 60), "sparse": (3, 30)}  # linear algebra -> (pipes, cells of each)
+ROOMS = ("irk", "dirk", "newton", "differences", "linear_", "structure", "pivots", "auto")  # that implicit steps are of
+
+
+def scene(kind: str, method: str) -> dict:
+    """Pipes that leave a lake for one gate, which shuts."""
+    pipes, cells = SCENES[kind]
+    links = {
+        f"p{i}": {
+            "type": "pipe",
+            "from": "lake",
+            "to": "gate",
+            "length": 100.0 + i,
+            "diameter": 0.3,
+            "wave_speed": 1000.0,
+            "friction": {"model": "none"},
+            "cells": cells,
+        }
+        for i in range(pipes)
+    }
+    demand = {"start": 0.1, "duration": 0.1, "value": [0.01, 0.0]}
+    nodes = {"lake": {"type": "reservoir", "head": 50.0}, "gate": {"type": "junction", "demand": demand}}
+    numerics = {"end": 0.3, "scheme": "upwind", "method": method, "courant": 0.9}
+    output = {"fields": 0, "probes": ["gate.pressure"]}
+    made = {"schema": 1, "title": kind, "fluid": dict(WATER), "nodes": nodes, "links": links}
+    return made | {"numerics": numerics, "output": output}
+
+
+def start_table(quick: bool) -> None:
+    """Wall times of first and later runs, and what a cache holds after an explicit run."""
+
+    print("\nStart-up, whole processes [s]; more: beyond the explicit run of the same scene")
+    print(f"  {'scene':8} {'method':12} {'cold':>6} {'more':>6} {'after':>6} {'more':>6} {'warm':>6} {'more':>6}")
+    worst = {"cold": 0.0, "warm": 0.0}
+    with tempfile.TemporaryDirectory(prefix="fvsolve-stiff-") as folder:
+        for kind in ["sparse"] if quick else SCENES:
+            base, first = first_and_later(Path(folder) / kind, kind, EXPLICIT, quick)
+            print(f"  {kind:8} {EXPLICIT:12} {first:6.2f} {'':6} {'':6} {'':6} {base:6.2f}", flush=True)
+            strays = compiled_rooms(Path(folder) / kind)
+            print(f"    compiled of the implicit rooms: {', '.join(strays) or 'nothing'}")
+            for method in IMPLICIT[: 1 if quick else None]:
+                cold = seconds(kind, method, Path(folder) / f"{kind}-{method}")
+                warm, after = first_and_later(Path(folder) / kind, kind, method, quick)
+                more = {"cold": cold - first, "after": after - base, "warm": warm - base}
+                cells = (
+                    f"{cold:6.2f} {more['cold']:6.2f} {after:6.2f} {more['after']:6.2f} {warm:6.2f} {more['warm']:6.2f}"
+                )
+                print(f"  {kind:8} {method:12} {cells}", flush=True)
+                worst = {name: max(worst[name], more[name]) for name in worst}
+    for name, most in GOALS.items():
+        print(
+            f"  {name}: {worst[name]:.2f} s more at worst, goal {most:g}: {'met' if worst[name] <= most else 'missed'}"
+        )
+
+
+def first_and_later(cache: Path, kind: str, method: str, quick: bool) -> tuple[float, float]:
+    """(best later, first) wall time of one scene in one cache [s]."""
+    first = seconds(kind, method, cache)
+    return min(seconds(kind, method, cache) for _ in range(2 if quick else 5)), first
+
+
+def seconds(kind: str, method: str, cache: Path) -> float:
+    """Wall time of one process [s]."""
+    import start_up
+
+    return start_up.seconds([sys.executable, __file__, kind, method], cache)
+
+
+def compiled_rooms(cache: Path) -> list[str]:
+    """Cached functions of the rooms that only implicit steps need."""
+    names = {path.name.split("-")[0] for path in cache.rglob("*.nbi")}
+    return sorted(name for name in names if name.startswith(ROOMS))
+
+
+if __name__ == "__main__":
+    import fvsolve
+
+    found = fvsolve.run(scene(*sys.argv[1:]))
+    sys.exit(0 if found.ok else found.reason)

@@ -1,0 +1,186 @@
+"""Which states the rate of each state can depend on, from the tables of a model alone. Knows indices; no values.
+
+A pipe's cells depend on their neighbours as far as the scheme reaches. Where a pipe meets a node, what it offers
+(its edge cells) is read by the node, and what the node makes of all offers together is read by the cells that look
+beyond the end. Tanks, chambers and given pressures part one group of nodes from the next: their pressure is their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from fvsolve.kernels import records as rec
+from fvsolve.steady import union
+
+Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depend on
+
+
+def sparsity(model) -> csc_array:
+    """bool[n + nodes, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
+    n, nodes = model.y_size, len(model.node_names)
+    pairs = [(np.arange(n), np.arange(n)), *Couplings(model).pairs()]
+    rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    return csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + nodes, n)), dtype=bool)
+
+
+class Reach(NamedTuple):
+    """How many cells a scheme looks at, for a wave that runs forward."""
+
+    behind: int  # cells before a cell, in its rate
+    ahead: int  # cells after it
+    entering: int  # cells under the polynomial beyond an end, where the wave enters
+    leaving: int  # and where it leaves
+
+
+def reach_of(settings) -> Reach:
+    """Reach of a model's scheme; pipes too short for it reach no further."""
+    family, degree = settings["scheme"], int(settings["degree"])
+    if family == rec.UPWIND:
+        return Reach(1, 0, 0, 1)
+    if family == rec.MUSCL:
+        return Reach(2, 1, 1, 3)
+    if family == rec.WENO5:
+        return Reach(3, 2, 4, 5)
+    used = [k - 2 for k in range(6) if settings[f"w{k}"] != 0.0]  # cells in the value after a cell, from it
+    return Reach(1 - min(used), max(0, *used), degree, degree + 1)
+
+
+class Couplings:
+    """The couplings of one model while they are collected."""
+
+    def __init__(self, model) -> None:
+        tables = model.tables
+        self.size = model.y_size
+        self.nodes, self.pipes = tables[rec.I_NODES], tables[rec.I_PIPES]
+        self.valves, self.columns = tables[rec.I_VALVES], tables[rec.I_COLUMNS]
+        settings = tables[rec.I_SETTINGS][0]
+        self.linear = settings["law"] == rec.LAW_LINEAR
+        self.upwind = settings["scheme"] == rec.UPWIND
+        self.reach = reach_of(settings)
+        self.inner = self.nodes["kind"] == rec.JUNCTION
+        self.sets = self.pressures()  # of each node, the states that set its pressure
+
+    def pairs(self) -> Iterator[Pairs]:
+        """All couplings but those of a state with itself."""
+        for pipe in self.pipes:
+            yield from self.inside(pipe)
+            yield from self.beyond(pipe)
+        yield from self.stored()
+        yield from self.rigid()
+
+    # nodes ------------------------------------------------------------------------------------------------------
+
+    def joints(self) -> list:
+        """Links whose ends are solved together: valves, and columns that all but shut valves can lead."""
+        return [*self.valves, *(column for column in self.columns if self.led(column))]
+
+    def led(self, column) -> bool:
+        """Whether there are openings at which a column's flow follows the valves at its end."""
+        return any(self.nodes["gates"][i] >= 0 for i in ends_of(column))
+
+    def own(self, i: int) -> np.ndarray:
+        """The state that is the mass stored in node i, or none."""
+        y = self.nodes["y"][i]
+        return np.array([y] if y >= 0 else [], dtype=np.int64)
+
+    def pressures(self) -> list[np.ndarray]:
+        """Of each node, the states that set its pressure: its own, or all that enter its group."""
+        ends = map(ends_of, self.joints())
+        group = union(len(self.nodes), [(i, j) for i, j in ends if self.inner[i] and self.inner[j]])
+        enter: list[list] = [[] for _ in group]
+        for pipe in self.pipes:
+            for right, i in enumerate(ends_of(pipe)):
+                enter[group[i]].append(self.offered(pipe, right))
+        for column in self.columns:
+            for i in ends_of(column):
+                enter[group[i]].append(column["y"])
+        for link in self.joints():
+            i, j = ends_of(link)
+            enter[group[i]].append(self.own(j))
+            enter[group[j]].append(self.own(i))
+        joined = [states(*some) for some in enter]
+        return [joined[group[i]] if self.inner[i] else self.own(i) for i in range(len(group))]
+
+    def stored(self) -> Iterator[Pairs]:
+        """What flows into tanks, chambers and given pressures: their mass, and their row of the ledger."""
+        into = [[self.own(i)] for i in range(len(self.nodes))]
+        for pipe in self.pipes:
+            for right, i in enumerate(ends_of(pipe)):
+                into[i].append(self.offered(pipe, right))
+        for link in self.joints():
+            i, j = ends_of(link)
+            into[i].append(self.sets[j])
+            into[j].append(self.sets[i])
+        for column in self.columns:
+            for i in ends_of(column):
+                into[i].append(column["y"])
+        for i in np.flatnonzero(~self.inner):
+            yield every(states(self.own(i), self.size + i), states(*into[i]))
+
+    def rigid(self) -> Iterator[Pairs]:
+        """A column's flow feels the pressures of both its ends."""
+        for column in self.columns:
+            yield every(states(column["y"]), states(*(self.sets[i] for i in ends_of(column))))
+
+    # pipes ------------------------------------------------------------------------------------------------------
+
+    def coupled(self, pipe) -> bool:
+        """Whether the rates of both waves depend on all that either of them reads."""
+        rough = pipe["friction"] in (rec.FRICTION_ROUGH, rec.FRICTION_HAZEN)
+        return bool(not self.linear or rough or (pipe["loss"] != 0.0 and not self.upwind))
+
+    def inside(self, pipe) -> Iterator[Pairs]:
+        """Cells on their neighbours."""
+        cells = np.arange(pipe["cells"])
+        looks = np.arange(-self.reach.behind, self.reach.ahead + 1)
+        at_once = [0] if pipe["loss"] != 0.0 else []
+        for wave, looks_of in ((0, (looks, -looks)), (1, (-looks, looks))):
+            other = looks_of[1] if self.coupled(pipe) else at_once
+            for source, offsets in ((wave, looks_of[0]), (1 - wave, other)):
+                for offset in offsets:
+                    here = cells[(cells + offset >= 0) & (cells + offset < cells.size)]
+                    first = pipe["y"] + source * cells.size
+                    yield pipe["y"] + wave * cells.size + here, first + here + offset
+
+    def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
+        """(cells of the wave that enters by an end, cells of the one that leaves), nearest first."""
+        forward = pipe["y"] + np.arange(pipe["cells"])
+        backward = forward + pipe["cells"]
+        return (backward[::-1], forward[::-1]) if right else (forward, backward)
+
+    def offered(self, pipe, right: int) -> np.ndarray:
+        """The edge cells that a node reads at one end of a pipe."""
+        enters, leaves = self.sides(pipe, right)
+        edge = slice(self.reach.leaving)
+        return leaves[edge] if self.linear else states(leaves[edge], enters[edge])
+
+    def beyond(self, pipe) -> Iterator[Pairs]:
+        """Cells that look beyond an end: on the polynomial there and, where the wave enters, on the node."""
+        for right, i in enumerate(ends_of(pipe)):
+            enters, leaves = self.sides(pipe, right)
+            near, last = slice(self.reach.behind), slice(max(self.reach.ahead, 1))
+            read = states(self.sets[i], self.offered(pipe, right), enters[: self.reach.entering])
+            yield every(enters[near], read)
+            yield every(leaves[last], leaves[: self.reach.leaving])
+            if self.coupled(pipe):
+                yield every(leaves[near], read)
+                yield every(enters[last], leaves[: self.reach.leaving])
+
+
+def ends_of(link) -> tuple[int, int]:
+    """Indices of the nodes at both ends of a link."""
+    return int(link["from_node"]), int(link["to_node"])
+
+
+def states(*parts) -> np.ndarray:
+    """Indices of states, each once."""
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(np.atleast_1d(part) for part in parts)]))
+
+
+def every(rows: np.ndarray, states: np.ndarray) -> Pairs:
+    """Each of some rows on each of some states."""
+    return np.repeat(rows, states.size), np.tile(states, rows.size)

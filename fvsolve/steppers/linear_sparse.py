@@ -1,0 +1,217 @@
+"""Factors of shift I - J on a fixed pattern of 2 x 2 blocks, pivots on the diagonal. Knows lists; searches for nothing.
+
+States go in pairs, pairs in an order that keeps the factors sparse, and where these can differ from zero is found
+once. The store holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a row to work in; a block
+is four numbers, row by row.
+"""
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.steppers.pairs import pairs
+from fvsolve.steppers.pivots import LEAST, bad_row, size_of
+from fvsolve.steppers.structure import OWN
+
+# The kind's own part: how many blocks, then offsets from its start. Of each new row its two states; L and U by rows;
+# the entries of J by rows: their places in the working row, and in the Jacobian.
+BLOCKS, ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_PLACES, J_ENTRIES = range(9)
+PARTS = 9
+LOST = 1e-13  # share of the determinant of a diagonal block that must be left of it
+
+
+def prepare(pattern) -> tuple[np.ndarray, int]:
+    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the store)."""
+    two, rows, columns, inside = blocks(pattern)
+    count = len(two)
+    order = minimum_degree(pattern_of(rows, columns, count))
+    new = np.argsort(order)
+    i, j = new[rows // 2], new[columns // 2]
+    in_order = pattern_of(2 * i, 2 * j, count).tocsr()
+    l_starts, l_columns, u_starts, u_columns = fill(count, in_order.indptr, in_order.indices)
+    by_rows = np.argsort(i, kind="stable")
+    j_starts = np.concatenate(([0], np.cumsum(np.bincount(i, minlength=count))))
+    j_places = (4 * j + 2 * (rows % 2) + columns % 2)[by_rows]
+    parts = (two[order].ravel(), l_starts, l_columns, u_starts, u_columns, j_starts, j_places, inside[by_rows])
+    offsets = PARTS + np.cumsum([0] + [part.size for part in parts[:-1]])
+    own = np.concatenate([np.asarray(part, dtype=np.int64) for part in ([count], offsets, *parts)])
+    return own, 4 * (l_columns.size + u_columns.size + 2 * count)
+
+
+def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(pairs of states; of the entries among states: row and column as 2 pair + member, place in the Jacobian)."""
+    n = pattern.shape[1]
+    two = pairs(pattern[:n])
+    member = np.empty(n, dtype=np.int64)
+    member[two[:, 1]] = 2 * np.arange(len(two)) + 1
+    member[two[:, 0]] = 2 * np.arange(len(two))
+    inside = np.flatnonzero(pattern.indices < n)
+    columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
+    return two, member[pattern.indices[inside]], member[columns[inside]], inside
+
+
+def pattern_of(rows, columns, count: int):
+    """Which of count x count blocks have an entry, sparse by columns."""
+    from scipy.sparse import coo_array, csc_array
+
+    found = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
+    found.sum_duplicates()
+    return found
+
+
+def minimum_degree(pattern) -> np.ndarray:
+    """int64[n]: rows in an order of few neighbours first, multiple minimum degree on A + A^T (Liu 1985).
+
+    SuperLU finds it while it factors a diagonally dominant matrix of this pattern, whose pivots stay put.
+    """
+    from scipy.sparse import csc_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    n = pattern.shape[0]
+    ones = csc_array(pattern, dtype=np.float64)
+    dominant = csc_array(diags_array(np.full(n, 2.0 * ones.sum(axis=1).max() + 2.0)) - ones)
+    factors = splu(dominant, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0)
+    return np.argsort(factors.perm_c).astype(np.int64)
+
+
+def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(starts and columns of L, starts and columns of U) by rows, for pivots on the diagonal."""
+    starts, columns = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int64)
+    room = 4 * columns.size + 16
+    while True:
+        l_starts, u_starts, chain = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
+        l_columns, u_columns = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+        if eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
+            return l_starts, l_columns[: l_starts[n]].copy(), u_starts, u_columns[: u_starts[n]].copy()
+        room *= 2
+
+
+@njit
+def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
+    """Patterns of L and U; False where there is no room for them.
+
+    A row of U holds what its row of J does, and the rows of U that L calls for. chain : int64[n + 1]  the columns
+    of the row, each with the next one; chain[n] holds the first, n ends it.
+    """
+    n = chain.size - 1
+    for i in range(n):
+        last = n
+        for p in range(starts[i], starts[i + 1]):
+            chain[last], last = columns[p], columns[p]
+        chain[last] = n
+        at, end, k = l_starts[i], u_starts[i], chain[n]
+        while k < i:
+            if at == l_columns.size:
+                return False
+            l_columns[at] = k
+            at += 1
+            last = k
+            for p in range(u_starts[k], u_starts[k + 1]):
+                j = u_columns[p]
+                while chain[last] < j:
+                    last = chain[last]
+                if chain[last] != j:
+                    chain[last], chain[j] = j, chain[last]
+                last = j
+            k = chain[k]
+        k = chain[k] if k == i else k
+        while k < n:
+            if end == u_columns.size:
+                return False
+            u_columns[end] = k
+            end += 1
+            k = chain[k]
+        l_starts[i + 1], u_starts[i + 1] = at, end
+    return True
+
+
+@njit(forceinline=True)
+def place(shape, which):
+    """Where one of the kind's own lists begins."""
+    return shape[OWN] + shape[shape[OWN] + which]
+
+
+@njit(forceinline=True)
+def clear(block):
+    """Four zeros."""
+    block[0] = block[1] = block[2] = block[3] = 0.0
+
+
+def factor(shape, jacobian, shift, store):
+    """store <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
+
+    A diagonal block is good whose determinant keeps 1e-13 of what it was at first and of its two terms: a measure
+    that does not depend on the units of states.
+    """
+    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
+    l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
+    u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
+    starts, places = shape[place(shape, J_STARTS) :], shape[place(shape, J_PLACES) :]
+    entries = shape[place(shape, J_ENTRIES) :]
+    lower, upper = store, store[4 * l_starts[count] :]
+    inverse, row = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
+    bad = bad_row(shape, jacobian)
+    if bad > 0:
+        return bad
+    for e in range(4 * count):
+        row[e] = 0.0
+    for i in range(count):
+        for p in range(starts[i], starts[i + 1]):
+            row[places[p]] = -jacobian[entries[p]]
+        own = row[4 * i : 4 * i + 4]
+        own[0] += shift
+        own[3] += shift if order[2 * i] != order[2 * i + 1] else 1.0
+        first = size_of(own[0] * own[3]) + size_of(own[1] * own[2])
+        for p in range(l_starts[i], l_starts[i + 1]):
+            k = l_columns[p]
+            x, d, share = row[4 * k : 4 * k + 4], inverse[4 * k : 4 * k + 4], lower[4 * p : 4 * p + 4]
+            l0, l1 = x[0] * d[0] + x[1] * d[2], x[0] * d[1] + x[1] * d[3]
+            l2, l3 = x[2] * d[0] + x[3] * d[2], x[2] * d[1] + x[3] * d[3]
+            share[0], share[1], share[2], share[3] = l0, l1, l2, l3
+            clear(x)
+            for q in range(u_starts[k], u_starts[k + 1]):
+                u, y = upper[4 * q : 4 * q + 4], row[4 * u_columns[q] : 4 * u_columns[q] + 4]
+                y0, y1 = y[0] - (l0 * u[0] + l1 * u[2]), y[1] - (l0 * u[1] + l1 * u[3])
+                y2, y3 = y[2] - (l2 * u[0] + l3 * u[2]), y[3] - (l2 * u[1] + l3 * u[3])
+                y[0], y[1], y[2], y[3] = y0, y1, y2, y3
+        a, b, c, d = own[0], own[1], own[2], own[3]
+        clear(own)
+        one, other = a * d, b * c
+        det = one - other
+        left = size_of(det)
+        if not (LEAST < left < 1.0 / LEAST and left > LOST * max(first, size_of(one) + size_of(other))):
+            return order[2 * i] + 1
+        per = det.conjugate() / (det.real * det.real + det.imag * det.imag)
+        y = inverse[4 * i : 4 * i + 4]
+        y[0], y[1], y[2], y[3] = d * per, -b * per, -c * per, a * per
+        for q in range(u_starts[i], u_starts[i + 1]):
+            u, x = upper[4 * q : 4 * q + 4], row[4 * u_columns[q] : 4 * u_columns[q] + 4]
+            u[0], u[1], u[2], u[3] = x[0], x[1], x[2], x[3]
+            clear(x)
+    return 0
+
+
+def solve(shape, store, x):
+    """x <- (shift I - J)^-1 x."""
+    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
+    l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
+    u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
+    lower, upper = store, store[4 * l_starts[count] :]
+    inverse, work = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
+    for i in range(count):
+        a, b = x[order[2 * i]], x[order[2 * i + 1]]
+        for p in range(l_starts[i], l_starts[i + 1]):
+            share, y = lower[4 * p : 4 * p + 4], work[2 * l_columns[p] : 2 * l_columns[p] + 2]
+            a -= share[0] * y[0] + share[1] * y[1]
+            b -= share[2] * y[0] + share[3] * y[1]
+        work[2 * i], work[2 * i + 1] = a, b
+    for i in range(count - 1, -1, -1):
+        a, b = work[2 * i], work[2 * i + 1]
+        for p in range(u_starts[i], u_starts[i + 1]):
+            u, y = upper[4 * p : 4 * p + 4], work[2 * u_columns[p] : 2 * u_columns[p] + 2]
+            a -= u[0] * y[0] + u[1] * y[1]
+            b -= u[2] * y[0] + u[3] * y[1]
+        d = inverse[4 * i : 4 * i + 4]
+        first, second = d[0] * a + d[1] * b, d[2] * a + d[3] * b
+        work[2 * i], work[2 * i + 1] = first, second
+        x[order[2 * i + 1]] = second  # a state without a partner is written over by its own
+        x[order[2 * i]] = first
