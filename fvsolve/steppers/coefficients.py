@@ -12,12 +12,15 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
+from fvsolve.steppers.rosenbrock import Rosenbrock
 from fvsolve.steppers.tableau import Method
 
 
 @functools.cache
 def coefficients(method: Method) -> tuple[np.ndarray, np.ndarray, int]:
     """(flat coefficients, dense output : float64[s, d], stages s), the start as an explicit stage included."""
+    if isinstance(method, Rosenbrock):
+        return method.coefficients
     a, b, c, dense = method.a, method.b, method.c, method.dense
     error = method.error if method.adaptive else np.zeros(len(b))
     if a[0].any() or c[0] != 0.0:

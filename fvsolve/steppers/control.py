@@ -8,9 +8,11 @@ from fvsolve.steppers.orders import (
     COURANT,
     END,
     ERROR_OLD,
-    IMPLICIT,
+    EXPLICIT,
+    KIND,
     LAST,
     N_MARK,
+    NEWTON_SOLVED,
     ORDER,
     SIZE,
     STEP,
@@ -53,7 +55,7 @@ def next_step(orders, memory, out_rate, k, scale):
         if memory[STEP] <= 0.0:
             memory[STEP] = first_step(k, scale, orders, orders[END] - memory[T])
         stable = orders[STEP_MAX]  # error control alone would chatter at the limit of an explicit method
-        if out_rate > 0.0 and orders[IMPLICIT] == 0.0:
+        if out_rate > 0.0 and orders[KIND] == EXPLICIT:
             stable = 2.0 / out_rate
         return min(memory[STEP], orders[STEP_MAX], max(stable, shortest(orders, memory)))
     h = orders[SIZE]
@@ -75,7 +77,7 @@ def reduced(orders, e):
 def grown(orders, memory, h, e):
     """Factor on an accepted step of error e: PI control (Gustafsson 1991); predictive for implicit methods (1994)."""
     e, old, order = max(e, 1e-10), max(memory[ERROR_OLD], 1e-4), orders[ORDER]
-    if orders[IMPLICIT] == 0.0:
+    if orders[KIND] == EXPLICIT:
         return min(5.0, max(0.2, 0.9 * e ** (-0.7 / order) * old ** (0.4 / order)))
     grow = 0.9 * e ** (-1.0 / order)
     if memory[ERROR_OLD] > 0.0 and memory[STEPS] > 0.0:
@@ -86,4 +88,4 @@ def grown(orders, memory, h, e):
 @njit(forceinline=True)
 def kept(orders, grow):
     """Whether an implicit step that may grow so little keeps its length."""
-    return orders[IMPLICIT] == 1.0 and 1.0 <= grow <= DEAD_BAND
+    return orders[KIND] == NEWTON_SOLVED and 1.0 <= grow <= DEAD_BAND

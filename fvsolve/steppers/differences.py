@@ -6,7 +6,7 @@ from fvsolve.steppers.structure import COLOR_COLUMNS, COLOR_STARTS, COLORS, LEDG
 ROOT = 2.0**-26  # the root of the rounding of a float64
 
 
-@njit
+@njit(forceinline=True)
 def differences(rhs, handle, shape, where, t, y, f, supply0, scale, y_work, f_work, out, jacobian):
     """jacobian <- d(f, supply)/dy by one-sided differences; returns the number of calls of rhs.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.newton import (
     BASE,
@@ -32,7 +32,7 @@ from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
 
-@njit
+@inner
 def predict(b, c, x, first, vectors, k):
     """k <- slope at x last steps beyond the last one's end, by the parabola through its ends and the slope at its end.
 
@@ -49,7 +49,7 @@ def predict(b, c, x, first, vectors, k):
                 k[i] -= w * last[i]
 
 
-@njit
+@inner
 def solve_stage(
     rhs, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, orders, memory, nnz, work, vectors, store
 ):  # fmt: skip
@@ -85,7 +85,7 @@ def solve_stage(
     return why
 
 
-@njit
+@inner
 def try_stages(
     rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, orders, memory, nnz,
     work, vectors, store,

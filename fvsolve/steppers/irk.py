@@ -8,11 +8,12 @@ pair (Butcher 1976; Hairer and Wanner 1996, IV.8). With W = T^-1 Z Newton solves
 
 from __future__ import annotations
 
+import functools
 from math import sqrt
 
 import numpy as np
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
 from fvsolve.steppers.newton import (
     CONVERGED,
@@ -39,6 +40,7 @@ from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTO
 from fvsolve.steppers.step import combine, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
+from fvsolve.steppers.tableau import Method
 
 # Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
 T, BACK, BLOCKS, SLOPES, AHEAD, START = range(6)
@@ -77,11 +79,11 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
     return np.concatenate([part.ravel() for part in parts])
 
 
-def pairs_of(coefficients: np.ndarray, s: int) -> int:
+@functools.cache
+def pairs_of(method: Method) -> int:
     """Number of complex pairs among the eigenvalues of A^-1."""
-    q = s - 1
-    blocks = coefficients[s * s + 3 * s + BLOCKS * q * q :][: q * q].reshape(q, q)
-    return int(np.count_nonzero(np.tril(blocks, -1)))
+    a = method.a[1:, 1:] if not method.a[0].any() else method.a
+    return int(np.count_nonzero(np.linalg.eigvals(a).imag > 0))
 
 
 @njit(inline="always")
@@ -105,9 +107,9 @@ def blend(keep, base, m, at, q, first, vectors, target):
                 target[e] = keep * base[e] + (c0 * v0[e] + (c1 * v1[e] + c2 * v2[e]))
 
 
-@njit
+@inner
 def predict(coefficients, h, h_last, s, room, vectors):
-    """W <- T^-1 of the increments that the last step's slopes promise for the stages of this one; room : float64[q q]."""
+    """W <- T^-1 of the increments that the last step's slopes promise for this step's stages; room : float64[q q]."""
     q, c = s - 1, nodes_of(coefficients, s)
     back, ahead = matrix(coefficients, s, BACK), matrix(coefficients, s, AHEAD)
     for e in range(q * q):
@@ -124,7 +126,7 @@ def predict(coefficients, h, h_last, s, room, vectors):
         blend(0.0, vectors[s + WEIGHTS], room, i * q, q, 1, vectors, vectors[s + STAGES + i])
 
 
-@njit
+@inner
 def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n, memory):
     """Factors for every block of L / h behind one another; False without a pivot."""
     q, blocks, b, real, pair = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n
@@ -143,7 +145,7 @@ def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store
     return True
 
 
-@njit
+@inner
 def solve_blocks(solve, solve_complex, shape, coefficients, s, size, store, store_complex, vectors):
     """(L / h x I - I x J) dW = R, in place of R."""
     q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
@@ -162,7 +164,7 @@ def solve_blocks(solve, solve_complex, shape, coefficients, s, size, store, stor
             b, real = b + 1, real + size
 
 
-@njit
+@inner
 def iterate(
     rhs, solve, solve_complex, handle, coefficients, shape, t, h, y, y_stage, k0, supply, where, out, orders, memory,
     work, vectors, store, store_complex,
@@ -210,7 +212,7 @@ def iterate(
     return why
 
 
-@njit
+@inner
 def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
     """Slopes k of the stages from W; ledger rates of the stages from those of the last f and its last increment."""
     s = k.shape[0]
@@ -225,7 +227,7 @@ def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
             book_increment(shape, nnz, d, supply, i + 1, work)
 
 
-@njit
+@inner
 def filtered_error(
     rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store
 ):

@@ -1,6 +1,6 @@
-"""The package's own methods by name, explicit and implicit. Knows no time loop."""
+"""The package's own methods by name, explicit, implicit and linearly implicit. Knows no time loop."""
 
-from fvsolve.steppers import explicit, implicit  # noqa: F401  (declare them)
+from fvsolve.steppers import explicit, implicit, rosenbrock  # noqa: F401  (declare them)
 from fvsolve.steppers.tableau import METHODS
 
 __all__ = ["METHODS"]

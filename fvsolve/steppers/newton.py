@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.orders import CALLS, CONTROL, JACOBIANS, LAST, SIZE, STEPS, TOLERANCE, WORST
 from fvsolve.steppers.step import copy
@@ -36,7 +36,7 @@ def forget(work: np.ndarray) -> None:
     work[SEEN], work[SURE] = -1.0, 1.0
 
 
-@njit
+@inner
 def begin(k, y, scale, orders, memory, work, vectors):
     """At the first try of a step: keep the last stages to go on from; judge the Jacobian by their iterations."""
     s, n = k.shape
@@ -55,7 +55,7 @@ def begin(k, y, scale, orders, memory, work, vectors):
     work[SEEN], work[RATIO] = memory[STEPS], 0.0
 
 
-@njit
+@inner
 def renew(rhs, handle, shape, where, t, y, k, supply, scale, out, memory, work, vectors):
     """The Jacobian at the start of the step, from the fresh f there."""
     s = k.shape[0]
@@ -68,7 +68,7 @@ def renew(rhs, handle, shape, where, t, y, k, supply, scale, out, memory, work, 
     work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, memory[STEPS], 0.0, 0.0
 
 
-@njit
+@inner
 def size_of(d, weights):
     """Sum of squares of an increment in units of the tolerance."""
     total = 0.0
@@ -77,7 +77,7 @@ def size_of(d, weights):
     return total
 
 
-@njit
+@inner
 def find_worst(d, weights, memory):
     """Note the component that moves most against its tolerance, or that is no number."""
     worst = -1.0
@@ -87,7 +87,7 @@ def find_worst(d, weights, memory):
             worst, memory[WORST] = e, i
 
 
-@njit
+@inner
 def verdict(turn, size, before, orders, work):
     """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
     fixed = orders[CONTROL] != TOLERANCE
@@ -112,7 +112,7 @@ def verdict(turn, size, before, orders, work):
     return turn == MOST - 1, FAILED
 
 
-@njit
+@inner
 def book_increment(shape, nnz, d, supply, i, work):
     """Add to the ledger rates of stage i what the last increment d of its state changes in them, by that Jacobian."""
     n, product = d.size, work[HEADER + nnz :]

@@ -50,9 +50,9 @@ def integrate(
     stops = t[1:] if lands else t[-1:]
     stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, n + 1))
     if f not in _COMPILED:
-        _COMPILED[f] = _functions(f, t[0], y0)
-    functions, handle = _COMPILED[f], np.array([id(f)])
-    _PYTHON[id(f)] = f if in_place(f) else lambda t, y, dydt: dydt.__setitem__(slice(None), f(t, y))
+        _COMPILED[f] = _functions(f, t[0], y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
+    functions, _PYTHON[id(f)] = _COMPILED[f]
+    handle = np.array([id(f)])
     _RAISED.pop(id(f), None)
     found = np.empty((t.size, n))
     found[0] = y0
@@ -96,7 +96,7 @@ def _check(method, t, rtol, step) -> None:
             raise FvsolveError(f"{name} = {value!r} is not a positive number")
 
 
-_COMPILED: WeakKeyDictionary = WeakKeyDictionary()  # function of the user -> functions of the loop
+_COMPILED: WeakKeyDictionary = WeakKeyDictionary()  # the user's function -> the loop's, and f(t, y, dydt)
 _PYTHON: dict[int, Callable] = {}  # functions that numba cannot compile, by the number in their handle
 _RAISED: dict[int, BaseException] = {}  # what they raised
 WHERE = 3  # no ledger behind it in `out`

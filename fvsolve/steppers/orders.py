@@ -10,8 +10,9 @@ COUNTS = {
 }  # fmt: skip
 # What a call is told.
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
-ORDER, FSAL, IMPLICIT = range(11, 14)  # of the error estimate; the last stage is the next first; Newton solves stages
+ORDER, FSAL, KIND = range(11, 14)  # power of h of the error estimate; whether the last stage is the next first; kind
 ORDERS = 14
+EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
 # Why a call came back.
 DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK = range(9)

@@ -16,41 +16,30 @@ def copy(source, target):
 
 @njit
 def combine(y, h, weights, count, k, out):
-    """out = y + h sum of weights[j] k[j] over j < count; up to three terms a pass."""
-    terms, c, which = 0, (0.0, 0.0, 0.0), (0, 0, 0)
-    first = True
+    """out = y + h sum of weights[j] k[j] over j < count; three terms a pass where there are so many."""
+    one, two, moved, base = -1, -1, False, y
     for j in range(count):
-        if weights[j] != 0.0:
-            if terms == 0:
-                c, which = (h * weights[j], 0.0, 0.0), (j, 0, 0)
-            elif terms == 1:
-                c, which = (c[0], h * weights[j], 0.0), (which[0], j, 0)
-            else:
-                c, which = (c[0], c[1], h * weights[j]), (which[0], which[1], j)
-            terms += 1
-            if terms == 3:
-                add(y if first else out, c, which, terms, k, out)
-                first, terms = False, 0
-    if terms > 0:
-        add(y if first else out, c, which, terms, k, out)
-    elif first:
+        if weights[j] == 0.0:
+            continue
+        if one < 0:
+            one = j
+        elif two < 0:
+            two = j
+        else:
+            c0, c1, c2, k0, k1, k2 = h * weights[one], h * weights[two], h * weights[j], k[one], k[two], k[j]
+            for i in range(out.size):
+                out[i] = base[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
+            base, moved, one, two = out, True, -1, -1
+    if two >= 0:
+        c0, c1, k0, k1 = h * weights[one], h * weights[two], k[one], k[two]
+        for i in range(out.size):
+            out[i] = base[i] + (c0 * k0[i] + c1 * k1[i])
+    elif one >= 0:
+        c0, k0 = h * weights[one], k[one]
+        for i in range(out.size):
+            out[i] = base[i] + c0 * k0[i]
+    elif not moved:
         copy(y, out)
-
-
-@njit
-def add(y, c, which, terms, k, out):
-    """out = y + c0 k0 (+ c1 k1 (+ c2 k2))."""
-    k0, k1, k2 = k[which[0]], k[which[1]], k[which[2]]
-    c0, c1, c2 = c
-    if terms == 1:
-        for i in range(out.size):
-            out[i] = y[i] + c0 * k0[i]
-    elif terms == 2:
-        for i in range(out.size):
-            out[i] = y[i] + (c0 * k0[i] + c1 * k1[i])
-    else:
-        for i in range(out.size):
-            out[i] = y[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
 
 
 @njit

@@ -11,6 +11,7 @@ from fvsolve.jit import argument
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.coefficients import coefficients
 from fvsolve.steppers.march import compiled, compiled_step, no_algebra
+from fvsolve.steppers.rosenbrock import Rosenbrock
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
 
@@ -37,7 +38,7 @@ class Stepper:
         self.flags = np.array([told.FRESH, 0, 0, 1, 0], dtype=np.int64)
         self.orders[told.ORDER] = method.control_order
         self.orders[told.FSAL] = method.explicit and method.first_same_as_last
-        self.orders[told.IMPLICIT] = not method.explicit
+        self.orders[told.KIND] = KINDS[kind_of(method)]
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
         self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
         self.g = self.g_new = self.none
@@ -48,13 +49,13 @@ class Stepper:
         from fvsolve.steppers import newton
 
         q = pairs = 0
-        if not self.method.diagonally_implicit:
+        if kind_of(self.method) == "irk":
             from fvsolve.steppers.irk import pairs_of
 
-            q, pairs = s - 1, pairs_of(self.coefficients, s)
+            q, pairs = s - 1, pairs_of(self.method)
         reals = q - 2 * pairs if q else 1
         size, self.shape = structure.store_size, structure.shape
-        self.work = np.zeros(newton.HEADER + structure.nnz + n + ledgers + q * q)
+        self.work = np.zeros(newton.HEADER + structure.nnz + n + 2 * ledgers + q * q)
         self.work[newton.STORE] = size
         self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
         self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
@@ -96,8 +97,19 @@ def arguments(functions: tuple) -> tuple:
     return tuple(argument(function) for function in functions)
 
 
+# Files of steps, and what they are to the loop.
+KINDS = {"erk": told.EXPLICIT, "dirk": told.NEWTON_SOLVED, "irk": told.NEWTON_SOLVED, "ros": told.LINEARLY_IMPLICIT}
+
+
+@functools.cache
+def kind_of(method: Method) -> str:
+    """Which file of steps takes a method's: explicit, stages in turn, stages at once, or linearly implicit."""
+    if isinstance(method, Rosenbrock):
+        return "ros"
+    return "erk" if method.explicit else "dirk" if method.diagonally_implicit else "irk"
+
+
 @functools.cache
 def attempt_of(method: Method):
-    """The compiled step of a method: explicit, diagonally implicit or fully implicit, each in a file of its own."""
-    kind = "erk" if method.explicit else "dirk" if method.diagonally_implicit else "irk"
-    return compiled_step(importlib.import_module(f"fvsolve.steppers.{kind}").attempt)
+    """The compiled step of a method; each kind is compiled only where it is used."""
+    return compiled_step(importlib.import_module(f"fvsolve.steppers.{kind_of(method)}").attempt)

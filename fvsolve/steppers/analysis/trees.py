@@ -43,12 +43,14 @@ class Conditions:
     """sum_i b_i phi_i(tree) = 1 / gamma(tree) for one array A, and any weights b.
 
     rounding : relative error of each coefficient, 0 where they are exact.
+    single : the array that a lone branch takes in place of A, for Rosenbrock methods alpha + Gamma in place of alpha
+    (Hairer and Wanner 1996, theorem IV.7.3).
     """
 
-    def __init__(self, a: Sequence[Sequence], rounding: Fraction = Fraction(0)):
+    def __init__(self, a: Sequence[Sequence], rounding: Fraction = Fraction(0), single: Sequence[Sequence] = ()):
         self.rounding = rounding
-        self.a = [[(j, short(x) if rounding else x) for j, x in enumerate(row) if x != 0] for row in a]
-        self.size = [[(j, abs(x)) for j, x in row] for row in self.a] if rounding else None
+        self.a = self._rows(a)
+        self.single = self._rows(single) if len(single) else self.a
         self.known: dict[tuple[Tree, bool], list] = {}
 
     def residual(self, tree: Tree, b: Sequence):
@@ -72,12 +74,18 @@ class Conditions:
             p += 1
         return p
 
+    def _rows(self, a: Sequence[Sequence]) -> list:
+        return [[(j, short(x) if self.rounding else x) for j, x in enumerate(row) if x != 0] for row in a]
+
     def _phi(self, tree: Tree, absolute: bool) -> list:
         """Products over the branches of A phi(branch); of absolute values where their size is wanted."""
         if (tree, absolute) not in self.known:
             found = [Fraction(1)] * len(self.a)
-            rows = self.size if absolute else self.a
-            for branch in trees(tree[0])[tree[1]]:
+            branches = trees(tree[0])[tree[1]]
+            rows = self.single if len(branches) == 1 else self.a
+            if absolute:
+                rows = [[(j, abs(x)) for j, x in row] for row in rows]
+            for branch in branches:
                 inner = self._phi(branch, absolute)
                 found = [
                     f * sum((x * inner[j] for j, x in row), Fraction(0)) if f != 0 else f

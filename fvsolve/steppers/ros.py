@@ -1,0 +1,90 @@
+"""One step of a Rosenbrock method: every stage is one linear solve with the Jacobian at its start. Knows arrays.
+
+(I / (h g) - J) u_i = f(t + c_i h, y + sum a_ij u_j) + sum C_ij u_j / h + d_i h f_t, y+ = y + sum m_i u_i
+(Hairer and Wanner 1996, (IV.7.25)). Stages are kept as k_i = u_i / h.
+"""
+
+from __future__ import annotations
+
+from fvsolve.jit import inner, njit
+from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
+from fvsolve.steppers.differences import multiply
+from fvsolve.steppers.newton import HAS, HEADER, INCREMENT, RATE, SEEN, SHIFT, renew
+from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
+from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.structure import SIZE as STATES
+from fvsolve.steppers.structure import STARTS
+
+SLOPE = 5  # the row of `vectors`, behind the stages, that keeps df/dt
+
+
+@inner
+def slope_in_time(rhs, handle, t, h, y, k, supply, where, out, memory, work, vectors):
+    """df/dt and, last in `work`, that of the ledger rates, by a difference that stays within the step."""
+    s, n = k.shape
+    slope, ledgers = vectors[s + SLOPE], supply.shape[1]
+    step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
+    later = t + step
+    rhs(later, y, slope, out, handle)
+    memory[CALLS] += 1.0
+    per = 1.0 / (later - t)
+    for e in range(n):
+        slope[e] = (slope[e] - k[0, e]) * per
+    for m in range(ledgers):
+        work[work.size - ledgers + m] = (out[where + m] - supply[0, m]) * per
+
+
+@njit
+def attempt(
+    rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
+    where, out, scale, orders, memory, work, vectors, store, store_complex,
+):  # fmt: skip
+    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+
+    Of the linear algebra the real part is used. Returns NEWTON_FAILED where the matrix is singular.
+    """
+    s, n = k.shape
+    ledgers, nnz = supply.shape[1], shape[shape[STARTS] + shape[STATES]]
+    c, beyond = nodes_of(coefficients, s), coefficients[s * s + 3 * s :]  # C, d, g
+    gamma, slope, d, f = beyond[s * s + s], vectors[s + SLOPE], vectors[s + INCREMENT], vectors[s + RATE]
+    if work[HAS] == 0.0 or work[SEEN] != memory[STEPS]:
+        renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+        slope_in_time(rhs, handle, t, h, y[now], k, supply, where, out, memory, work, vectors)
+        work[SEEN] = memory[STEPS]
+    shift = 1.0 / (h * gamma)
+    if work[SHIFT] != shift:
+        memory[FACTORS] += 1.0
+        work[SHIFT] = 0.0
+        if factor(shape, work[HEADER:], shift, store) != 0:
+            return NEWTON_FAILED
+        work[SHIFT] = shift
+    for i in range(1, s):
+        if i == 1:
+            f = k[0]
+            for m in range(ledgers):
+                out[where + m] = supply[0, m]
+        else:
+            f = vectors[s + RATE]
+            combine(y[now], h, row_of(coefficients, s, i), i, k, y[3])
+            rhs(t + c[i] * h, y[3], f, out, handle)
+        late = beyond[s * s + i] * h
+        for e in range(n):
+            d[e] = f[e] + late * slope[e]
+        combine(d, 1.0, beyond[i * s : (i + 1) * s], i, k, k[i])
+        solve(shape, store, k[i])
+        for e in range(n):
+            d[e] = k[i, e]
+            k[i, e] /= h
+        if ledgers > 0:
+            product = work[HEADER + nnz :]
+            multiply(shape, work[HEADER : HEADER + nnz], d, product)
+            for m in range(ledgers):
+                total = out[where + m] + product[n + m] + late * work[work.size - ledgers + m]
+                for j in range(1, i):
+                    total += beyond[i * s + j] * supply[j, m]
+                supply[i, m] = gamma * total
+    memory[CALLS] += s - 2.0
+    combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
+    if orders[CONTROL] != TOLERANCE:
+        return 0.0
+    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])

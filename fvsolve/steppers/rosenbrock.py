@@ -1,0 +1,161 @@
+"""Rosenbrock methods as their codes print them, and what follows from that. Knows no time loop.
+
+k_i h = h f(y + sum alpha_ij h k_j) + h J sum gamma_ij h k_j; the codes avoid the product with J by u = Gamma h k:
+A = alpha Gamma^-1, C = diag(1 / gamma) - Gamma^-1, m = b Gamma^-1 (Hairer and Wanner 1996, IV.7).
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.steppers.analysis.trees import Conditions
+from fvsolve.steppers.tableau import METHODS, Array, Method
+
+DIGITS = 14  # that are left of the printed ones once Gamma has been inverted
+
+
+@dataclass(frozen=True, eq=False)
+class Rosenbrock(Method):
+    """One linear solve a stage; of stiffly accurate kind: y+ = y_s + u_s, and u_s estimates the error.
+
+    text : rows `c_i d_i | a_i1 a_i2 ...`, c and d the sums of rows of alpha and Gamma; ruled lines before C and before
+    the polynomials of its dense output, y(theta) = y + theta (y+ - y) + theta (1 - theta) sum_k theta^k (H u)_k.
+    """
+
+    gamma: str = field(default="", repr=False)
+
+    @functools.cached_property
+    def printed(self) -> tuple:
+        """(c, d, A, C, H) as fractions; A and C square."""
+        blocks: list[list[list[Fraction]]] = [[], [], []]
+        at, sums = 0, []
+        for line in self.text.strip().splitlines():
+            left, _, right = line.partition("|")
+            if set(line.strip()) <= set("-+ "):
+                at += 1
+                continue
+            row = [Fraction(word) for word in right.split()]
+            blocks[at].append(row)
+            if at == 0:
+                sums.append([Fraction(word) for word in left.split()])
+        s = len(sums)
+        a, c, h = ([row + [Fraction(0)] * (s - len(row)) for row in block] for block in blocks)
+        return [one[0] for one in sums], [one[1] for one in sums], a, c, h
+
+    @functools.cached_property
+    def forms(self) -> tuple:
+        """(alpha, Gamma, b, b of the embedded solution) in fractions."""
+        _, _, a, c, _ = self.printed
+        s = len(a)
+        inverse = [
+            [(1 / Fraction(self.gamma) if i == j else Fraction(0)) - c[i][j] for j in range(s)] for i in range(s)
+        ]
+        gamma = _inverse(inverse)
+        m = [*a[-1][:-1], Fraction(1)]
+        hat = [*a[-1][:-1], Fraction(0)]
+        alpha = _product(a, gamma)
+        (b,), (embedded,) = _product([m], gamma), _product([hat], gamma)
+        return alpha, gamma, b, embedded
+
+    @functools.cached_property
+    def exact(self) -> Array:
+        """beta = alpha + Gamma in place of A: on y' = lambda y a Rosenbrock method is that diagonally implicit one."""
+        alpha, gamma, b, embedded = self.forms
+        beta = tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(alpha, gamma, strict=True))
+        return Array(beta, tuple(b), tuple(sum(row) for row in beta), tuple(embedded), Fraction(0), ())
+
+    @functools.cached_property
+    def _conditions(self) -> Conditions:
+        return Conditions(self.forms[0], self.rounding, self.exact.a)
+
+    @property
+    def diagonally_implicit(self) -> bool:
+        """No stage is solved by Newton."""
+        return False
+
+    @functools.cached_property
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """(flat coefficients [A, m, c, e, C, d, gamma], dense output, stages), with f at the start as a first stage."""
+        c, d, a, big_c, h = self.printed
+        s = len(c)
+
+        def framed(rows):
+            found = np.zeros((s + 1, s + 1))
+            found[1:, 1:] = [[float(x) for x in row] for row in rows]
+            return found
+
+        def led(values):
+            return np.array([0.0, *map(float, values)])
+
+        m, error = led([*a[-1][:-1], 1]), led([0] * (s - 1) + [1])
+        flat = [framed(a).ravel(), m, led(c), error, framed(big_c).ravel(), led(d), [float(Fraction(self.gamma))]]
+        h = np.vstack([led(row) for row in h])
+        dense = np.column_stack([m + h[0], *(h[i + 1] - h[i] for i in range(len(h) - 1)), -h[-1]])
+        return np.concatenate(flat), np.ascontiguousarray(dense), s + 1
+
+
+def _inverse(lower):
+    """Of a lower triangular matrix of fractions."""
+    s = len(lower)
+    found = [[Fraction(0)] * s for _ in range(s)]
+    for j in range(s):
+        for i in range(j, s):
+            total = Fraction(int(i == j)) - sum(lower[i][k] * found[k][j] for k in range(j, i))
+            found[i][j] = total / lower[i][i]
+    return found
+
+
+def _product(x, y):
+    return [[sum(row[k] * y[k][j] for k in range(len(y))) for j in range(len(y[0]))] for row in x]
+
+
+def declare(name: str, text: str, source: str, gamma: str) -> None:
+    METHODS[name] = Rosenbrock(name, source, text, given_digits=DIGITS, gamma=gamma)
+
+
+declare("rodas-4", gamma="0.25", source="Hairer and Wanner 1996, IV.7; RODAS", text="""
+    0     0.25    |
+    0.386 -0.1043 | 1.544
+    0.21  0.1035  | 0.9466785280815826 0.2557011698983284
+    0.63  -0.0362 | 3.314825187068521  2.896124015972201 0.9986419139977817
+    1     0       | 1.221224509226641  6.019134481288629 12.53708332932087 -0.6878860361058950
+    1     0       | 1.221224509226641  6.019134481288629 12.53708332932087 -0.6878860361058950 1
+    --------------+---------------------------------------------------------------------------------
+                  |
+                  | -5.6688
+                  | -2.430093356833875 -0.2063599157091915
+                  | -0.1073529058151375 -9.594562251023355 -20.47028614809616
+                  | 7.496443313967647 -10.24680431464352 -33.99990352819905 11.70890893206160
+                  | 8.083246795921522 -7.981132988064893 -31.52159432874371 16.31930543123136 -6.058818238834054
+    --------------+---------------------------------------------------------------------------------
+                  | 10.12623508344586 -7.487995877610167 -34.80091861555747 -7.992771707568823 1.025137723295662
+                  | -0.6762803392801253 6.087714651680015 16.43084320892478 24.76722511418386 -6.594389125716872
+""")  # fmt: skip
+
+declare("rodas-5p", gamma="0.21193756319429014", source="Steinebach 2023, BIT 63, 27", text="""
+    0                  0.21193756319429014  |
+    0.6358126895828704 -0.42387512638858027 | 3
+    0.4095798393397535 -0.3384627126235924  | 2.849394379747939 0.45842242204463923
+    0.9769306725060716 1.8046452872882734   | -6.954028509809101 2.489845061869568 -10.358996098473584
+    0.4288403609558664 2.325825639765069    | 2.8029986275628964 0.5072464736228206 -0.3988312541770524 -0.04721187230404641
+    1 0 | -7.502846399306121 2.561846144803919 -11.627539656261098 -0.18268767659942256 0.030198172008377946
+    1 0 | -7.502846399306121 2.561846144803919 -11.627539656261098 -0.18268767659942256 0.030198172008377946 1
+    1 0 | -7.502846399306121 2.561846144803919 -11.627539656261098 -0.18268767659942256 0.030198172008377946 1 1
+    ----+----------------------------------------------------------------------------------------------------
+        |
+        | -14.155112264123755
+        | -17.97296035885952 -2.859693295451294
+        | 147.12150275711716 -1.41221402718213 71.68940251302358
+        | 165.43517024871676 -0.4592823456491126 42.90938336958603 -5.961986721573306
+        | 24.854864614690072 -3.0009227002832186 47.4931110020768 5.5814197821558125 -0.6610691825249471
+        | 30.91273214028599 -3.1208243349937974 77.79954646070892 34.28646028294783 -19.097331116725623 -28.087943162872662
+        | 37.80277123390563 -3.2571969029072276 112.26918849496327 66.9347231244047 -40.06618937091002 -54.66780262877968 -9.48861652309627
+    ----+----------------------------------------------------------------------------------------------------
+        | 25.948786856663858 -2.5579724845846235 10.433815404888879 -2.3679251022685204 0.524948541321073 1.1241088310450404 0.4272876194431874 -0.17202221070155493
+        | -9.91568850695171 -0.9689944594115154 3.0438037242978453 -24.495224566215796 20.176138334709044 15.98066361424651 -6.789040303419874 -6.710236069923372
+        | 11.419903575922262 2.8879645146136994 72.92137995996029 80.12511834622643 -52.072871366152654 -59.78993625266729 -0.15582684282751913 4.883087185713722
+""")  # fmt: skip
