@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from time import perf_counter
 
@@ -44,25 +44,44 @@ def best(function: Callable[[], object], budget: float, least: int = 3, most: in
     return min(walls)
 
 
-def measured(solver: Solver, settings, distance: Callable[[np.ndarray], float], budget: float) -> list[Run]:
-    """Runs of a solver, printed as they are made; `distance` is the error of a solution. A failure is a line."""
-    print(f"  {solver.name}\n    {'setting':>9} {'error':>9} {'wall ms':>9} {'steps':>7} {'calls of f':>10}")
-    runs = []
-    for setting in settings:
-        try:
-            error = distance(solver.solve(setting))
-        except Exception as fault:  # noqa: BLE001  whatever a peer raises, the others go on
-            print(f"    {setting:9.0e} {type(fault).__name__}: {fault}")
-            continue
-        if np.isfinite(error):
-            wall = best(lambda: solver.solve(setting), budget)  # noqa: B023
-            runs.append(Run(setting, error, wall, *solver.count(setting)))
-            r = runs[-1]
-            setting = f"{r.setting:9.0e}" if r.setting < 0.1 else f"{r.setting:9.2f}"
-            print(f"    {setting} {r.error:9.1e} {r.wall * 1e3:9.3f} {r.steps:7.0f} {r.calls:10.0f}", flush=True)
-        else:
-            print(f"    {setting:9.0e} did not reach the end")
-    return runs
+def chart(solvers: list[Solver], settings, distance: Callable, budget: float, rounds: int = 3) -> dict[str, list[Run]]:
+    """Runs of all solvers at their settings, printed; `distance` is the error of a solution.
+
+    settings : the same for all, or a dict by solver's name. Wall times are the best of several rounds over all, so
+    that one noisy moment spoils no single solver. Whatever a solver raises is a line, and the others go on.
+    """
+    found = {solver.name: {} for solver in solvers}
+    for turn in range(rounds):
+        for solver in solvers:
+            for setting in settings[solver.name] if isinstance(settings, dict) else settings:
+                if turn == 0:
+                    found[solver.name][setting] = first(solver, setting, distance)
+                run = found[solver.name][setting]
+                if isinstance(run, Run):
+                    wall = best(lambda: solver.solve(setting), budget / rounds)  # noqa: B023
+                    found[solver.name][setting] = replace(run, wall=min(run.wall, wall))
+    for name, runs in found.items():
+        table(name, runs)
+    return {name: [r for r in runs.values() if isinstance(r, Run)] for name, runs in found.items()}
+
+
+def first(solver: Solver, setting, distance: Callable) -> Run | str:
+    """A run not yet timed, or why there is none."""
+    try:
+        error = distance(solver.solve(setting))
+        counts = solver.count(setting)
+    except Exception as fault:  # noqa: BLE001  a peer may raise anything
+        return f"{type(fault).__name__}: {fault}"
+    return Run(setting, error, np.inf, *counts) if np.isfinite(error) else "did not reach the end"
+
+
+def table(name: str, runs: dict[float, Run | str]) -> None:
+    """Print the runs of one solver."""
+    print(f"  {name}\n    {'setting':>9} {'error':>9} {'wall ms':>9} {'steps':>7} {'calls of f':>10}")
+    for setting, r in runs.items():
+        label = f"{setting:9.0e}" if setting < 0.1 else f"{setting:9.2f}"
+        told = r if isinstance(r, str) else f"{r.error:9.1e} {r.wall * 1e3:9.3f} {r.steps:7.0f} {r.calls:10.0f}"
+        print(f"    {label} {told}", flush=True)
 
 
 def against(goal: float, factor: float) -> str:

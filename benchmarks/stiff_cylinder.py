@@ -7,7 +7,7 @@ from pathlib import Path
 import cylinder
 import numba
 import numpy as np
-from measure import Run, Solver, against, measured
+from measure import Run, Solver, against, chart
 from peers_ode import Problem, explicit_reference, peers
 from price import price
 
@@ -36,7 +36,7 @@ def cylinder_table(quick: bool) -> None:
     print(f"the reference (DOP853, 1e-13) and Dormand-Prince at 1e-12 differ by {distance(other):.0e}")
     tolerances = 10.0 ** -(np.array([3.0, 5, 7, 9]) if quick else np.arange(3.0, 11.0))
     solvers = [fvsolve_solver(problem, name) for name in implicit_methods()] + peers(problem)
-    charts = {s.name: measured(s, tolerances, distance, 0.05 if quick else 0.3) for s in solvers}
+    charts = chart(solvers, tolerances, distance, 0.06 if quick else 0.3)
     for target in TARGETS:
         verdict(charts, target)
     draw(charts)

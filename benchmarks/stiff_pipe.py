@@ -7,7 +7,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 from acoustics import END, Acoustics
-from measure import Solver, against, best, measured
+from measure import Solver, against, best, chart
 from peers_ode import Problem, cvode, cvode_options, numba_dop853, numba_lsoda, scipy_ivp, scipy_odeint
 from price import price
 from stiff_cylinder import implicit_methods
@@ -31,16 +31,15 @@ def pipe_table(quick: bool) -> None:
     print(f"{call_time(pulse.rhs, pulse.start.y):.2f} us, interleaved {call_time(pulse.rhs_mixed, pulse.start.y):.2f}")
     budget = 0.1 if quick else 0.5
     tolerances = (1e-5, 1e-7) if quick else 10.0 ** -np.arange(4.0, 10.0)
-    charts = {"explicit": {}, "implicit": {}, "peers": {}}
-    for method, courants in COURANTS.items():
-        solver = stepped(pulse, method, "courant")
-        charts["explicit"][solver.name] = measured(solver, courants, pulse.distance, budget)
-    for method in implicit_methods():
-        solver = stepped(pulse, method, "rtol")
-        charts["implicit"][solver.name] = measured(solver, tolerances, pulse.distance, budget)
-    for solver in pipe_peers(pulse):
-        charts["peers"][solver.name] = measured(solver, tolerances, pulse.distance, budget)
-    verdict(charts)
+    groups = {
+        "explicit": [stepped(pulse, method, "courant") for method in COURANTS],
+        "implicit": [stepped(pulse, method, "rtol") for method in implicit_methods()],
+        "peers": pipe_peers(pulse),
+    }
+    settings = {s.name: tolerances for group in groups.values() for s in group}
+    settings |= {s.name: courants for s, courants in zip(groups["explicit"], COURANTS.values(), strict=True)}
+    charts = chart([s for group in groups.values() for s in group], settings, pulse.distance, budget)
+    verdict({of: {s.name: charts[s.name] for s in group} for of, group in groups.items()})
 
 
 def call_time(rhs, y) -> float:

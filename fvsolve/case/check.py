@@ -11,7 +11,8 @@ from fvsolve.case.raw import Raw
 from fvsolve.case.sections import Numerics
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber, Cylinder, EndStop, Reservoir, Spring
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
@@ -95,8 +96,15 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
     if numerics.courant is not None and not has_cells:
         yield ("numerics", "courant"), "no pipe, so no cell to cross; give step or rtol"
     method = METHODS.get(numerics.method)
+    least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
+    if numerics.step is not None and not numerics.step > least:
+        yield ("numerics", "step"), f"{numerics.step:g} s would not move the time; wanted more than {least:.2g} s"
+    if numerics.rtol is not None and numerics.rtol < LEAST_TOLERANCE:
+        yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding; wanted {LEAST_TOLERANCE:g} or more"
+    if numerics.method == AUTO and numerics.rtol is None:
+        yield ("numerics", "method"), 'method "auto" goes by the error of its steps; give rtol, not courant or step'
     if numerics.rtol is not None and method is not None and not method.adaptive:
-        able = " or ".join(show(name) for name, other in METHODS.items() if other.adaptive)
+        able = " or ".join(dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive))
         message = f"method {show(method.name)} estimates no error; use {able}, or courant or step"
         yield ("numerics", "rtol"), message
 

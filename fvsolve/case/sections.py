@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
@@ -21,7 +22,8 @@ from fvsolve.parts.value import (
     nonnegative,
     positive,
 )
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.structure import KINDS
 from fvsolve.units import show
 
 SCHEMES = ("upwind", "muscl", "upwind5", "weno5", "central", "linear-upwind", "fromm", "upwind3")
@@ -48,6 +50,19 @@ class FluidSpec(Table):
     vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
 
 
+class MethodNames(Collection):
+    """`auto` and the names of all methods, those of the user included as soon as they are there."""
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((AUTO, *METHODS))
+
+    def __contains__(self, name: object) -> bool:
+        return name == AUTO or name in METHODS
+
+    def __len__(self) -> int:
+        return 1 + len(METHODS)
+
+
 class Numerics(Table):
     """`[numerics]`: the span of time, how space and time are cut, where to start from."""
 
@@ -60,10 +75,13 @@ class Numerics(Table):
     ] = "steady"
     scheme: Annotated[str, Choice("scheme", SCHEMES, "reconstruction in the cells")] = DEFAULT_SCHEME
     limiter: Annotated[str, Choice("limiter", LIMITERS, "of the scheme muscl")] = DEFAULT_LIMITER
-    method: Annotated[str | None, Choice("method", METHODS, "Runge-Kutta method")] = None
+    method: Annotated[str | None, Choice("method", MethodNames(), "Runge-Kutta method")] = None
     courant: Annotated[float | None, Number(positive, "step, in travel times of the quickest cell")] = None
     step: Annotated[float | None, Quantity("time", positive, "fixed step [s]")] = None
     rtol: Annotated[float | None, Number(between(0, 1, open=True), "error per step, relative")] = None
+    linear_algebra: Annotated[
+        str | None, Choice("linear algebra", KINDS, "of implicit steps; the structure chooses if left out")
+    ] = None
     cell_time: Annotated[float | None, Quantity("time", positive, "of pipes that state no cells [s]")] = None
     below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
@@ -71,11 +89,18 @@ class Numerics(Table):
         """The same with the step control and method that are the default, cells present or not."""
         changes: dict[str, Any] = {}
         if self.courant is self.step is self.rtol is None:
-            changes = {"courant": DEFAULT_COURANT} if has_cells else {"rtol": DEFAULT_RTOL}
+            by_courant = has_cells and not steps_by_error(self.method)
+            changes = {"courant": DEFAULT_COURANT} if by_courant else {"rtol": DEFAULT_RTOL}
         adaptive = self.rtol is not None or "rtol" in changes
         if self.method is None:
             changes["method"] = DEFAULT_METHOD_RTOL if adaptive else DEFAULT_METHOD
         return self.model_copy(update=changes)
+
+
+def steps_by_error(method: str | None) -> bool:
+    """Whether a method is meant for error control even where there are cells: `auto`, and implicit ones that can."""
+    found = METHODS.get(method or "")
+    return method == AUTO or (found is not None and found.adaptive and not found.explicit)
 
 
 class OutputUnits(Value):

@@ -132,7 +132,9 @@ def _cost(said: dict) -> str:
     rejected = f", {said['rejections']} rejected" if said["rejections"] else ""
     cells = f", {said['cells']} cells" if said["cells"] else ""
     cost = f" ({_number(said['cost'])} ns per cell and step)" if said["cells"] and said["cost"] else ""
-    return f"{said['steps']} steps{rejected}{cells}, {said['seconds']:.3g} s{cost}"
+    newton = f", {said['jacobians']} Jacobians, {said['factorisations']} factorisations" if said["jacobians"] else ""
+    newton += f", {said['newton']} Newton iterations, {said['newton_failures']} failed" if said["newton"] else ""
+    return f"{said['steps']} steps{rejected}{newton}{cells}, {said['seconds']:.3g} s{cost}"
 
 
 def _number(value) -> str:

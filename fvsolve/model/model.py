@@ -88,6 +88,14 @@ class Model:
 
         return make_handle(self.tables)
 
+    @cached_property
+    def structure(self):
+        """Pattern of the Jacobian and the linear algebra that fits it, or that `numerics.linear_algebra` names."""
+        from fvsolve.model.sparsity import sparsity
+        from fvsolve.steppers.structure import Structure
+
+        return Structure(sparsity(self), self.case.numerics.linear_algebra)
+
     def functions(self) -> tuple:
         """(rhs, observe, record, events) for the density law of the case, with bodies where it has some, compiled."""
         from fvsolve.kernels.functions import functions

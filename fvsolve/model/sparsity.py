@@ -2,7 +2,8 @@
 
 A pipe's cells depend on their neighbours as far as the scheme reaches. Where a pipe meets a node, what it offers
 (its edge cells) is read by the node, and what the node makes of all offers together is read by the cells that look
-beyond the end. Tanks, chambers and given pressures part one group of nodes from the next: their pressure is their own.
+beyond the end. Tanks, chambers and given pressures part one group of nodes from the next: their pressure is their own,
+but for chambers of cylinders, whose pressure is that of their bodies too.
 """
 
 from __future__ import annotations
@@ -62,6 +63,8 @@ class Couplings:
         self.upwind = settings["scheme"] == rec.UPWIND
         self.reach = reach_of(settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
+        self.bodies, self.pistons = tables[rec.I_BODIES]["y"], tables[rec.I_PISTONS]
+        self.braces = [*tables[rec.I_BRACES], *tables[rec.I_STOPS]]
         self.sets = self.pressures()  # of each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
@@ -71,6 +74,7 @@ class Couplings:
             yield from self.beyond(pipe)
         yield from self.stored()
         yield from self.rigid()
+        yield from self.moving()
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -87,6 +91,15 @@ class Couplings:
         y = self.nodes["y"][i]
         return np.array([y] if y >= 0 else [], dtype=np.int64)
 
+    def held(self, i: int) -> np.ndarray:
+        """The states that set the pressure of a node that stores: its mass, and where its piston is."""
+        return states(self.own(i), *(self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"])))
+
+    def places(self, row, what: int) -> np.ndarray:
+        """Positions (`what` 0) or velocities (1) of the two bodies that a row joins, where they are states."""
+        ends = ("case", "rod") if "rod" in row.dtype.names else ("from_body", "to_body")
+        return np.array([self.bodies[row[end]] + what for end in ends if self.bodies[row[end]] >= 0], dtype=np.int64)
+
     def pressures(self) -> list[np.ndarray]:
         """Of each node, the states that set its pressure: its own, or all that enter its group."""
         ends = map(ends_of, self.joints())
@@ -100,14 +113,14 @@ class Couplings:
                 enter[group[i]].append(column["y"])
         for link in self.joints():
             i, j = ends_of(link)
-            enter[group[i]].append(self.own(j))
-            enter[group[j]].append(self.own(i))
+            enter[group[i]].append(self.held(j))
+            enter[group[j]].append(self.held(i))
         joined = [states(*some) for some in enter]
-        return [joined[group[i]] if self.inner[i] else self.own(i) for i in range(len(group))]
+        return [joined[group[i]] if self.inner[i] else self.held(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
         """What flows into tanks, chambers and given pressures: their mass, and their row of the ledger."""
-        into = [[self.own(i)] for i in range(len(self.nodes))]
+        into = [[self.held(i)] for i in range(len(self.nodes))]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
                 into[i].append(self.offered(pipe, right))
@@ -118,6 +131,9 @@ class Couplings:
         for column in self.columns:
             for i in ends_of(column):
                 into[i].append(column["y"])
+        for row in self.pistons:
+            for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
+                into[i] += [self.places(row, 1), *([self.held(other)] if row["leakage"] > 0.0 else [])]
         for i in np.flatnonzero(~self.inner):
             yield every(states(self.own(i), self.size + i), states(*into[i]))
 
@@ -125,6 +141,16 @@ class Couplings:
         """A column's flow feels the pressures of both its ends."""
         for column in self.columns:
             yield every(states(column["y"]), states(*(self.sets[i] for i in ends_of(column))))
+
+    def moving(self) -> Iterator[Pairs]:
+        """A body's position on its velocity, and that on what pushes it: bodies beside it, and chambers."""
+        at = self.bodies[self.bodies >= 0]
+        yield at, at + 1
+        for row in [*self.braces, *self.pistons]:
+            felt = [self.places(row, 0), self.places(row, 1)]
+            if "rod" in row.dtype.names:
+                felt += [self.own(row["a"]), self.own(row["b"])]
+            yield every(self.places(row, 1), states(*felt))
 
     # pipes ------------------------------------------------------------------------------------------------------
 

@@ -19,18 +19,19 @@ BOW = 0.15  # how far parallel links bend aside, as part of their length
 
 def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     """Plan position float64[2] [m] of every part with places; `lengths` are those of the links that have one [m]."""
-    owners = [name for name, link in case.links.items() if link.owns and name not in case.nodes]
+    ports = {name: [place(port) for port in link.ports.values()] for name, link in case.links.items()}
+    owners = dict.fromkeys(one for found in ports.values() for one in found if one not in case.nodes)
     stated = {name: node.position for name, node in case.nodes.items() if node.position is not None}
     if len(stated) == len(case.nodes):
         plan = {name: np.array(place, float) for name, place in stated.items()}
-        return plan | {name: np.mean([plan[port] for port in case.links[name].ports.values()], 0) for name in owners}
+        return plan | {name: np.mean([plan[port] for port in ports[name]], 0) for name in owners}
     names = [*case.nodes, *owners]
     index = {name: i for i, name in enumerate(names)}
     short = SHORT * max(lengths.values(), default=1.0)
     edges = [
         (index[hub], index[other], max(lengths.get(name, short), short))
-        for name, link in case.links.items()
-        for hub, *others in [[place(port) for port in ([name] if name in owners else []) + [*link.ports.values()]]]
+        for name, found in ports.items()
+        for hub, *others in [[name, *found] if name in owners else found]
         for other in others
     ]
     plan = _plan(len(names), edges)

@@ -13,6 +13,7 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.units import show
 
@@ -40,7 +41,11 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         loop.begin(end, NO_LIMIT)
         if first and adaptive and state.memory.size == 2:
             loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory
-        if loop.run(NO_LIMIT) != told.DONE:
+        code = loop.run(NO_LIMIT)
+        while code == told.SWITCH:
+            automatic.change(loop.stepper)
+            code = loop.run(NO_LIMIT)
+        if code != told.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
     return State(loop.t, loop.now.copy(), loop.memory[[told.STEP, told.ERROR_OLD]].copy())
 

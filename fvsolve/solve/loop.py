@@ -7,6 +7,7 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
+from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.stepper import Stepper, arguments
 from fvsolve.steppers.tableau import Method, method_named
@@ -18,14 +19,14 @@ NO_LIMIT = 1e308
 class Loop:
     """Buffers of one run of a model by one method; `run` steps on until there is something to do."""
 
-    def __init__(self, model: Model, method: Method | None = None) -> None:
+    def __init__(self, model: Model) -> None:
         numerics = model.case.numerics
-        self.model, self.method = model, method or method_named(numerics.method)
+        self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.rhs, self.observe, self.record, self.events = arguments(model.functions())
-        leaps = leap_allowed(model, self.method)
+        leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
-        structure = None if self.method.explicit else model.structure
-        self.stepper = stepper = Stepper(self.method, model.y_size, len(model.node_names), structure, model.scale)
+        ledgers = len(model.node_names)
+        self.stepper = stepper = Stepper(method, model.y_size, ledgers, lambda: model.structure, model.scale)
         sums = [*model.tables[rec.I_NODES]["y"], *model.tables[rec.I_BODIES]["y"]]  # travel is part of what is stored
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
@@ -39,7 +40,9 @@ class Loop:
         for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
-        if numerics.courant is not None and not self.method.explicit:  # waves alone: Newton copes with the rest
+        if numerics.method == automatic.AUTO:
+            automatic.watch(stepper, model.structure)
+        if numerics.courant is not None and not method.explicit:  # of waves alone: Newton copes with the rest
             pipes = model.tables[rec.I_PIPES]
             self.orders[told.CONTROL] = told.FIXED_STEP
             self.orders[told.SIZE] = numerics.courant / np.max(pipes["speed"] / pipes["dx"])

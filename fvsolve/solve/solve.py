@@ -10,6 +10,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.summary import Summary, find_envelope, find_extremes, find_marks, mass_ledger
+from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 
 CHECKPOINT_SECONDS = 1.0
@@ -47,6 +48,7 @@ class Run:
         orders[told.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
         orders[told.FIELD_COUNT] = output.fields
         self.segment, self.fresh = 0, state.memory.size == 0
+        self.changes: list[tuple[float, float, float]] = []  # of method, under `auto`
         self.loop.now[:] = state.y
         self.loop.memory[told.T] = state.t
         for array in (model.tables[rec.I_EXTREMES], model.tables[rec.I_ENVELOPE]):
@@ -62,16 +64,20 @@ class Run:
     def memory(self) -> np.ndarray:
         """Everything that a resumed run needs beside t and y, flat."""
         kept = [self.model.tables[at].ravel() for at in PERSISTENT]
-        own = [float(self.segment), self.seconds]
-        return np.concatenate([own, self.loop.memory, self.loop.stepper.ledger, self.loop.stepper.carry, *kept])
+        changes = [x for change in self.changes for x in change]
+        own = [float(self.segment), self.seconds, float(len(self.changes)), *changes]
+        return np.concatenate([own, *(view.ravel() for view in self.loop.stepper.memories()), *kept])
 
     def remember(self, memory: np.ndarray) -> None:
-        at = 2 + told.MEMORY
-        self.segment, self.seconds = int(memory[0]), float(memory[1])
-        self.loop.memory[:] = memory[2:at]
-        for array in (self.loop.stepper.ledger, self.loop.stepper.carry, *(self.model.tables[k] for k in PERSISTENT)):
-            array.ravel()[:] = memory[at : at + array.size]
-            at += array.size
+        self.segment, self.seconds, changes = int(memory[0]), float(memory[1]), int(memory[2])
+        self.changes = [tuple(row) for row in memory[3 : 3 + 3 * changes].reshape(-1, 3).tolist()]
+        if changes % 2 == 1:
+            automatic.change(self.loop.stepper)
+        memory = self.loop.stepper.remember(memory[3 + 3 * changes :])
+        for at in PERSISTENT:
+            array = self.model.tables[at].ravel()
+            array[:] = memory[: array.size]
+            memory = memory[array.size :]
 
     def state(self) -> State:
         return State(self.loop.t, self.loop.now.copy(), self.memory())
@@ -181,6 +187,8 @@ class Run:
             elif code == told.CHUNK:
                 self.pause(spent)
                 left, spent = self.budget, 0.0
+            elif code == told.SWITCH:
+                self.changes.append(automatic.change(self.loop.stepper))
             elif code == told.DONE:
                 return ""
             elif code != told.ROWS_FULL:
@@ -213,6 +221,10 @@ class Run:
             return f"stopped: pressure below vapour pressure at {when}, as below_vapor asks"
         if code in (told.BAD_VALUE, told.BAD_STATUS):
             loop.step_back()
+        if code == told.NEWTON_STUCK:
+            worst = model.state_names[int(loop.memory[told.WORST])]
+            return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; look for a "
+                    "jump in what acts there, or try an explicit method")  # fmt: skip
         if code == told.TINY_STEP:
             return f"stopped: the step shrank to nothing at {when}; try a larger rtol, or courant in place of it"
         if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
@@ -223,16 +235,21 @@ class Run:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"
 
+    def methods(self) -> list[dict]:
+        """Which method stepped from when on, and why."""
+        name = self.model.case.numerics.method
+        if name != automatic.AUTO:
+            return [{"time": self.start, "method": name, "why": "as numerics.method says"}]
+        return automatic.account(self.start, self.changes, self.loop.orders[told.PRICE])
+
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
-        memory = loop.memory
         ledger = mass_ledger(model, loop.now, loop.stepper.ledger[: len(model.node_names)])
         summary = Summary(
             reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
-            find_envelope(model), int(memory[told.STEPS]), int(memory[told.REJECTIONS]), int(memory[told.CALLS]),
-            model.cells, self.seconds, self.setup,
+            find_envelope(model), loop.stepper.counts(), self.methods(), model.cells, self.seconds, self.setup,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

@@ -32,12 +32,16 @@ class Summary:
     ledgers: dict[str, dict[str, Any]] = field(default_factory=dict)
     extremes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     envelope: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
-    steps: int = 0
-    rejections: int = 0
-    rhs: int = 0
+    counts: dict[str, int] = field(default_factory=dict)  # steps, rejections, calls of rhs, what Newton did
+    methods: list[dict[str, Any]] = field(default_factory=list)  # which one from when on, and why
     cells: int = 0
     seconds: float = 0.0
     seconds_setup: float = 0.0
+
+    @property
+    def steps(self) -> int:
+        """Accepted steps."""
+        return self.counts.get("steps", 0)
 
     @property
     def cost(self) -> float:

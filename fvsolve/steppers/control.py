@@ -4,6 +4,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.steppers.orders import (
+    CASES,
     CONTROL,
     COURANT,
     END,
@@ -14,15 +15,21 @@ from fvsolve.steppers.orders import (
     N_MARK,
     NEWTON_SOLVED,
     ORDER,
+    PRICE,
+    RADIUS,
     SIZE,
     STEP,
     STEP_MAX,
     STEPS,
+    SWITCHES,
     T_MARK,
     TOLERANCE,
     T,
 )
+from fvsolve.steppers.tolerances import LEAST_STEP
 
+PATIENCE = 15  # steps that must agree before another kind of step is tried; doubled by every change
+BOUNDARY = 3.25  # h times the spectral radius at which `dormand-prince` meets the boundary of its stability region
 DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
 
 
@@ -35,7 +42,7 @@ def shortest(orders, memory):
 @njit(forceinline=True)
 def too_short(orders, memory, h):
     """Whether a step would not move the time."""
-    return not h > 4e-16 * max(abs(memory[T]), abs(orders[END]))
+    return not h > LEAST_STEP * max(abs(memory[T]), abs(orders[END]))
 
 
 @njit
@@ -83,6 +90,23 @@ def grown(orders, memory, h, e):
     if memory[ERROR_OLD] > 0.0 and memory[STEPS] > 0.0:
         grow = min(grow, 0.9 * (h / memory[LAST]) * (old / (e * e)) ** (1.0 / order))
     return min(8.0, max(0.2, grow))
+
+
+@njit(forceinline=True)
+def watch(orders, memory, h, e, out_rate):
+    """Count the steps for which another kind of step would have been cheaper; whether they are enough to change.
+
+    Explicit steps: held back by stability (Hairer and Wanner 1996, IV.2), by more than an implicit step costs.
+    Implicit steps: explicit ones within their stability boundary would have cost less than half.
+    """
+    if orders[KIND] == EXPLICIT:
+        could = 0.9 * max(e, 1e-30) ** (-1.0 / orders[ORDER])
+        held = out_rate > 0.0 and h * out_rate > 1.98 and could > orders[PRICE]
+        other = held or h * memory[RADIUS] > BOUNDARY
+    else:
+        other = 2.0 * max(1.0, h * memory[RADIUS] / BOUNDARY) < orders[PRICE]
+    memory[CASES] = memory[CASES] + 1.0 if other else max(0.0, memory[CASES] - 3.0)
+    return memory[CASES] >= PATIENCE * 2.0 ** min(memory[SWITCHES], 6.0)
 
 
 @njit(forceinline=True)

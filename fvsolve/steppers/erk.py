@@ -1,9 +1,22 @@
 """One explicit Runge-Kutta step (14). Knows arrays; controls nothing."""
 
+from math import sqrt
+
 from fvsolve.jit import njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.orders import CALLS, CONTROL, FSAL, SIZE, TOLERANCE
+from fvsolve.steppers.orders import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
 from fvsolve.steppers.step import combine, error_norm
+
+
+@njit
+def quotient(f_new, f, y_new, y, scale):
+    """|f_new - f| / |y_new - y| of two stages at the end of the step: about the spectral radius (H. and W. IV.2)."""
+    above, below = 0.0, 0.0
+    for i in range(y.size):
+        w = 1.0 / (scale[i] + abs(y[i]))
+        above += ((f_new[i] - f[i]) * w) * ((f_new[i] - f[i]) * w)
+        below += ((y_new[i] - y[i]) * w) * ((y_new[i] - y[i]) * w)
+    return sqrt(above / below) if below > 0.0 else 0.0
 
 
 @njit
@@ -26,6 +39,8 @@ def attempt(
     if not last_is_new:
         combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
     memory[CALLS] += s - 1.0
+    if orders[WATCH] != 0.0:
+        memory[RADIUS] = quotient(k[s - 1], k[s - 2], y[new], y[3], scale)
     if orders[CONTROL] != TOLERANCE:
         return 0.0
     return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])

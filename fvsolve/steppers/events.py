@@ -1,7 +1,7 @@
 """Events: functions that fall through zero, and the step that ends there. Knows no model."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.orders import T
+from fvsolve.steppers.orders import NEWTON_FAILED, T
 
 EVENT_TOLERANCE = 1e-13
 
@@ -44,7 +44,9 @@ def locate(
     attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y, now, new, k,
     supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
 ):  # fmt: skip
-    """The step that ends just past the first event, by the Illinois rule on its length; y[new] belongs to it."""
+    """The step that ends just past the first event, by the Illinois rule on its length; y[new] belongs to it.
+
+    NEWTON_FAILED in its place where a stage on the way could not be solved."""
     t, low, high, at_low, at_high = memory[T], 0.0, h, 1.0, nearness(g, g_new)
     guess = h
     for turn in range(101):
@@ -57,10 +59,12 @@ def locate(
             guess = 0.5 * (low + high)
         if done:
             guess = high
-        attempt(
+        e = attempt(
             rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, guess, y, now, new, k,
             supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
         )  # fmt: skip
+        if e == NEWTON_FAILED:
+            return NEWTON_FAILED
         events(t + guess, y[new], handle, g_new)
         if done:
             break

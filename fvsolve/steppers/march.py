@@ -9,7 +9,7 @@ from math import isfinite
 
 from fvsolve.jit import argument, njit
 from fvsolve.steppers.coefficients import weights_of
-from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short
+from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate
 from fvsolve.steppers.orders import (
     BAD_STATUS,
@@ -17,6 +17,7 @@ from fvsolve.steppers.orders import (
     BEHIND,
     BUDGET,
     CALLS,
+    CASES,
     CHUNK,
     CONTROL,
     DONE,
@@ -54,10 +55,12 @@ from fvsolve.steppers.orders import (
     STOP_AT,
     STOP_HERE,
     STOPPED,
+    SWITCH,
     T_MARK,
     TINY_STEP,
     TOLERANCE,
     UNBOOKED,
+    WATCH,
     WHERE,
     T,
 )
@@ -227,6 +230,8 @@ def march(
             return DONE
         if out[WHERE] == STOP_HERE:
             return STOPPED
+        if orders[WATCH] != 0.0 and memory[CASES] < 0.0:
+            return SWITCH
         if orders[BUDGET] <= 0.0:
             return CHUNK
         h = next_step(orders, memory, out[RATE], k, scale)
@@ -238,7 +243,7 @@ def march(
             flags[PHASE] = FRESH
             memory[CALLS] -= 1.0
             continue
-        failed = TINY_STEP
+        failed, rate = TINY_STEP, out[RATE]
         while not leaping:
             rest = orders[END] - memory[T]
             last = h >= rest * (1.0 - 1e-9)
@@ -263,6 +268,8 @@ def march(
                 if (not last or grow < 1.0) and not kept(orders, grow):
                     memory[STEP] = h * grow
                 memory[ERROR_OLD] = e
+                if orders[WATCH] != 0.0 and watch(orders, memory, h, e, rate):
+                    memory[CASES] = -1.0
                 break
             memory[REJECTIONS] += 1.0
             h *= reduced(orders, e)
@@ -273,6 +280,8 @@ def march(
                 attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y,
                 now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
             )  # fmt: skip
+            if h == NEWTON_FAILED:
+                return NEWTON_STUCK
             last = last and memory[T] + h >= orders[END]
             if orders[CONTROL] != TOLERANCE:
                 memory[STEP] = 0.0

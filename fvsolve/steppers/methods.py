@@ -3,4 +3,6 @@
 from fvsolve.steppers import explicit, implicit, rosenbrock  # noqa: F401  (declare them)
 from fvsolve.steppers.tableau import METHODS
 
-__all__ = ["METHODS"]
+AUTO = "auto"  # in place of a method: `automatic.py` chooses
+
+__all__ = ["AUTO", "METHODS"]

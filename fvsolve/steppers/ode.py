@@ -16,7 +16,8 @@ from fvsolve.steppers import orders as told
 from fvsolve.steppers.march import compiled, compiled_as
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
-from fvsolve.steppers.tableau import Method, method_named
+from fvsolve.steppers.tableau import METHODS, Method, method_named
+from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 
 NO_LIMIT = 1e308
 
@@ -41,7 +42,7 @@ def integrate(
     n = y0.size
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.full(n, 1.0) if atol is None or step is not None else np.broadcast_to(atol / np.float64(size), n).copy()
-    stepper = Stepper(method, n, 0, _full(n) if not method.explicit else None, scale)
+    stepper = Stepper(method, n, 0, lambda: _full(n), scale)
     orders, memory, flags, y = stepper.orders, stepper.memory, stepper.flags, stepper.y
     y[0], memory[told.T] = y0, t[0]
     orders[told.CONTROL] = told.FIXED_STEP if step is not None else told.TOLERANCE
@@ -88,9 +89,15 @@ def _check(method, t, rtol, step) -> None:
     if rtol is not None and step is not None:
         raise FvsolveError("rtol and step both set the step; keep one")
     if step is None and not method.adaptive:
-        raise FvsolveError(f"{method.name} has no error estimate; give step")
+        able = ", ".join(dict.fromkeys(other.name for other in METHODS.values() if other.adaptive))
+        raise FvsolveError(f"{method.name} has no error estimate; give step, or one of {able}")
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
         raise FvsolveError("t must be at least two times, rising")
+    least = LEAST_STEP * np.abs(t).max(initial=0.0)
+    if step is not None and 0 < step <= least:
+        raise FvsolveError(f"step = {step:g} would not move the time; wanted more than {least:.2g}")
+    if rtol is not None and 0 < rtol < LEAST_TOLERANCE:
+        raise FvsolveError(f"rtol = {rtol:g} is below rounding; wanted {LEAST_TOLERANCE:g} or more")
     for name, value in (("rtol", rtol), ("step", step)):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise FvsolveError(f"{name} = {value!r} is not a positive number")

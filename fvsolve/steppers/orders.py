@@ -2,20 +2,22 @@
 
 # What the loop remembers, in one flat array of floats that a restart stores.
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
-JACOBIANS, FACTORS, NEWTON, NEWTON_FAILURES, WORST = range(12, 17)
-MEMORY = 17
+JACOBIANS, FACTORS, NEWTON, NEWTON_FAILURES, WORST, RADIUS, CASES, SWITCHES = range(12, 20)
+MEMORY = 20
 COUNTS = {
     "steps": STEPS, "rejections": REJECTIONS, "rhs": CALLS, "jacobians": JACOBIANS, "factorisations": FACTORS,
     "newton": NEWTON, "newton_failures": NEWTON_FAILURES,
 }  # fmt: skip
 # What a call is told.
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
-ORDER, FSAL, KIND = range(11, 14)  # power of h of the error estimate; whether the last stage is the next first; kind
-ORDERS = 14
+# Power of h of the error estimate; whether the last stage is the next first; the kind of step; whether stiffness is
+# watched, and then the price of an implicit step in explicit ones.
+ORDER, FSAL, KIND, WATCH, PRICE = range(11, 16)
+ORDERS = 16
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
 # Why a call came back.
-DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK = range(9)
+DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK, SWITCH = range(10)
 # What passes between calls while rows are still to be written: phase, whether a step lies behind, buffers.
 PHASE, BEHIND, NOW, OLD, ROWS = range(5)
 FRESH, LEAPT, EMIT, READY = range(4)

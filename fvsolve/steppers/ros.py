@@ -6,11 +6,13 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
 from fvsolve.steppers.newton import HAS, HEADER, INCREMENT, RATE, SEEN, SHIFT, renew
-from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
+from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, RADIUS, SIZE, STEPS, TOLERANCE, WATCH
 from fvsolve.steppers.step import combine, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
@@ -34,6 +36,23 @@ def slope_in_time(rhs, handle, t, h, y, k, supply, where, out, memory, work, vec
         work[work.size - ledgers + m] = (out[where + m] - supply[0, m]) * per
 
 
+@inner
+def spectral_radius(shape, work, nnz, scale, v):
+    """Largest |eigenvalue| of the Jacobian, about, by five turns of the power method."""
+    n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
+    for e in range(n):
+        v[e] = scale[e] if e % 2 == 0 else -scale[e]
+    for _ in range(5):
+        multiply(shape, work[HEADER : HEADER + nnz], v, product)
+        total = 0.0
+        for e in range(n):
+            total += (product[e] / scale[e]) * (product[e] / scale[e])
+        before, now = now, sqrt(total)
+        for e in range(n):
+            v[e] = product[e] / now if now > 0.0 else 0.0
+    return sqrt(before * now)  # of a pair, whose single quotients swing
+
+
 @njit
 def attempt(
     rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
@@ -51,6 +70,8 @@ def attempt(
         renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
         slope_in_time(rhs, handle, t, h, y[now], k, supply, where, out, memory, work, vectors)
         work[SEEN] = memory[STEPS]
+        if orders[WATCH] != 0.0:
+            memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])
     shift = 1.0 / (h * gamma)
     if work[SHIFT] != shift:
         memory[FACTORS] += 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,32 +18,41 @@ from fvsolve.steppers.tableau import Method
 
 
 class Stepper:
-    """Buffers of one run by one method, and the compiled functions that are the method's.
+    """Buffers of one run, and the compiled functions that are the method's.
 
-    structure : of the Jacobian, for implicit methods; scale : float64[n], what small deviations are measured against;
-    ledgers : rows of rates beside dydt.
+    structure() : of the Jacobian, asked for by implicit methods alone; scale : float64[n], what small deviations are
+    measured against; ledgers : rows of rates beside dydt.
     """
 
-    def __init__(self, method: Method, n: int, ledgers: int, structure: Structure | None, scale: np.ndarray) -> None:
-        self.method, self.scale = method, scale
-        self.coefficients, self.dense, s = coefficients(method)
-        self.march, self.attempt, self.algebra = compiled(), attempt_of(method), no_algebra()
-        self.shape, self.work, self.vectors = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, n))
-        self.store, self.store_complex = np.zeros(0), np.zeros(0, dtype=complex)
-        if not method.explicit:
-            self.solve_by(structure, s, n, ledgers)
-        self.y, self.k, self.f_old = np.zeros((4, n)), np.zeros((s, n)), np.zeros(n)
-        self.supply, self.ledger = np.zeros((s, ledgers)), np.zeros(2 * ledgers)
-        self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
+    def __init__(
+        self, method: Method, n: int, ledgers: int, structure: Callable[[], Structure], scale: np.ndarray
+    ) -> None:
+        self.structure, self.scale, self.march = structure, scale, compiled()
+        self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(2 * ledgers)
         self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
         self.flags = np.array([told.FRESH, 0, 0, 1, 0], dtype=np.int64)
-        self.orders[told.ORDER] = method.control_order
-        self.orders[told.FSAL] = method.explicit and method.first_same_as_last
-        self.orders[told.KIND] = KINDS[kind_of(method)]
+        self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
         self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
         self.g = self.g_new = self.none
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
+        self.use(method)
+
+    def use(self, method: Method) -> None:
+        """Step by this method from now on."""
+        n, ledgers = self.scale.size, self.ledger.size // 2
+        self.method = method
+        self.coefficients, self.dense, s = coefficients(method)
+        self.attempt, self.algebra = attempt_of(method), no_algebra()
+        self.k, self.supply = np.zeros((s, n)), np.zeros((s, ledgers))
+        self.shape, self.work, self.vectors = self.nobody, self.none, np.zeros((0, n))
+        self.store, self.store_complex, self.kept = self.none, np.zeros(0, dtype=complex), 0
+        if not method.explicit:
+            self.solve_by(self.structure(), s, n, ledgers)
+        self.orders[told.ORDER] = method.control_order
+        self.orders[told.FSAL] = method.explicit and method.first_same_as_last
+        self.orders[told.KIND] = KINDS[kind_of(method)]
+        self.flags[told.PHASE], self.flags[told.BEHIND] = told.FRESH, 0
 
     def solve_by(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
         """Room and functions for Newton's linear algebra."""
@@ -54,10 +64,12 @@ class Stepper:
 
             q, pairs = s - 1, pairs_of(self.method)
         reals = q - 2 * pairs if q else 1
+        self.factors = reals + pairs  # made for one length of step
         size, self.shape = structure.store_size, structure.shape
         self.work = np.zeros(newton.HEADER + structure.nnz + n + 2 * ledgers + q * q)
         self.work[newton.STORE] = size
         self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
+        self.kept = newton.HEADER + structure.nnz
         self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
         real = arguments(structure.functions()) if reals else no_algebra()[:2]
         self.algebra = (*real, *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]))
@@ -70,11 +82,31 @@ class Stepper:
 
     def forget(self) -> None:
         """Remember nothing over a kink but what has been counted."""
-        self.memory[told.STEP] = self.memory[told.ERROR_OLD] = 0.0
+        self.memory[told.STEP] = self.memory[told.ERROR_OLD] = self.memory[told.CASES] = 0.0
         if self.work.size:
             from fvsolve.steppers.newton import forget
 
             forget(self.work)
+
+    def memories(self) -> list[np.ndarray]:
+        """Views of all that the next step depends on, beside t and y."""
+        views = [self.memory, self.ledger, self.carry]
+        if self.kept:  # header and Jacobian; f at the start of the last step, and its stages
+            views += [self.work[: self.kept], self.vectors[self.k.shape[0]], self.k]
+        return views
+
+    def remember(self, memory: np.ndarray) -> np.ndarray:
+        """Take back what `memories` held, from one flat array; returns what is left of it."""
+        for view in self.memories():
+            view[...] = memory[: view.size].reshape(view.shape)
+            memory = memory[view.size :]
+        if self.work.size:
+            from fvsolve.steppers.newton import SHIFT
+
+            if self.work[SHIFT] != 0.0:  # factors are made anew from the same matrix, which is not counted again
+                self.memory[told.FACTORS] -= self.factors
+            self.work[SHIFT] = 0.0
+        return memory
 
     def counts(self) -> dict[str, int]:
         """How much work the run was."""

@@ -1,0 +1,54 @@
+"""`auto`: explicit steps while the spectrum allows them, implicit ones where stiffness makes those cheaper.
+
+Knows which two methods, what their steps cost and how to say why one gave way to the other.
+"""
+
+from __future__ import annotations
+
+from fvsolve.steppers import orders as told
+from fvsolve.steppers.methods import AUTO
+from fvsolve.steppers.stepper import Stepper
+from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.tableau import method_named
+
+EXPLICIT, IMPLICIT = "dormand-prince", "rodas-5p"
+DENSE_ENTRY, ENTRY = 1 / 150, 1 / 15  # of a Jacobian in factors and solves, in calls of rhs per state
+
+
+def first_method(name: str) -> str:
+    """The method that a run by `name` begins with."""
+    return EXPLICIT if name == AUTO else name
+
+
+def price(structure: Structure) -> float:
+    """What an implicit step costs in explicit ones: Jacobian, stages, factor and solves, counted in calls of rhs."""
+    implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
+    algebra = structure.n**2 * DENSE_ENTRY if structure.kind == "dense" else structure.nnz / structure.n * ENTRY * 10
+    return (structure.color_count + implicit.stages + 1 + algebra) / (explicit.stages - 1)
+
+
+def watch(stepper: Stepper, structure: Structure) -> None:
+    """Have the loop watch stiffness."""
+    stepper.orders[told.WATCH], stepper.orders[told.PRICE] = 1.0, price(structure)
+
+
+def change(stepper: Stepper) -> tuple[float, float, float]:
+    """Go on by the other method; returns when, with which spectral radius [1/s] and after which step [s]."""
+    memory = stepper.memory
+    stepper.use(method_named(IMPLICIT if stepper.method.explicit else EXPLICIT))
+    memory[told.SWITCHES] += 1.0
+    memory[told.CASES] = 0.0
+    return float(memory[told.T]), float(memory[told.RADIUS]), float(memory[told.LAST])
+
+
+def account(start: float, changes: list[tuple[float, float, float]], price: float) -> list[dict]:
+    """Which method from when on, and why."""
+    found = [{"time": start, "method": EXPLICIT, "why": "until the spectrum forbids it"}]
+    for k, (t, radius, h) in enumerate(changes):
+        if k % 2 == 0:
+            why = (f"stiff: rates of about {radius:.3g} 1/s hold explicit steps to {h:.3g} s, and an implicit step "
+                   f"costs no more than {price:.3g} of them")  # fmt: skip
+        else:
+            why = f"no longer stiff: rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s"
+        found.append({"time": t, "method": EXPLICIT if k % 2 else IMPLICIT, "why": why})
+    return found
