@@ -105,7 +105,7 @@ def watch(orders, memory, h, e, out_rate):
         other = held or h * memory[RADIUS] > BOUNDARY
     else:
         other = 2.0 * max(1.0, h * memory[RADIUS] / BOUNDARY) < orders[PRICE]
-    memory[CASES] = memory[CASES] + 1.0 if other else max(0.0, memory[CASES] - 3.0)
+    memory[CASES] = memory[CASES] + 1.0 if other else max(0.0, memory[CASES] - 0.5)
     return memory[CASES] >= PATIENCE * 2.0 ** min(memory[SWITCHES], 6.0)
 
 

@@ -12,8 +12,10 @@ import numpy as np
 from numba import objmode, types
 
 from fvsolve.errors import FvsolveError
+from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.march import compiled, compiled_as
+from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, Method, method_named
@@ -29,6 +31,7 @@ def integrate(
     """Values of y at the times t : float64[len(t), n], for y' = f(t, y), y(t[0]) = y0.
 
     f : f(t, y) -> float64[n], or f(t, y, dydt), which fills its last argument; compiled where numba can
+    method : a name, a tableau, or "auto": explicit while the spectrum allows it, implicit where that is cheaper
     rtol : relative tolerance of methods with an error estimate (default 1e-6); atol : absolute one, a number or
     float64[n], default rtol; step : fixed step [s], for every method
     counts : a dict to be filled with the numbers of steps, rejections, rhs, jacobians, factorisations, newton, ...
@@ -36,7 +39,8 @@ def integrate(
     Raises FvsolveError for two step settings, a method without an error estimate and no step, times out of order,
     and where the solution does not stay finite or Newton fails.
     """
-    method = method_named(method) if isinstance(method, str) else method
+    watched = method == AUTO
+    method = method_named(automatic.first_method(method)) if isinstance(method, str) else method
     t, y0 = np.asarray(t, dtype=np.float64), np.atleast_1d(np.asarray(y0, dtype=np.float64))
     _check(method, t, rtol, step)
     n = y0.size
@@ -47,6 +51,8 @@ def integrate(
     y[0], memory[told.T] = y0, t[0]
     orders[told.CONTROL] = told.FIXED_STEP if step is not None else told.TOLERANCE
     orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
+    if watched:
+        automatic.watch(stepper, _full(n))
     lands = method.order > stepper.dense_order + 2
     stops = t[1:] if lands else t[-1:]
     stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, n + 1))
@@ -62,6 +68,9 @@ def integrate(
         flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
         kept = memory[told.STEP]
         code = stepper.call(*functions, handle, WHERE, stepper.none)
+        while code == told.SWITCH:
+            automatic.change(stepper)
+            code = stepper.call(*functions, handle, WHERE, stepper.none)
         if code != told.DONE:
             raise FvsolveError(_failure(method, code, memory)) from _RAISED.pop(id(f), None)
         found[i] = y[flags[told.NOW]]
