@@ -8,6 +8,7 @@ from scipy.sparse import csc_array
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.differences import differences, multiply
+from fvsolve.steppers.pairs import pairs
 from fvsolve.steppers.structure import Structure
 
 KINDS = ("dense", "banded", "sparse")
@@ -48,12 +49,94 @@ def test_what_is_solved_is_the_shifted_matrix(kind, n, m, shift):
     assert (shift * np.eye(n) - dense[:n]) @ x == pytest.approx(b, rel=1e-11, abs=1e-11)
 
 
-def test_dense_exchanges_rows_where_a_pivot_is_zero():
-    structure = Structure.full(3)
+@pytest.mark.parametrize("kind", ["dense", "banded"])
+def test_rows_are_exchanged_where_a_pivot_is_zero(kind):
+    structure = Structure(np.ones((3, 3), dtype=bool), kind)
     j = np.array([[1.0, 2.0, 3.0], [4.0, 1.0, 6.0], [7.0, 8.0, 0.0]])  # shift 1 makes two pivots zero
     b = np.array([1.0, -2.0, 0.5])
     x = solved(structure, j.T.ravel().copy(), 1.0, b)
     assert (np.eye(3) - j) @ x == pytest.approx(b, rel=1e-13)
+
+
+@pytest.mark.parametrize("width", [1, 2, 5])
+def test_rows_are_exchanged_all_along_a_band(width):
+    """Random entries with nothing on the diagonal: without pivoting there is no factor."""
+    n, rng = 60, np.random.default_rng(width)
+    distance = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    shuffled = rng.permutation(n)
+    structure = Structure((distance <= width)[shuffled][:, shuffled], "banded")
+    values, dense = values_on(structure)
+    pattern = structure.pattern
+    values[pattern.indices == np.repeat(np.arange(n), np.diff(pattern.indptr))] = 0.0
+    np.fill_diagonal(dense, 0.0)
+    b = rng.normal(size=n)
+    assert solved(structure, values, 0.0, b) == pytest.approx(np.linalg.solve(-dense, b), rel=1e-8)
+
+
+def test_sparse_refuses_what_needs_an_exchange_of_rows():
+    structure = Structure(np.ones((3, 3), dtype=bool), "sparse")
+    factor, _ = structure.functions()
+    assert factor(structure.shape, np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]), 1.0, np.zeros(structure.store_size)) > 0
+
+
+# a pipe of two waves: each cell on its neighbours and, by friction, on its other wave
+
+
+def pipe_pattern(cells: int, reach: int) -> np.ndarray:
+    """Of both waves of a pipe, forward ones first, both closed by the other at the ends."""
+    distance = np.abs(np.subtract.outer(np.arange(cells), np.arange(cells)))
+    return np.kron(np.ones((2, 2), dtype=bool), distance <= reach)
+
+
+def pipe_values(structure: Structure, seed: int = 0) -> np.ndarray:
+    """Slopes that damp: random ones, and on the diagonal less than minus the sum of the others of a row."""
+    pattern, rng = structure.pattern, np.random.default_rng(seed)
+    values = rng.normal(size=structure.nnz)
+    columns = np.repeat(np.arange(structure.n), np.diff(pattern.indptr))
+    others = np.bincount(pattern.indices, np.abs(values), minlength=sum(pattern.shape))
+    values[pattern.indices == columns] = -others[: structure.n]
+    return values
+
+
+@pytest.mark.parametrize("reach", [1, 2, 3])
+def test_all_kinds_agree_from_long_steps_to_short_ones(reach):
+    n, b = 80, np.random.default_rng(2).normal(size=80)
+    for shift in (1e-2, 1.0, 1e3, 1e6, 0.5 + 2.0j):
+        found = []
+        for kind in KINDS:
+            structure = Structure(pipe_pattern(n // 2, reach), kind)
+            found.append(solved(structure, pipe_values(structure), shift, b))
+        assert found[1] == pytest.approx(found[0], rel=1e-10, abs=1e-12 * np.max(np.abs(found[0])))
+        assert found[2] == pytest.approx(found[0], rel=1e-10, abs=1e-12 * np.max(np.abs(found[0])))
+
+
+@pytest.mark.parametrize("reach", [1, 2, 3])
+def test_sparse_finds_the_two_waves_of_a_cell(reach):
+    cells = 30
+    found = pairs(csc_array(pipe_pattern(cells, reach)))
+    assert np.array_equal(found, np.column_stack((np.arange(cells), cells + np.arange(cells))))
+
+
+def test_sparse_pairs_every_state_once():
+    found = pairs(csc_array(pattern_of(41, density=0.05)))
+    assert sorted(set(found.ravel())) == list(range(41))
+    assert sum(1 if a == b else 2 for a, b in found) == 41
+
+
+def test_sparse_factors_of_a_line_stay_inside_its_band():
+    """Two waves, one neighbour each side: by blocks of two a tridiagonal matrix, whose factors have no fill."""
+    cells = 200
+    structure = Structure(pipe_pattern(cells, 1), "sparse")
+    assert structure.store_size == 4 * (2 * (cells - 1) + 2 * cells)  # L and U, inverses and the working row
+
+
+def test_the_kind_is_chosen_by_size_and_crowding():
+    assert Structure.full(100).kind == "dense"
+    assert Structure(np.eye(16, dtype=bool)).kind == "dense"
+    assert Structure(np.eye(17, dtype=bool)).kind == "sparse"
+    assert Structure(pipe_pattern(40, 3)).kind == "sparse"
+    assert Structure(pattern_of(40, density=0.3)).kind == "dense"
+    assert Structure(pipe_pattern(40, 3), "banded").kind == "banded"
 
 
 @pytest.mark.parametrize("kind", KINDS)
