@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -376,3 +377,25 @@ def test_a_controller_may_hold_spool_and_force():
         assert sign * state.y[x] > 1e-3 and sign * other.y[x] < 0.0
     with pytest.raises(fvsolve.FvsolveError, match="spool.position = 2 is out of range; wanted a number from -1 to 1"):
         fvsolve.advance(model, fvsolve.initial_state(model), 0.02, {"spool.position": 2.0})
+
+
+def test_a_run_with_bodies_broken_off_and_resumed_is_the_unbroken_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    jack = Jack(pressures=(60e5, 80e5), leakage=2e-13)
+    links = {**jack.links(), "spool": spool(1e-5, 0.6)}
+    case = scene({**jack.nodes(), **SUPPLY}, links, 0.05, {"method": "rk4", "step": 1e-6}, PROBES, 1e-3,
+                 fluid=jack.fluid())  # fmt: skip
+    calls = []
+
+    def third(t, seconds, steps):
+        calls.append(t)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    whole = fvsolve.run(case, out=tmp_path / "whole")
+    assert fvsolve.run(case, out=tmp_path / "broken", progress=third).reason.startswith("interrupted")
+    assert 0.0 < calls[1] < 0.05
+    resumed = fvsolve.run(case, out=tmp_path / "broken", resume=True)
+    assert whole.ok and resumed.ok and resumed.ledger == whole.ledger
+    same = [(tmp_path / run / "history.csv").read_bytes() for run in ("whole", "broken")]
+    assert same[0] == same[1]
