@@ -114,8 +114,9 @@ SPOOL = 'ports = { P = "pump", T = "sump", A = "cyl.A", B = "cyl.B" }'
 BAD = {
     "a rod on a reservoir": (
         swap('rod = "load"', 'rod = "pump"'),
-        'links.cyl.ports.rod: "pump" is a reservoir, a hydraulic place, and this port of a cylinder a translational '
-        "one; translational places are ground, load",
+        'links.cyl.ports.rod: "pump" is a reservoir, a hydraulic place, and this port of a cylinder '
+        "a translational one; "
+        "translational places are ground, load",
     ),
     "a spool on a mass": (
         swap('A = "cyl.A"', 'A = "load"'),

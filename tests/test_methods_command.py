@@ -68,7 +68,7 @@ def test_the_picture_goes_where_it_is_wanted(said, tmp_path):
     assert found["a"][0][0] == pytest.approx(0.435866521508459) and len(found["numerator"]) == 3
 
 
-@pytest.mark.parametrize("name", ["verner-7", "crouzeix-4", "esdirk-5", "euler"])
+@pytest.mark.parametrize("name", ["verner-7", "crouzeix-4", "esdirk-5", "rodas-4", "euler"])
 def test_long_and_short_tableaux_are_both_shown(said, name):
     code, out, _ = said("methods", name)
     assert code == 0 and out.startswith(name) and re.search(r"^R\(s\) = ", out, re.MULTILINE)
@@ -94,9 +94,8 @@ def test_a_picture_of_a_kind_that_nobody_can_draw_is_refused(said):
 def test_the_page_says_what_the_program_says(name):
     one = analyse(name)
     pade = f"{one.pade[0]}/{one.pade[1]}" if one.pade else "-"
-    kind = "explicit" if one.explicit else "diagonal" if one.diagonally_implicit else "full"
     row = [
-        f"`{name}`", one.order, one.error_order or "-", one.stage_order, one.stages, kind, stable(one),
+        f"`{name}`", one.order, one.error_order or "-", one.stage_order, one.stages, one.kind, stable(one),
         *map(cell, (one.real_interval, one.imaginary_interval, one.ssp_radius)), pade, one.source,
     ]  # fmt: skip
     assert f"| {' | '.join(map(str, row))} |" in DOCS.splitlines()

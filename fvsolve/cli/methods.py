@@ -55,7 +55,7 @@ def _table(found: dict[str, Facts]) -> None:
     rows = [
         [
             name, str(one.order), str(one.error_order) if one.adaptive else "-", str(one.stage_order),
-            str(one.stages), _kind(one), _yes(one.a_stable), _yes(one.l_stable), _length(one.real_interval),
+            str(one.stages), one.kind, _yes(one.a_stable), _yes(one.l_stable), _length(one.real_interval),
             _length(one.imaginary_interval), _length(one.ssp_radius), _pade(one),
         ]
         for name, one in first.items()
@@ -86,7 +86,7 @@ def _show(method: Method, facts: Facts, path: Path) -> None:
 
 def _sentences(one: Facts) -> list[str]:
     estimate = f"error estimate of order {one.error_order}" if one.adaptive else "no error estimate"
-    kind = [f"{one.stages} stages", _kind(one)]
+    kind = [f"{one.stages} stages", one.kind]
     kind += ["stiffly accurate"] if one.stiffly_accurate else []
     kind += ["first rate same as last"] if one.first_same_as_last else []
     sector = "no sector" if one.angle is None else f"A(alpha) with alpha = {one.angle:.8g} degrees"
@@ -165,10 +165,6 @@ def _number(x) -> str:
     if len(text) > TERM:
         return f"{float(x):.15g}"
     return f"({text})" if re.search(r".[-+]", text) else text
-
-
-def _kind(one: Facts) -> str:
-    return "explicit" if one.explicit else "diagonal" if one.diagonally_implicit else "full"
 
 
 def _yes(value: bool) -> str:

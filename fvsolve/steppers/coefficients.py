@@ -12,14 +12,13 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
-from fvsolve.steppers.rosenbrock import Rosenbrock
 from fvsolve.steppers.tableau import Method
 
 
 @functools.cache
 def coefficients(method: Method) -> tuple[np.ndarray, np.ndarray, int]:
     """(flat coefficients, dense output : float64[s, d], stages s), the start as an explicit stage included."""
-    if isinstance(method, Rosenbrock):
+    if method.kind == "linear":
         return method.coefficients
     a, b, c, dense = method.a, method.b, method.c, method.dense
     error = method.error if method.adaptive else np.zeros(len(b))
@@ -28,7 +27,7 @@ def coefficients(method: Method) -> tuple[np.ndarray, np.ndarray, int]:
         b, c, error = (np.concatenate(([x], part)) for x, part in ((0.0, b), (0.0, c), (method.start_error, error)))
         dense = np.vstack([np.zeros((1, dense.shape[1])), dense]) if dense.size else dense
     flat = [a.ravel(), b, c, error]
-    if not (method.explicit or method.diagonally_implicit):
+    if method.kind == "full":
         from fvsolve.steppers.irk import transformed
 
         try:

@@ -23,8 +23,7 @@ HEADER = 8
 FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, STAGES = range(7)
 
 MOST = 10  # iterations
-FIXED = 1e-13  # accuracy of a step that is given, relative
-STALLED = 1e-9  # below it an iteration that no longer gains has met rounding
+FIXED, FLOOR = 1e-13, 1e-7  # accuracy aimed at where the step is given, relative; and what must be reached
 ENOUGH = 0.05  # of the tolerance
 STALE = 0.03  # a Jacobian that gains less than this in an iteration is made anew for the next step
 CONVERGED, FAILED = 0, 1
@@ -90,26 +89,26 @@ def find_worst(d, weights, memory):
 @inner
 def verdict(turn, size, before, orders, work):
     """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
-    fixed = orders[CONTROL] != TOLERANCE
-    enough = 1.0 if fixed else max(1e-15 / orders[SIZE], ENOUGH)
+    enough, floor = 1.0, FLOOR / FIXED
+    if orders[CONTROL] == TOLERANCE:
+        enough = floor = max(1e-15 / orders[SIZE], ENOUGH)
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
-        stalled = size * FIXED <= STALLED if fixed else size * orders[SIZE] <= 1e-14
-        if ratio >= 0.3 and stalled:
+        if ratio >= 0.3 and size <= floor:  # what remains is rounding, or a kink that no iteration sees through
             return True, CONVERGED
         work[RATIO] = max(work[RATIO], ratio)
         if ratio >= 0.99:
             return True, FAILED
         work[SURE] = ratio / (1.0 - ratio)
-        if work[SURE] * size * ratio ** (MOST - 1 - turn) > enough:
+        if work[SURE] * size * ratio ** (MOST - 1 - turn) > floor:
             return True, FAILED
     else:
         work[SURE] = max(work[SURE], 1e-16) ** 0.8
     if work[SURE] * size <= enough:
         return True, CONVERGED
-    return turn == MOST - 1, FAILED
+    return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= floor else FAILED
 
 
 @inner

@@ -77,6 +77,11 @@ class Rosenbrock(Method):
         """No stage is solved by Newton."""
         return False
 
+    @property
+    def kind(self) -> str:
+        """A stage at a time, by one linear solve."""
+        return "linear"
+
     @functools.cached_property
     def coefficients(self) -> tuple[np.ndarray, np.ndarray, int]:
         """(flat coefficients [A, m, c, e, C, d, gamma], dense output, stages), with f at the start as a first stage."""

@@ -12,7 +12,6 @@ from fvsolve.jit import argument
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.coefficients import coefficients
 from fvsolve.steppers.march import compiled, compiled_step, no_algebra
-from fvsolve.steppers.rosenbrock import Rosenbrock
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
 
@@ -43,7 +42,7 @@ class Stepper:
         n, ledgers = self.scale.size, self.ledger.size // 2
         self.method = method
         self.coefficients, self.dense, s = coefficients(method)
-        self.attempt, self.algebra = attempt_of(method), no_algebra()
+        self.attempt, self.algebra = attempt_of(method.kind), no_algebra()
         self.k, self.supply = np.zeros((s, n)), np.zeros((s, ledgers))
         self.shape, self.work, self.vectors = self.nobody, self.none, np.zeros((0, n))
         self.store, self.store_complex, self.kept = self.none, np.zeros(0, dtype=complex), 0
@@ -51,7 +50,7 @@ class Stepper:
             self.solve_by(self.structure(), s, n, ledgers)
         self.orders[told.ORDER] = method.control_order
         self.orders[told.FSAL] = method.explicit and method.first_same_as_last
-        self.orders[told.KIND] = KINDS[kind_of(method)]
+        self.orders[told.KIND] = KINDS[method.kind][1]
         self.flags[told.PHASE], self.flags[told.BEHIND] = told.FRESH, 0
 
     def solve_by(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
@@ -59,7 +58,7 @@ class Stepper:
         from fvsolve.steppers import newton
 
         q = pairs = 0
-        if kind_of(self.method) == "irk":
+        if self.method.kind == "full":
             from fvsolve.steppers.irk import pairs_of
 
             q, pairs = s - 1, pairs_of(self.method)
@@ -129,19 +128,16 @@ def arguments(functions: tuple) -> tuple:
     return tuple(argument(function) for function in functions)
 
 
-# Files of steps, and what they are to the loop.
-KINDS = {"erk": told.EXPLICIT, "dirk": told.NEWTON_SOLVED, "irk": told.NEWTON_SOLVED, "ros": told.LINEARLY_IMPLICIT}
+# Kinds of methods: the file of their steps, and what they are to the loop.
+KINDS = {
+    "explicit": ("erk", told.EXPLICIT),
+    "diagonal": ("dirk", told.NEWTON_SOLVED),
+    "full": ("irk", told.NEWTON_SOLVED),
+    "linear": ("ros", told.LINEARLY_IMPLICIT),
+}
 
 
 @functools.cache
-def kind_of(method: Method) -> str:
-    """Which file of steps takes a method's: explicit, stages in turn, stages at once, or linearly implicit."""
-    if isinstance(method, Rosenbrock):
-        return "ros"
-    return "erk" if method.explicit else "dirk" if method.diagonally_implicit else "irk"
-
-
-@functools.cache
-def attempt_of(method: Method):
-    """The compiled step of a method; each kind is compiled only where it is used."""
-    return compiled_step(importlib.import_module(f"fvsolve.steppers.{kind_of(method)}").attempt)
+def attempt_of(kind: str):
+    """The compiled step of a kind of methods, compiled only where one is used."""
+    return compiled_step(importlib.import_module(f"fvsolve.steppers.{KINDS[kind][0]}").attempt)

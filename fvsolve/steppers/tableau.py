@@ -133,6 +133,11 @@ class Method:
         """Whether the stages can be solved in turn, and at least one must be solved."""
         return not self.explicit and not np.any(np.triu(self.a, 1))
 
+    @property
+    def kind(self) -> str:
+        """What a step solves: nothing (explicit), a stage at a time (diagonal), all of them at once (full)."""
+        return "explicit" if self.explicit else "diagonal" if self.diagonally_implicit else "full"
+
     @functools.cached_property
     def stiffly_accurate(self) -> bool:
         """Whether the last stage is the new state."""

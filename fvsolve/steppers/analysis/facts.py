@@ -17,8 +17,9 @@ class Facts:
     """A method known: order, cost, stability.
 
     error_order : of the embedded solution, 0 where there is none; digits : of its source, None where exact;
-    angle : alpha of A(alpha) [degrees], None where no ray is stable; real_interval, imaginary_interval,
-    ssp_radius : inf where there is no end; pade : degrees (k, m) of the entry of e^s that R is, else None.
+    kind : explicit, diagonal, full or linear (Rosenbrock); angle : alpha of A(alpha) [degrees], None where no ray
+    is stable; real_interval, imaginary_interval, ssp_radius : inf where there is no end; pade : degrees (k, m) of
+    the entry of e^s that R is, else None; error_constant : of the least power of s in R(s) - e^s.
     """
 
     name: str
@@ -28,6 +29,7 @@ class Facts:
     stage_order: int
     stages: int
     digits: int | None
+    kind: str
     explicit: bool
     diagonally_implicit: bool
     adaptive: bool
