@@ -57,6 +57,10 @@ def checks(model) -> None:
     rows = [[name, *map(_number, one.values())] for name, one in found["nodes"].items()]
     _table(["node", "elevation [m]", "pressure [Pa]", "head [m]"], rows, console)
     _line(console, "")
+    rows = [[name, *map(_number, one.values())] for name, one in found["bodies"].items()]
+    if rows:
+        _table(["body", "position [m]", "velocity [m/s]", "net force [N]"], rows, console)
+        _line(console, "")
     rows = [[name, *(_number(one[key]) for key in PIPE)] for name, one in found["pipes"].items()]
     if rows:
         _table(["pipe", *PIPE.values()], rows, console)

@@ -106,7 +106,7 @@ def add_states(scene) -> None:
         if bodies[i]["lightness"] > 0.0:
             speed = travel[i] * math.sqrt(stiffness[i] * bodies[i]["lightness"]) if stiffness[i] > 0.0 else SMALL_SPEED
             bodies[i]["y"] = scene.states([f"{name}.position"], travel[i])
-            scene.states([f"{name}.velocity"], speed)
+            scene.states([f"{name}.velocity"], max(speed, abs(bodies[i]["velocity"])))
 
 
 def start_bodies(scene, start) -> list[str]:

@@ -287,8 +287,8 @@ class Scene:
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
-            {name: case.elevation(name) for name in case.places}, case.probes, self.warnings, self.steady,
-            self.profiles,
+            self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
+            self.steady, self.profiles,
         )  # fmt: skip
 
 

@@ -22,6 +22,10 @@ def checks(model) -> dict[str, Any]:
                "head": float(model.head(row["pressure"], row["elevation"]))}
         for name, row in zip(model.node_names, model.tables[rec.I_NODES], strict=True)
     }  # fmt: skip
+    bodies = {
+        name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
+        for name, row in zip(model.body_names, model.tables[rec.I_BODIES], strict=False)
+    }
     pipes = {}
     for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
         velocity = row["flow"] / (rho * row["area"])
@@ -41,7 +45,7 @@ def checks(model) -> dict[str, Any]:
     steps = math.ceil(span / step) if step else None
     cost = SECONDS_PER_STEP + SECONDS_PER_CELL_STEP * model.cells
     return {
-        "nodes": nodes, "pipes": pipes, "states": model.y_size, "cells": model.cells, "step": step,
+        "nodes": nodes, "bodies": bodies, "pipes": pipes, "states": model.y_size, "cells": model.cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": steps * cost if steps else None,
         "moving": model.steady["moving"], "warnings": model.warnings,
     }  # fmt: skip
@@ -62,4 +66,4 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
-    return numerics.courant / rate, "a chamber, tank or rigid column, quicker than every pipe cell"
+    return numerics.courant / rate, "a chamber, tank, rigid column or mass, quicker than every pipe cell"

@@ -60,6 +60,7 @@ class Model:
     valve_names: list[str]
     column_names: list[str]
     piston_names: list[str]
+    body_names: list[str]
     elevation: dict[str, float]
     probes: list[Any]
     warnings: list[str]
