@@ -17,7 +17,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.erk import function_types
-from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.structure import KINDS, Structure
 
 CASES = sorted((Path(__file__).parent.parent / "cases").glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]
@@ -141,6 +141,26 @@ def test_what_slopes_store_is_what_they_supply(law, scheme):
             moved = 2.0**-26 * np.maximum(np.abs(y), model.scale)
             rounding = 1e-14 * (weight @ np.abs(base[:n]) + np.sum(np.abs(base[n:]))) / moved
             assert np.all(np.abs(weight @ found[:n] - np.sum(found[n:], axis=0)) <= rounding)
+
+
+@pytest.mark.parametrize("law, scheme", [("linear", "upwind"), ("linear", "central"), ("log", "upwind5")])
+def test_every_kind_solves_steps_of_a_microsecond_and_of_minutes(law, scheme):
+    """Without exchanges of rows as well: 1e-7 is far below what Newton needs, at a Courant number of 1e5."""
+    model, rng = random_model(3, scheme, law), np.random.default_rng(3)
+    n, pattern = model.y_size, sparsity(model)
+    entry = (pattern.indices, np.repeat(np.arange(n), np.diff(pattern.indptr)))
+    for t in TIMES:
+        found = slopes(model, t, random_state(model, rng), Structure(pattern))
+        for shift in (1e-2, 1.0, 1e3, 1e6, 1e2 + 2e2j):
+            b = model.scale * rng.normal(size=n)
+            wanted = np.linalg.solve(shift * np.eye(n) - found[:n], b) / model.scale
+            for kind in KINDS:
+                structure, number = Structure(pattern, kind), type(shift)
+                factor, solve = structure.functions(number is complex)
+                store, x = np.zeros(structure.store_size, dtype=number), b.astype(number)
+                assert factor(structure.shape, found[entry].copy(), shift, store) == 0
+                solve(structure.shape, store, x)
+                assert np.max(np.abs(x / model.scale - wanted)) < 1e-7 * np.max(np.abs(wanted))
 
 
 def masses(model) -> np.ndarray:
