@@ -59,7 +59,7 @@ def first_step(k, scale, orders, span):
 def next_step(orders, memory, out_rate, k, scale):
     """Length of the step to try, before the end of the segment is looked at [s]."""
     if orders[CONTROL] == TOLERANCE:
-        if memory[STEP] <= 0.0:
+        if too_short(orders, memory, memory[STEP]):  # none is remembered, or one that would not move the time
             memory[STEP] = first_step(k, scale, orders, orders[END] - memory[T])
         stable = orders[STEP_MAX]  # error control alone would chatter at the limit of an explicit method
         if out_rate > 0.0 and orders[KIND] == EXPLICIT:
