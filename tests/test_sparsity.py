@@ -16,7 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.erk import function_types
+from fvsolve.steppers.march import function_types
 from fvsolve.steppers.structure import KINDS, Structure
 
 CASES = sorted((Path(__file__).parent.parent / "cases").glob("*.toml"))
@@ -95,7 +95,7 @@ def compiled_differences():
 
     found = njit(differences.py_func)
     i, v, f, shape = types.int64, types.float64[::1], types.float64, types.int64[::1]
-    found.compile((function_types()[0], shape, shape, i, f, v, v, v, v, v, v, v, v))
+    found.compile((function_types()[5], shape, shape, i, f, v, v, v, v, v, v, v, v))
     found.disable_compile()
     return found
 

@@ -47,17 +47,20 @@ def led_end(t, tables, k):
 
 
 @njit
+def pressure_at(tables, out, i, extra, solved):
+    """p' of node i; of a junction, until nodes are `solved`, a guess from what its pipes and `extra` [kg/s] bring."""
+    layout, node = tables[I_LAYOUT][0], tables[I_NODES][i]
+    if node["kind"] != JUNCTION or solved:
+        return out[layout["pressure"] + i]
+    return (out[layout["net"] + i] + extra) / node["admittance"] if node["admittance"] > 0.0 else 0.0
+
+
+@njit
 def standing_pressure(tables, out, k, end, solved):
-    """p' of the led end of column k at which nothing drives it; the other end's is guessed until nodes are `solved`."""
-    layout, nodes, column = tables[I_LAYOUT][0], tables[I_NODES], tables[I_COLUMNS][k]
+    """p' of the led end of column k at which nothing drives it."""
+    column = tables[I_COLUMNS][k]
     i = column["from_node"] if end == 1 else column["to_node"]
-    p = out[layout["pressure"] + i]
-    if nodes[i]["kind"] == JUNCTION and not solved:
-        p = (
-            (out[layout["net"] + i] + end * column["flow"]) / nodes[i]["admittance"]
-            if nodes[i]["admittance"] > 0.0
-            else 0.0
-        )
+    p = pressure_at(tables, out, i, end * column["flow"], solved)
     return p + end * (column["offset"] + column["drag"] * column["length"] / column["area"])
 
 
@@ -65,7 +68,7 @@ def standing_pressure(tables, out, k, end, solved):
 def led_flow(t, tables, out, k, end, solved):
     """(flow out of column k through the valves that lead it, its rate, p' of that end), by damped iteration."""
     nodes, valves, column = tables[I_NODES], tables[I_VALVES], tables[I_COLUMNS][k]
-    pressure, limit = tables[I_LAYOUT][0]["pressure"], tables[I_SETTINGS][0]["limit"]
+    limit = tables[I_SETTINGS][0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
     early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate on this side of a kink
     standing = standing_pressure(tables, out, k, end, solved)
@@ -76,7 +79,7 @@ def led_flow(t, tables, out, k, end, solved):
             which = tables[I_INTEGERS][nodes[x]["gates"] + e]
             valve = valves[which]
             side = 1.0 if valve["from_node"] == x else -1.0
-            other = out[pressure + (valve["to_node"] if side > 0.0 else valve["from_node"])]
+            other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
             drop = side * valve["drop"] + p - other
             root = sqrt(abs(drop)) if drop >= 0.0 else -sqrt(abs(drop))
             later = sqrt(valve_conductance(tables, which, early + INSTANT))

@@ -34,7 +34,7 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
             links[f"v{k}"] = valve(a, b, 1e-3, CLOSING if rng.random() < 0.7 else 1.0)
     nodes["X"], nodes["Y"] = junction(), junction()  # a column that valves can lead, and one that they cannot
     a, d = (str(name) for name in rng.choice(names, 2, replace=False))
-    b, c = (str(name) for name in rng.choice([name for name in names if nodes[name]["type"] != "junction"], 2))
+    b, c = (str(name) for name in rng.choice(names, 2))
     column = {"type": "rigid-column", "length": 20.0, "diameter": 0.1, "friction": FACTOR}
     links["c0"] = column | {"from": a, "to": "X"}
     links["w0"], links["w1"] = valve("X", b, 1e-3, CLOSING), valve(c, "X", 1e-3, CLOSING)
