@@ -12,7 +12,7 @@ from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import method_named
 
 EXPLICIT, IMPLICIT = "dormand-prince", "rodas-5p"
-DENSE_ENTRY, ENTRY = 1 / 150, 1 / 15  # of a Jacobian in factors and solves, in calls of rhs per state
+DENSE, SPARSE = 0.25, 40.0  # factors and solves of a step in calls of rhs: per state squared; whatever the size
 
 
 def first_method(name: str) -> str:
@@ -23,7 +23,7 @@ def first_method(name: str) -> str:
 def price(structure: Structure) -> float:
     """What an implicit step costs in explicit ones: Jacobian, stages, factor and solves, counted in calls of rhs."""
     implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
-    algebra = structure.n**2 * DENSE_ENTRY if structure.kind == "dense" else structure.nnz / structure.n * ENTRY * 10
+    algebra = DENSE * structure.n**2 if structure.kind == "dense" else SPARSE
     return (structure.color_count + implicit.stages + 1 + algebra) / (explicit.stages - 1)
 
 
