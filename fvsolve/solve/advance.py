@@ -42,7 +42,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         if first and adaptive and state.memory.size == 2:
             loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory
         code = loop.run(NO_LIMIT)
-        while code == told.SWITCH:
+        while code == told.CHUNK and automatic.wants_change(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
         if code != told.DONE:

@@ -32,6 +32,11 @@ def watch(stepper: Stepper, structure: Structure) -> None:
     stepper.orders[told.WATCH], stepper.orders[told.PRICE] = 1.0, price(structure)
 
 
+def wants_change(stepper: Stepper) -> bool:
+    """Whether the loop came back because the other kind of step would be cheaper."""
+    return stepper.memory[told.CASES] < 0.0
+
+
 def change(stepper: Stepper) -> tuple[float, float, float]:
     """Go on by the other method; returns when, with which spectral radius [1/s] and after which step [s]."""
     memory = stepper.memory

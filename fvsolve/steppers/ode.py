@@ -68,8 +68,9 @@ def integrate(
         flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
         kept = memory[told.STEP]
         code = stepper.call(*functions, handle, WHERE, stepper.none)
-        while code == told.SWITCH:
+        while code == told.CHUNK and automatic.wants_change(stepper):
             automatic.change(stepper)
+            orders[told.BUDGET] = NO_LIMIT
             code = stepper.call(*functions, handle, WHERE, stepper.none)
         if code != told.DONE:
             raise FvsolveError(_failure(method, code, memory)) from _RAISED.pop(id(f), None)
