@@ -42,10 +42,9 @@ class Loop:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, model.structure)
-        if numerics.courant is not None and not method.explicit:  # of waves alone: Newton copes with the rest
-            pipes = model.tables[rec.I_PIPES]
+        if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
             self.orders[told.CONTROL] = told.FIXED_STEP
-            self.orders[told.SIZE] = numerics.courant / np.max(pipes["speed"] / pipes["dx"])
+            self.orders[told.SIZE] = numerics.courant / model.wave_rates.max()
 
     @property
     def now(self) -> np.ndarray:
