@@ -306,5 +306,5 @@ def attempt(
         return filtered_error(
             rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store,
             doubt,
-        )
+        )  # fmt: skip
     return error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])
