@@ -105,7 +105,7 @@ def verdict(turn, size, before, orders, work):
         if work[SURE] * size * ratio ** (MOST - 1 - turn) > floor:
             return True, FAILED
     else:
-        work[SURE] = max(work[SURE], 1e-16) ** 0.8
+        work[SURE] = max(work[SURE], 1e-4) ** 0.8
     if work[SURE] * size <= enough:
         return True, CONVERGED
     return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= floor else FAILED
