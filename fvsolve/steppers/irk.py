@@ -38,7 +38,7 @@ from fvsolve.steppers.newton import (
     verdict,
 )
 from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
-from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 from fvsolve.steppers.tableau import Method
@@ -209,7 +209,12 @@ def iterate(
         if done:
             break
     if why == FAILED:
-        find_worst(vectors[r_at], weights, memory)
+        f = vectors[s + RATE]
+        copy(vectors[f_at], f)
+        for i in range(1, q):
+            for e in range(n):
+                f[e] += vectors[f_at + i, e]
+        find_worst(vectors[r_at], f, weights, memory)
     return why
 
 
