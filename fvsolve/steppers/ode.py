@@ -180,12 +180,13 @@ def _functions(f, t0, y0):
 
 def _rhs(f, t0, y0):
     """f in the loop's own form, NaN where it raises; a function that numba refuses is called as Python."""
-    from numba.core.errors import NumbaError
+    from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
-    inner, fills = f if hasattr(f, "py_func") else numba.njit(f), in_place(f)
+    fills = in_place(f)
     try:
+        inner = f if hasattr(f, "py_func") else numba.njit(f)
         inner(t0, y0, np.empty_like(y0)) if fills else inner(t0, y0)
-    except (NumbaError, TypeError, NotImplementedError):
+    except (NumbaError, UnsupportedBytecodeError, TypeError, NotImplementedError):
         return _call_python
 
     def rhs(t, y, dydt, out, handle):
