@@ -98,6 +98,7 @@ def leap_allowed(model: Model, method: Method) -> bool:
     settings, numerics = model.tables[rec.I_SETTINGS][0], model.case.numerics
     plain = np.isin(model.tables[rec.I_PIPES]["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
     return bool(
-        settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND and method.stages == 1
-        and numerics.rtol is None and model.y_size == 2 * model.cells and plain
+        settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND
+        and method.explicit and method.stages == 1 and numerics.rtol is None
+        and model.y_size == 2 * model.cells and plain
     )  # fmt: skip
