@@ -74,10 +74,9 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         numba.config.CACHE_DIR = before
 
 
-inner = functools.partial(njit, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-inner.__doc__ = (
+def inner(function: Callable) -> Callable:
     """`njit` for what compiled code alone calls, from one place: arrays cost nothing to pass, no door to Python."""
-)
+    return njit(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 class Argument:

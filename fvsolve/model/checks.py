@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
+from fvsolve.steppers.tableau import method_named
 
 SECONDS_PER_CELL_STEP = 5e-9  # of a method with three stages; benchmarks/kernels.py
 SECONDS_PER_STEP = 1.5e-6
@@ -58,11 +59,13 @@ def step_and_reason(model) -> tuple[float | None, str]:
         return numerics.step, "numerics.step"
     if numerics.rtol is not None:
         return None, f"error control, rtol = {numerics.rtol:g}"
-    rate = float(model.evaluate(numerics.start, np.zeros(model.y_size), numerics.start)[1][rec.RATE])
+    if method_named(numerics.method).explicit:
+        own = model.wave_rates * model.tables[rec.I_PIPES]["quicker"]
+        rate = float(model.evaluate(numerics.start, np.zeros(model.y_size), numerics.start)[1][rec.RATE])
+    else:  # waves alone: implicit steps cope with the rest
+        own, rate = model.wave_rates, float(model.wave_rates.max(initial=0.0))
     if not rate > 0.0:
         return None, "nothing limits it"
-    pipes = model.tables[rec.I_PIPES]
-    own = pipes["speed"] / pipes["dx"] * pipes["quicker"]
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"

@@ -78,6 +78,12 @@ class Model:
         return sum(pipe.cells for pipe in self.pipes)
 
     @property
+    def wave_rates(self) -> np.ndarray:
+        """Cells that a wave crosses in a second, for every pipe [1/s]."""
+        pipes = self.tables[rec.I_PIPES]
+        return pipes["speed"] / pipes["dx"]
+
+    @property
     def layout(self):
         """Offsets of what the rhs writes beside dydt."""
         return self.tables[rec.I_LAYOUT][0]

@@ -30,7 +30,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     if not until >= state.t:
         raise FvsolveError(f"until = {until:g} s lies before the state's time, {state.t:g} s")
     held = hold(model, inputs or {})
-    loop = Loop(held)
+    loop = Loop(held, lambda: model.structure)  # which does not depend on what is held
     loop.now[:] = state.y
     loop.memory[told.T] = state.t
     adaptive = loop.orders[told.CONTROL] == told.TOLERANCE
@@ -42,7 +42,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         if first and adaptive and state.memory.size == 2:
             loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory
         code = loop.run(NO_LIMIT)
-        while code == told.SWITCH:
+        while code == told.CHUNK and automatic.wants_change(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
         if code != told.DONE:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fvsolve.kernels import records as rec
@@ -10,6 +12,7 @@ from fvsolve.model import Model
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.stepper import Stepper, arguments
+from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method, method_named
 
 ROW_CAPACITY = 512
@@ -19,14 +22,14 @@ NO_LIMIT = 1e308
 class Loop:
     """Buffers of one run of a model by one method; `run` steps on until there is something to do."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, structure: Callable[[], Structure] | None = None) -> None:
         numerics = model.case.numerics
         self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.rhs, self.observe, self.record, self.events = arguments(model.functions())
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
-        ledgers = len(model.node_names)
-        self.stepper = stepper = Stepper(method, model.y_size, ledgers, lambda: model.structure, model.scale)
+        ledgers, structure = len(model.node_names), structure or (lambda: model.structure)
+        self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale)
         sums = [*model.tables[rec.I_NODES]["y"], *model.tables[rec.I_BODIES]["y"]]  # travel is part of what is stored
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
@@ -41,11 +44,10 @@ class Loop:
             if getattr(numerics, key) is not None:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
-            automatic.watch(stepper, model.structure)
-        if numerics.courant is not None and not method.explicit:  # of waves alone: Newton copes with the rest
-            pipes = model.tables[rec.I_PIPES]
+            automatic.watch(stepper, structure())
+        if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
             self.orders[told.CONTROL] = told.FIXED_STEP
-            self.orders[told.SIZE] = numerics.courant / np.max(pipes["speed"] / pipes["dx"])
+            self.orders[told.SIZE] = numerics.courant / model.wave_rates.max()
 
     @property
     def now(self) -> np.ndarray:
@@ -96,6 +98,7 @@ def leap_allowed(model: Model, method: Method) -> bool:
     settings, numerics = model.tables[rec.I_SETTINGS][0], model.case.numerics
     plain = np.isin(model.tables[rec.I_PIPES]["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
     return bool(
-        settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND and method.stages == 1
-        and numerics.rtol is None and model.y_size == 2 * model.cells and plain
+        settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND
+        and method.explicit and method.stages == 1 and numerics.rtol is None
+        and model.y_size == 2 * model.cells and plain
     )  # fmt: skip

@@ -184,11 +184,11 @@ class Run:
                 count = self.loop.memory[told.NEXT_FIELD] - 1
                 due = self.start + count * self.loop.orders[told.FIELD_EVERY]
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
+            elif code == told.CHUNK and automatic.wants_change(self.loop.stepper):
+                self.changes.append(automatic.change(self.loop.stepper))
             elif code == told.CHUNK:
                 self.pause(spent)
                 left, spent = self.budget, 0.0
-            elif code == told.SWITCH:
-                self.changes.append(automatic.change(self.loop.stepper))
             elif code == told.DONE:
                 return ""
             elif code != told.ROWS_FULL:

@@ -32,6 +32,11 @@ def watch(stepper: Stepper, structure: Structure) -> None:
     stepper.orders[told.WATCH], stepper.orders[told.PRICE] = 1.0, price(structure)
 
 
+def wants_change(stepper: Stepper) -> bool:
+    """Whether the loop came back because the other kind of step would be cheaper."""
+    return stepper.memory[told.CASES] < 0.0
+
+
 def change(stepper: Stepper) -> tuple[float, float, float]:
     """Go on by the other method; returns when, with which spectral radius [1/s] and after which step [s]."""
     memory = stepper.memory
@@ -46,9 +51,10 @@ def account(start: float, changes: list[tuple[float, float, float]], price: floa
     found = [{"time": start, "method": EXPLICIT, "why": "until the spectrum forbids it"}]
     for k, (t, radius, h) in enumerate(changes):
         if k % 2 == 0:
-            why = (f"stiff: rates of about {radius:.3g} 1/s hold explicit steps to {h:.3g} s, and an implicit step "
-                   f"costs no more than {price:.3g} of them")  # fmt: skip
+            why = (f"stability held explicit steps to {h:.3g} s"
+                   + (f", at rates of about {radius:.3g} 1/s" if radius > 0 else "")
+                   + f"; an implicit step costs about {price:.2g} of them")  # fmt: skip
         else:
-            why = f"no longer stiff: rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s"
+            why = f"rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s again"
         found.append({"time": t, "method": EXPLICIT if k % 2 else IMPLICIT, "why": why})
     return found

@@ -29,7 +29,8 @@ from fvsolve.steppers.orders import (
 from fvsolve.steppers.tolerances import LEAST_STEP
 
 PATIENCE = 15  # steps that must agree before another kind of step is tried; doubled by every change
-BOUNDARY = 3.25  # h times the spectral radius at which `dormand-prince` meets the boundary of its stability region
+BOUNDARY = 3.0  # of h times the spectral radius: `dormand-prince` bears 3.3 on the real axis
+HELD = 2.0  # about its mean where stability, not accuracy, holds the step: control then swings between 1 and 3.5
 DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
 
 
@@ -45,7 +46,7 @@ def too_short(orders, memory, h):
     return not h > LEAST_STEP * max(abs(memory[T]), abs(orders[END]))
 
 
-@njit
+@njit(forceinline=True)
 def first_step(k, scale, orders, span):
     """A cautious first step from the size of the rates [s]."""
     total, tolerance = 0.0, orders[SIZE]
@@ -102,7 +103,7 @@ def watch(orders, memory, h, e, out_rate):
     if orders[KIND] == EXPLICIT:
         could = 0.9 * max(e, 1e-30) ** (-1.0 / orders[ORDER])
         held = out_rate > 0.0 and h * out_rate > 1.98 and could > orders[PRICE]
-        other = held or h * memory[RADIUS] > BOUNDARY
+        other = held or h * memory[RADIUS] > HELD
     else:
         other = 2.0 * max(1.0, h * memory[RADIUS] / BOUNDARY) < orders[PRICE]
     memory[CASES] = memory[CASES] + 1.0 if other else max(0.0, memory[CASES] - 0.5)

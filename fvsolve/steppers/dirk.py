@@ -77,7 +77,7 @@ def solve_stage(
         if done:
             break
     if why == FAILED:
-        find_worst(d, weights, memory)
+        find_worst(d, f, weights, memory)
     elif supply.shape[1] > 0:
         for m in range(supply.shape[1]):
             supply[i, m] = out[where + m]

@@ -6,7 +6,7 @@ from fvsolve.steppers.orders import NEWTON_FAILED, T
 EVENT_TOLERANCE = 1e-13
 
 
-@njit
+@njit(forceinline=True)
 def arm(g, armed):
     """Note which event functions are at or below zero, where the rhs follows another rule; whether any changed.
 
@@ -29,7 +29,7 @@ def fallen(g, g_new):
     return False
 
 
-@njit
+@njit(forceinline=True)
 def nearness(g, g_new):
     """Least share of its value that an event function has kept over the step: 1 at its start, 0 at an event."""
     share = 1.0

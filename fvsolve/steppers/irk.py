@@ -25,6 +25,7 @@ from fvsolve.steppers.newton import (
     MADE,
     MOST,
     RATE,
+    SEEN,
     SHIFT,
     STAGES,
     STORE,
@@ -37,7 +38,7 @@ from fvsolve.steppers.newton import (
     verdict,
 )
 from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
-from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 from fvsolve.steppers.tableau import Method
@@ -208,7 +209,12 @@ def iterate(
         if done:
             break
     if why == FAILED:
-        find_worst(vectors[r_at], weights, memory)
+        f = vectors[s + RATE]
+        copy(vectors[f_at], f)
+        for i in range(1, q):
+            for e in range(n):
+                f[e] += vectors[f_at + i, e]
+        find_worst(vectors[r_at], f, weights, memory)
     return why
 
 
@@ -229,9 +235,9 @@ def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
 
 @inner
 def filtered_error(
-    rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store
+    rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store, doubt
 ):
-    """The embedded solution's difference, smoothed by the first factor; once more from there if it is great.
+    """The embedded solution's difference, smoothed by the first factor; where in doubt, once more from there.
 
     e = (I - h g J)^-1 h (e_0 f(t, y) + sum of e_i k_i), 1 / g the real eigenvalue of A^-1 (Hairer and Wanner IV.8).
     """
@@ -250,7 +256,7 @@ def filtered_error(
             w = d[e] / (orders[SIZE] * (scale[e] + max(abs(y[now, e]), abs(y[new, e]))))
             found += w * w
         found = sqrt(found / n)
-        if found < 1.0 or turn == 1:
+        if found < 1.0 or turn == 1 or not doubt:
             break
         for e in range(n):
             y[3, e] = y[now, e] + d[e]
@@ -271,6 +277,7 @@ def attempt(
     s, n = k.shape
     nnz = shape[shape[STARTS] + shape[STATES]]
     q, error = s - 1, error_of(coefficients, s)
+    doubt = work[SEEN] == memory[STEPS] or work[SEEN] < 0.0  # tried again, or the first after a kink
     begin(k, y[now], scale, orders, memory, work, vectors)
     while True:
         if work[HAS] == 0.0:
@@ -302,6 +309,7 @@ def attempt(
         return 0.0
     if error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0:
         return filtered_error(
-            rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store
-        )
+            rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store,
+            doubt,
+        )  # fmt: skip
     return error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])

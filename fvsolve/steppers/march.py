@@ -55,7 +55,6 @@ from fvsolve.steppers.orders import (
     STOP_AT,
     STOP_HERE,
     STOPPED,
-    SWITCH,
     T_MARK,
     TINY_STEP,
     TOLERANCE,
@@ -230,8 +229,6 @@ def march(
             return DONE
         if out[WHERE] == STOP_HERE:
             return STOPPED
-        if orders[WATCH] != 0.0 and memory[CASES] < 0.0:
-            return SWITCH
         if orders[BUDGET] <= 0.0:
             return CHUNK
         h = next_step(orders, memory, out[RATE], k, scale)
@@ -269,7 +266,7 @@ def march(
                     memory[STEP] = h * grow
                 memory[ERROR_OLD] = e
                 if orders[WATCH] != 0.0 and watch(orders, memory, h, e, rate):
-                    memory[CASES] = -1.0
+                    memory[CASES], orders[BUDGET] = -1.0, 1.0  # come back after this step, for another kind
                 break
             memory[REJECTIONS] += 1.0
             h *= reduced(orders, e)

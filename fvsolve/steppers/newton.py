@@ -77,12 +77,12 @@ def size_of(d, weights):
 
 
 @inner
-def find_worst(d, weights, memory):
-    """Note the component that moves most against its tolerance, or that is no number."""
+def find_worst(d, f, weights, memory):
+    """Note the component whose rate is no number, else the one that moves most against its tolerance."""
     worst = -1.0
     for i in range(weights.size):
-        e = abs(d[i] * weights[i])
-        if not e <= worst:
+        e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
+        if e > worst:  # a rate that is no number makes increments of others none too
             worst, memory[WORST] = e, i
 
 
@@ -105,7 +105,7 @@ def verdict(turn, size, before, orders, work):
         if work[SURE] * size * ratio ** (MOST - 1 - turn) > floor:
             return True, FAILED
     else:
-        work[SURE] = max(work[SURE], 1e-16) ** 0.8
+        work[SURE] = max(work[SURE], 1e-4) ** 0.8
     if work[SURE] * size <= enough:
         return True, CONVERGED
     return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= floor else FAILED

@@ -68,8 +68,9 @@ def integrate(
         flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
         kept = memory[told.STEP]
         code = stepper.call(*functions, handle, WHERE, stepper.none)
-        while code == told.SWITCH:
+        while code == told.CHUNK and automatic.wants_change(stepper):
             automatic.change(stepper)
+            orders[told.BUDGET] = NO_LIMIT
             code = stepper.call(*functions, handle, WHERE, stepper.none)
         if code != told.DONE:
             raise FvsolveError(_failure(method, code, memory)) from _RAISED.pop(id(f), None)
@@ -179,12 +180,13 @@ def _functions(f, t0, y0):
 
 def _rhs(f, t0, y0):
     """f in the loop's own form, NaN where it raises; a function that numba refuses is called as Python."""
-    from numba.core.errors import NumbaError
+    from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
-    inner, fills = f if hasattr(f, "py_func") else numba.njit(f), in_place(f)
+    fills = in_place(f)
     try:
+        inner = f if hasattr(f, "py_func") else numba.njit(f)
         inner(t0, y0, np.empty_like(y0)) if fills else inner(t0, y0)
-    except (NumbaError, TypeError, NotImplementedError):
+    except (NumbaError, UnsupportedBytecodeError, TypeError, NotImplementedError):
         return _call_python
 
     def rhs(t, y, dydt, out, handle):

@@ -13,7 +13,7 @@ from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
 from fvsolve.steppers.newton import HAS, HEADER, INCREMENT, RATE, SEEN, SHIFT, renew
 from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, RADIUS, SIZE, STEPS, TOLERANCE, WATCH
-from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
@@ -79,6 +79,7 @@ def attempt(
         if factor(shape, work[HEADER:], shift, store) != 0:
             return NEWTON_FAILED
         work[SHIFT] = shift
+    per = 1.0 / h
     for i in range(1, s):
         if i == 1:
             f = k[0]
@@ -88,14 +89,17 @@ def attempt(
             f = vectors[s + RATE]
             combine(y[now], h, row_of(coefficients, s, i), i, k, y[3])
             rhs(t + c[i] * h, y[3], f, out, handle)
-        late = beyond[s * s + i] * h
+        late, u = beyond[s * s + i] * h, k[i]
+        if late != 0.0:
+            for e in range(n):
+                d[e] = f[e] + late * slope[e]
+            f = d
+        combine(f, 1.0, beyond[i * s : (i + 1) * s], i, k, u)
+        solve(shape, store, u)
+        if ledgers > 0:
+            copy(u, d)
         for e in range(n):
-            d[e] = f[e] + late * slope[e]
-        combine(d, 1.0, beyond[i * s : (i + 1) * s], i, k, k[i])
-        solve(shape, store, k[i])
-        for e in range(n):
-            d[e] = k[i, e]
-            k[i, e] /= h
+            u[e] *= per
         if ledgers > 0:
             product = work[HEADER + nnz :]
             multiply(shape, work[HEADER : HEADER + nnz], d, product)

@@ -45,30 +45,48 @@ def combine(y, h, weights, count, k, out):
 @njit
 def error_norm(h, error, k, y, y_new, scale, tolerance):
     """Root mean square of h sum e_j k_j over tolerance (scale + max(|y|, |y_new|))."""
+    first, last = 0, error.size
+    while last > 0 and error[last - 1] == 0.0:
+        last -= 1
+    while first < last and error[first] == 0.0:
+        first += 1
     total = 0.0
     for i in range(y.size):
         e = 0.0
-        for j in range(error.size):
+        for j in range(first, last):
             e += error[j] * k[j, i]
         w = h * e / (tolerance * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
         total += w * w
     return sqrt(total / max(y.size, 1))
 
 
+@njit(forceinline=True)
+def weight(theta, dense, j):
+    """Of stage j in the dense output at theta: sum of dense[j, m] theta^(m + 1)."""
+    w = 0.0
+    for m in range(dense.shape[1] - 1, -1, -1):
+        w = (w + dense[j, m]) * theta
+    return w
+
+
 @njit
 def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
     """Dense output at t + theta h: the method's own polynomial, else the cubic through both ends."""
     if dense.shape[0] > 0:
-        copy(y, out)
-        for j in range(dense.shape[0]):
-            w, power = 0.0, theta
-            for m in range(dense.shape[1]):
-                w += dense[j, m] * power
-                power *= theta
-            kj = f if j == 0 else k[j]
-            if w != 0.0:
+        w = h * weight(theta, dense, 0)
+        for i in range(y.size):
+            out[i] = y[i] + w * f[i]
+        j = 1
+        while j < dense.shape[0]:
+            if j + 1 < dense.shape[0]:
+                a, b, ka, kb = h * weight(theta, dense, j), h * weight(theta, dense, j + 1), k[j], k[j + 1]
                 for i in range(y.size):
-                    out[i] += h * w * kj[i]
+                    out[i] += a * ka[i] + b * kb[i]
+            else:
+                w, ka = h * weight(theta, dense, j), k[j]
+                for i in range(y.size):
+                    out[i] += w * ka[i]
+            j += 2
         return
     s, r = theta, 1.0 - theta
     h00, h01 = r * r * (1.0 + 2.0 * s), s * s * (1.0 + 2.0 * r)
@@ -77,7 +95,7 @@ def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
         out[i] = h00 * y[i] + h01 * y_new[i] + (h10 * f[i] + h11 * f_new[i])
 
 
-@njit
+@njit(forceinline=True)
 def all_finite(y):
     """False where any value is not finite or its square is not: counted in integers, which is vectorised."""
     bad = 0
@@ -94,7 +112,7 @@ def add_up(total, part, carry):
     return new, whole - (new - total)
 
 
-@njit
+@njit(forceinline=True)
 def add_stored(h, b, k, y, y_new, stored, carry):
     """Stored masses once more, summed so that a million steps round as one; True where that changed a bit."""
     changed = False
@@ -108,7 +126,7 @@ def add_stored(h, b, k, y, y_new, stored, carry):
     return changed
 
 
-@njit
+@njit(forceinline=True)
 def book(h, b, supply, ledger):
     """Add a step of length h to the ledger, by the step's own weights; only once its end is known to be sound."""
     count = supply.shape[1]

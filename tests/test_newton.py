@@ -1,0 +1,181 @@
+"""What Newton does is counted, solves the stages it is asked to, and says where and in what it fails."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+from truth.scenes import WATER, chamber, scene, valve
+
+import fvsolve
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers import METHODS, integrate
+
+NAMES = [name for name, method in METHODS.items() if name == method.name]
+IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]
+ITERATED = [name for name in IMPLICIT if METHODS[name].kind != "linear"]
+SETTINGS = [
+    *((name, {"step": 0.1}) for name in NAMES),
+    *((name, {"rtol": 1e-5}) for name in NAMES if METHODS[name].adaptive),
+]
+SLOPES = np.array([[-2.0, 1.0, 0.0], [1.0, -20.0, 1.0], [0.0, 3.0, -10.0]])
+TIMES = [0.0, 0.25, 1.0, 1.7]
+
+
+class Counted:
+    """A function that is called as Python, and counts."""
+
+    def __init__(self, f) -> None:
+        self.f, self.calls = f, 0
+
+    def __call__(self, t, y):
+        self.calls += 1
+        return self.f(t, y)
+
+
+COUNTED = Counted(lambda t, y: SLOPES @ y)
+
+
+@pytest.mark.parametrize("name, settings", SETTINGS)
+def test_the_count_of_rates_is_the_number_of_calls(name, settings):
+    before, counts = COUNTED.calls, {}
+    integrate(COUNTED, [1.0, 1.0, 1.0], TIMES, name, counts=counts, **settings)
+    assert counts["rhs"] == COUNTED.calls - before > counts["steps"] > 0
+
+
+@njit
+def linear(t, y):
+    return SLOPES @ y + np.cos(t)
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_a_linear_problem_needs_one_jacobian_for_all_fixed_steps(name):
+    """And factors for two lengths, the last step's being rounded apart; Rosenbrock methods renew both every step."""
+    counts: dict = {}
+    integrate(linear, [1.0, 1.0, 1.0], [0.0, 2.05], name, step=0.1, counts=counts)
+    iterated = METHODS[name].kind != "linear"
+    systems = 1
+    if METHODS[name].kind == "full":
+        a = METHODS[name].a[METHODS[name].a.any(axis=1)]
+        systems = np.count_nonzero(np.linalg.eigvals(a[:, -len(a) :]).imag >= 0.0)
+    assert counts["steps"] == 21 and counts["newton_failures"] == counts["rejections"] == 0
+    assert counts["jacobians"] == (1 if iterated else 21)
+    assert counts["factorisations"] == (2 * systems if iterated else 21)
+    assert (counts["newton"] > 0) == iterated
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if METHODS[name].explicit])
+def test_an_explicit_method_does_none_of_it(name):
+    counts: dict = {}
+    integrate(linear, [1.0, 1.0, 1.0], [0.0, 2.0], name, step=0.05, counts=counts)
+    assert counts["rhs"] > 0
+    assert not any(counts[what] for what in ("jacobians", "factorisations", "newton", "newton_failures"))
+
+
+@njit
+def lands(t, y):
+    """The second falls freely, then is caught: what Newton learned of the one stretch is nothing in the other."""
+    return np.array([-y[0], -1.0 + 1e3 * max(0.5 - y[1], 0.0) ** 2])
+
+
+@pytest.mark.parametrize("h", [0.1, 0.03, 0.01])
+def test_no_step_is_taken_on_what_newton_did_in_the_last_one(h):
+    """Where each output is one step, implicit Euler's own equation y+ = y + h f(y+) holds to its accuracy."""
+    t, counts = h * np.arange(int(1.2 / h) + 1), {}
+    y = integrate(lands, [1.0, 1.0], t, "implicit-euler", step=h, counts=counts)
+    assert y[-1, 1] == pytest.approx(0.5 - math.sqrt(1e-3), abs=1e-5)
+    if counts["steps"] == len(t) - 1:
+        off = [y[i + 1] - y[i] - h * lands(t[i + 1], y[i + 1]) for i in range(len(t) - 1)]
+        assert np.max(np.abs(off)) < 1e-7
+
+
+@njit
+def jumps(t, y):
+    """The second falls slowly, below a half a hundred times as quickly."""
+    return np.array([-y[0], -1.0 if y[1] > 0.5 else -100.0])
+
+
+JUMPED = 0.5 - 100.0 * (2.5 - 0.5)  # at 2.5 s, from 1
+
+
+@pytest.mark.parametrize("name", ["tr-bdf2", "esdirk-3", "esdirk-4", "esdirk-5", "rodas-4", "rodas-5p", "radau-iia-5"])
+def test_error_control_passes_a_jump_of_the_rates(name):
+    counts: dict = {}
+    found = integrate(jumps, [1.0, 1.0], [0.0, 2.5], name, rtol=1e-6, counts=counts)[-1]
+    assert found[1] == pytest.approx(JUMPED, abs=1e-3)
+    assert counts["rejections"] > 5
+
+
+@pytest.mark.parametrize("name", [name for name in ITERATED if METHODS[name].stages < 5])
+def test_a_fixed_step_passes_it_within_one_step(name):
+    found = integrate(jumps, [1.0, 1.0], [0.0, 2.5], name, step=0.01)[-1]
+    assert found[1] == pytest.approx(JUMPED, abs=0.01 * 99.0 + 0.01)
+
+
+@njit
+def ends(t, y):
+    """No rates at all where the second is below a half, which it is at 0.5 s."""
+    return np.array([-y[0], -1.0 if y[1] > 0.5 else math.nan, 1.0])
+
+
+@pytest.mark.parametrize("name, settings", [row for row in SETTINGS if row[0] in ITERATED])
+def test_where_no_step_is_short_enough_the_error_says_when_and_in_what(name, settings):
+    with pytest.raises(FvsolveError, match=rf"{name} stopped at t = 0\.5: Newton did not converge, worst in y\[1\]"):
+        integrate(ends, [1.0, 1.0, 0.0], [0.0, 1.0], name, **settings)
+
+
+@pytest.mark.parametrize("name", ["rodas-4", "rodas-5p"])
+def test_a_rosenbrock_method_stops_there_too(name):
+    for settings in ({"step": 0.02}, {"rtol": 1e-6}):
+        with pytest.raises(FvsolveError, match=rf"{name} stopped at t = 0\.\d+: .* not finite"):
+            integrate(ends, [1.0, 1.0, 0.0], [0.0, 1.0], name, **settings)
+
+
+def test_what_f_raises_reaches_the_caller_from_within_newton_too():
+    def broken(t, y):
+        if t > 0.3:
+            raise KeyError("no such valve")
+        return -y
+
+    f = Counted(broken)
+    for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "implicit-euler"):
+        with pytest.raises(FvsolveError) as caught:
+            integrate(f, [1.0], [0.0, 1.0], name, step=0.1)
+        assert isinstance(caught.value.__cause__, KeyError), name
+
+
+def sucked_dry(**numerics) -> dict:
+    """A closed litre of water out of which ten litres a second are drawn: under `log` nothing is left at 0.1 s."""
+    nodes = {"pot": chamber(1e-3, 5e6), "drain": {"type": "inflow", "flow": -0.01}}
+    fluid = {**WATER, "law": "log"}
+    return scene(nodes, {"neck": valve("pot", "drain", 1e-3)}, 0.2, numerics, ["pot.pressure"], 0.005, fluid=fluid)
+
+
+@pytest.mark.parametrize(
+    "numerics",
+    [{"method": "radau-iia-5"}, {"method": "esdirk-4"}, {"method": "trapezoid", "step": 1e-3}],
+    ids=lambda numerics: numerics["method"],
+)
+def test_a_run_says_when_and_in_what_newton_failed_and_keeps_everything_up_to_there(numerics, tmp_path):
+    case = sucked_dry(**numerics)
+    result = fvsolve.run(case, out=tmp_path / "run")
+    assert not result.ok
+    assert result.reason.startswith("stopped: Newton did not converge at t = 0.100223 s, however short the step")
+    assert "worst in pot.mass; look for a jump" in result.reason
+    assert result.summary["newton_failures"] > 10
+    kept = fvsolve.open_run(tmp_path / "run")
+    assert kept.reason == result.reason and kept.t == pytest.approx(0.005 * np.arange(21))
+    assert np.all(np.isfinite(kept["pot.pressure"]))
+
+
+def test_a_summary_counts_what_newton_did():
+    case = sucked_dry(method="radau-iia-5", rtol=1e-6) | {"numerics": {"end": 0.05, "method": "radau-iia-5"}}
+    said = fvsolve.run(case).summary
+    assert said["methods"] == [{"time": 0.0, "method": "radau-iia-5", "why": "as numerics.method says"}]
+    assert said["steps"] > 0 and said["jacobians"] > 0 and said["newton"] >= said["steps"]
+    assert said["factorisations"] >= 2 * said["jacobians"]  # a real and a complex one
+    assert said["rhs"] >= said["steps"] + 3 * said["newton"] + said["jacobians"]
+    explicit = fvsolve.run({**case, "numerics": {"end": 0.05, "method": "dormand-prince"}}).summary
+    assert [explicit[what] for what in ("jacobians", "factorisations", "newton", "newton_failures")] == [0, 0, 0, 0]

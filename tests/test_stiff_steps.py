@@ -1,0 +1,163 @@
+"""What theory says of stiff problems is what the compiled steps do: damping, ringing, order reduction, dense output."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers import METHODS, analyse, integrate
+from fvsolve.steppers.coefficients import coefficients
+
+NAMES = [name for name, method in METHODS.items() if name == method.name]
+EXPLICIT = [name for name in NAMES if METHODS[name].explicit]
+IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]
+L_STABLE = [name for name in IMPLICIT if analyse(name).l_stable]
+RINGING = [name for name in IMPLICIT if not analyse(name).l_stable]
+ADAPTIVE = [name for name in IMPLICIT if METHODS[name].adaptive]
+
+FAST = 1e6  # [1/s]
+STEPS = 0.1 * np.arange(6)  # a hundred thousand times as long as the transient lasts
+
+
+@njit
+def relaxes(t, y):
+    """y' = lambda (y - cos t) - sin t, lambda = -1e6: whatever it starts from, it soon is cos t."""
+    return np.array([-1e6 * (y[0] - math.cos(t)) - math.sin(t)])
+
+
+@njit
+def prothero_robinson(t, y):
+    """y' = lambda (y - sin t) + cos t, lambda = -1e6, on its slow solution sin t."""
+    return np.array([-1e6 * (y[0] - math.sin(t)) + math.cos(t)])
+
+
+@njit
+def mild(t, y):
+    """The same with lambda = -1."""
+    return np.array([-1.0 * (y[0] - math.sin(t)) + math.cos(t)])
+
+
+@njit
+def pendulum(t, y):
+    """A nonlinear, non-autonomous system whose trees all count."""
+    return np.array([y[1], -np.sin(y[0]) + 0.3 * np.cos(t)])
+
+
+def departures(name: str) -> np.ndarray:
+    """y - cos t after each of five long steps that begin 1 away."""
+    return integrate(relaxes, [2.0], STEPS, name, step=0.1)[:, 0] - np.cos(STEPS)
+
+
+@pytest.mark.parametrize("name", L_STABLE)
+def test_an_l_stable_method_kills_a_fast_transient_in_one_long_step(name):
+    """What is left is the error of following cos t: up to h^2 / 6 where stages of order 1 are no end of the step."""
+    assert np.max(np.abs(departures(name)[1:])) < (2e-4 if METHODS[name].stiffly_accurate else 2e-3)
+
+
+@pytest.mark.parametrize("name", RINGING)
+def test_an_a_stable_method_that_is_not_l_stable_rings_on(name):
+    """It neither grows nor dies as the truth does: R(-1e5)^n, of modulus near 1 for all but Crouzeix's methods."""
+    r = analyse(name).stability_function(-FAST * 0.1).real
+    found = departures(name)
+    assert abs(r) > (0.6 if name.startswith("crouzeix") else 0.999)
+    assert found == pytest.approx(r ** np.arange(6), abs=5e-3)
+    if r < 0:
+        assert np.all(np.sign(found) == (-1.0) ** np.arange(6))
+
+
+@pytest.mark.parametrize("name", EXPLICIT)
+def test_an_explicit_method_blows_up(name):
+    try:
+        found = departures(name)
+    except FvsolveError as error:
+        assert "not finite" in str(error)
+    else:
+        assert np.all(np.abs(found[1:]) > 1e4 * np.abs(found[:-1]))
+
+
+# Orders that Rosenbrock methods keep: Rodas meets no condition of Scholz, Rodas5P all of them (Steinebach 2023).
+ROSENBROCK = {"rodas-4": 1, "rodas-5p": 3}
+
+
+def stiff_order(name: str) -> int:
+    """Order in h at fixed, infinite lambda h, of stage order q (Prothero and Robinson 1974; H. and W. 1996, IV.15).
+
+    A step errs by h^(q+1), by h^q / lambda where the last stage is its end; where R is 1 at infinity, errors add up.
+    """
+    method, far = METHODS[name], analyse(name).stability_function(-1e12).real
+    if name in ROSENBROCK:
+        return ROSENBROCK[name]
+    return method.stage_order + (not method.stiffly_accurate) - (far > 0.99)
+
+
+def errors(name: str, f, counts: tuple[int, int]) -> list[float]:
+    """Greatest error at thirteen times of six seconds, the first few left out, for these numbers of steps."""
+    t = np.linspace(0.0, 6.0, 13)
+    return [np.max(np.abs(integrate(f, [0.0], t, name, step=6.0 / n)[3:, 0] - np.sin(t[3:]))) for n in counts]
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_the_order_of_prothero_and_robinson_s_problem_falls_to_what_stage_order_allows(name):
+    order = stiff_order(name)
+    coarse, fine = errors(name, prothero_robinson, (24, 48) if order > 3 else (48, 96) if order > 1 else (192, 384))
+    assert math.log2(coarse / fine) == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_where_it_is_not_stiff_the_order_is_whole(name):
+    order = METHODS[name].order
+    coarse, fine = errors(name, mild, {9: (12, 24), 6: (24, 48), 5: (36, 72)}.get(order, (192, 384)))
+    assert math.log2(coarse / fine) >= order - 0.1
+
+
+def test_the_last_stage_as_the_end_of_the_step_is_worth_a_factor_of_lambda():
+    """Radau IA and Radau IIA have the same R; at one step length their errors are apart by lambda and more."""
+    assert analyse("radau-ia-5").stability_function == analyse("radau-iia-5").stability_function
+    first, second = (errors(name, prothero_robinson, (48, 96))[0] for name in ("radau-ia-5", "radau-iia-5"))
+    assert first > FAST * second
+
+
+BETWEEN = np.linspace(0.0, 4.0, 201)
+
+
+@pytest.fixture(scope="module")
+def truth() -> np.ndarray:
+    return integrate(pendulum, [1.0, 0.2], BETWEEN, "verner-7", step=5e-3)
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_between_steps_the_error_is_of_the_order_of_the_dense_output(name, truth):
+    """A polynomial of degree d in the step errs by h^(d+1); methods of a much higher order step onto the times."""
+    p, dense = METHODS[name].order, coefficients(METHODS[name])[1]
+    degree = dense.shape[1] if dense.size else 3
+    coarse, fine = (
+        np.max(np.abs(integrate(pendulum, [1.0, 0.2], BETWEEN, name, step=4.0 / n) - truth)) for n in (40, 80)
+    )
+    if p > degree + 2:
+        assert coarse < 1e-12
+    else:
+        assert math.log2(coarse / fine) == pytest.approx(min(p, degree + 1), abs=0.4)
+
+
+@pytest.mark.parametrize(
+    "name, settings", [*((name, {"step": 0.1}) for name in IMPLICIT), *((name, {"rtol": 1e-6}) for name in ADAPTIVE)]
+)
+def test_asking_for_more_times_does_not_move_the_end(name, settings):
+    """To the bit, where dense output answers; to the tolerance where steps are shortened onto the times."""
+    method, dense = METHODS[name], coefficients(METHODS[name])[1]
+    many, one = (integrate(pendulum, [1.0, 0.2], t, name, **settings)[-1] for t in (BETWEEN, [0.0, 4.0]))
+    if method.order > (dense.shape[1] if dense.size else 3) + 2:
+        assert many == pytest.approx(one, abs=1e-5)
+    else:
+        assert np.array_equal(many, one)
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_what_stands_between_steps_is_no_worse_than_the_tolerance_makes_the_steps(name, truth):
+    q = METHODS[name].control_order - 1
+    found = integrate(pendulum, [1.0, 0.2], BETWEEN, name, rtol=1e-6)
+    assert np.max(np.abs(found - truth)) < 10.0 * 1e-6 ** (q / (q + 1))
