@@ -30,7 +30,8 @@ from fvsolve.steppers.tolerances import LEAST_STEP
 
 PATIENCE = 15  # steps that must agree before another kind of step is tried; doubled by every change
 BOUNDARY = 3.0  # of h times the spectral radius: `dormand-prince` bears 3.3 on the real axis
-HELD = 2.0  # about its mean where stability, not accuracy, holds the step: control then swings between 1 and 3.5
+HELD = 2.5  # held by stability it swings from 1 to 3.5, held by accuracy it hardly moves
+CALM = 0.4  # what a step that is not held takes off the count
 DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
 
 
@@ -102,13 +103,13 @@ def watch(orders, memory, h, e, out_rate):
     """
     if orders[KIND] == EXPLICIT:
         could = 0.9 * max(e, 1e-30) ** (-1.0 / orders[ORDER])
-        held = out_rate > 0.0 and h * out_rate > 1.98 and could > orders[PRICE]
-        if held:
+        other = h * memory[RADIUS] > HELD
+        if out_rate > 0.0:  # then `next_step` keeps within stability, and the error says how much longer it could be
+            other = h * out_rate > 1.98 and could > orders[PRICE]
             memory[RADIUS] = max(memory[RADIUS], out_rate)
-        other = held or h * memory[RADIUS] > HELD
     else:
         other = 2.0 * max(1.0, h * memory[RADIUS] / BOUNDARY) < orders[PRICE]
-    memory[CASES] = memory[CASES] + 1.0 if other else max(0.0, memory[CASES] - 0.5)
+    memory[CASES] = memory[CASES] + 1.0 if other else max(0.0, memory[CASES] - CALM)
     return memory[CASES] >= PATIENCE * 2.0 ** min(memory[SWITCHES], 6.0)
 
 
