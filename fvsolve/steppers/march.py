@@ -8,7 +8,7 @@ import functools
 from math import isfinite
 
 from fvsolve.jit import argument, njit
-from fvsolve.steppers.coefficients import weights_of
+from fvsolve.steppers.coefficients import row_of, weights_of
 from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate
 from fvsolve.steppers.orders import (
@@ -30,12 +30,14 @@ from fvsolve.steppers.orders import (
     FIELD_EVERY,
     FRESH,
     FSAL,
+    KIND,
     LAST,
     LEAPS,
     LEAPT,
     N_MARK,
     NEWTON_FAILED,
     NEWTON_FAILURES,
+    NEWTON_SOLVED,
     NEWTON_STUCK,
     NEXT_FIELD,
     NEXT_OUTPUT,
@@ -147,7 +149,7 @@ def may_leap(orders, memory, times, h):
 
 @njit
 def emit(
-    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, k, dense, out, y_out, rows,
+    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, k, dense, out, y_out, rows, steep,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
@@ -159,7 +161,7 @@ def emit(
             return DONE
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
-        interpolate((due - t_old) / h, h, y_old, f_old, y, k[0], k, dense, y_out)
+        interpolate((due - t_old) / h, h, y_old, f_old, y, k[k.shape[0] - 1] if steep else k[0], k, dense, y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
@@ -189,6 +191,9 @@ def march(
     """
     s, reuse = k.shape[0], False
     b = weights_of(coefficients, s)
+    steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
+    for j in range(s):  # the last stage does not, where it is the end
+        steep = steep and row_of(coefficients, s, s - 1)[j] == b[j]
     for _ in range(1 << 62):
         now, old = flags[NOW], flags[OLD]
         new = 3 - now - old
@@ -220,7 +225,7 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
-                    y[now], k, dense, out_row, y_out, rows,
+                    y[now], k, dense, out_row, y_out, rows, steep,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -241,6 +246,8 @@ def march(
             memory[CALLS] -= 1.0
             continue
         failed, rate = TINY_STEP, out[RATE]
+        if steep:
+            copy(k[s - 1] if flags[BEHIND] == 1 else k[0], f_old)
         while not leaping:
             rest = orders[END] - memory[T]
             last = h >= rest * (1.0 - 1e-9)
@@ -295,7 +302,7 @@ def march(
         memory[LAST] = memory[T] - t_old
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
-        if next_due(orders, memory, times) <= memory[T]:
+        if not steep and next_due(orders, memory, times) <= memory[T]:
             copy(k[0], f_old)
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
