@@ -10,6 +10,8 @@ from time import perf_counter
 
 import numpy as np
 
+SLOW = 2.0  # [s] a run that takes longer is not repeated, and no finer one is tried
+
 
 @dataclass(frozen=True)
 class Solver:
@@ -34,30 +36,33 @@ class Run:
     calls: float
 
 
-def best(function: Callable[[], object], budget: float, least: int = 3, most: int = 300) -> float:
+def best(function: Callable[[], object], budget: float, most: int = 300) -> float:
     """Wall time [s] of the quickest call, of as many as fit into a budget [s]."""
     walls, began = [], perf_counter()
-    while len(walls) < least or (len(walls) < most and perf_counter() - began < budget):
+    while not walls or (len(walls) < most and perf_counter() - began < budget):
         start = perf_counter()
         function()
         walls.append(perf_counter() - start)
     return min(walls)
 
 
-def chart(solvers: list[Solver], settings, distance: Callable, budget: float, rounds: int = 3) -> dict[str, list[Run]]:
-    """Runs of all solvers at their settings, printed; `distance` is the error of a solution.
+def chart(solvers, settings, distance: Callable, budget: float, rounds: int = 3, enough: float = 0.0) -> dict:
+    """Runs of all solvers at their settings, printed, by solver's name; `distance` is the error of a solution.
 
-    settings : the same for all, or a dict by solver's name. Wall times are the best of several rounds over all, so
-    that one noisy moment spoils no single solver. Whatever a solver raises is a line, and the others go on.
+    settings : the same for all, or a dict by name. A solver's series ends where its error falls below `enough` and
+    where a run takes longer than SLOW. Wall times are the best of several rounds over all, so that one noisy moment
+    spoils no single solver. Whatever a solver raises is a line, and the others go on.
     """
     found = {solver.name: {} for solver in solvers}
-    for turn in range(rounds):
+    for solver in solvers:
+        for setting in settings[solver.name] if isinstance(settings, dict) else settings:
+            found[solver.name][setting] = run = first(solver, setting, distance)
+            if isinstance(run, Run) and (run.error < enough or run.wall > SLOW):
+                break
+    for _ in range(rounds):
         for solver in solvers:
-            for setting in settings[solver.name] if isinstance(settings, dict) else settings:
-                if turn == 0:
-                    found[solver.name][setting] = first(solver, setting, distance)
-                run = found[solver.name][setting]
-                if isinstance(run, Run):
+            for setting, run in found[solver.name].items():
+                if isinstance(run, Run) and run.wall < SLOW:
                     wall = best(lambda: solver.solve(setting), budget / rounds)  # noqa: B023
                     found[solver.name][setting] = replace(run, wall=min(run.wall, wall))
     for name, runs in found.items():
@@ -66,13 +71,14 @@ def chart(solvers: list[Solver], settings, distance: Callable, budget: float, ro
 
 
 def first(solver: Solver, setting, distance: Callable) -> Run | str:
-    """A run not yet timed, or why there is none."""
+    """A run, timed once, or why there is none."""
     try:
         error = distance(solver.solve(setting))
         counts = solver.count(setting)
+        wall = best(lambda: solver.solve(setting), 0.0)
     except Exception as fault:  # noqa: BLE001  a peer may raise anything
         return f"{type(fault).__name__}: {fault}"
-    return Run(setting, error, np.inf, *counts) if np.isfinite(error) else "did not reach the end"
+    return Run(setting, error, wall, *counts) if np.isfinite(error) else "did not reach the end"
 
 
 def table(name: str, runs: dict[float, Run | str]) -> None:

@@ -65,6 +65,7 @@ def fvsolve_solver(problem: Problem, method: str) -> Solver:
 def verdict(charts: dict[str, list[Run]], target: float) -> None:
     """Print what an error costs, each peer beside fvsolve's best method and its default."""
     prices = {name: price([(r.wall, r.error) for r in runs], target) for name, runs in charts.items() if runs}
+    prices = {name: found for name, found in prices.items() if np.isfinite(found[0])}
     ours = {name: cost for name, (cost, _) in prices.items() if name.startswith("fvsolve")}
     quickest = min(ours, key=ours.get) if ours else "fvsolve"
     least, default = ours.get(quickest, np.nan), ours.get(f"fvsolve {DEFAULT}", np.nan)

@@ -17,7 +17,7 @@ import fvsolve
 TARGET = 1e-6
 GOALS = {"explicit": 7.0, "implicit": 1.0}  # times faster than every peer; than CVODE with a band matrix
 BEYOND = "numbalsoda DOP853"  # no peer of the goals: explicit, compiled, and with the same f
-COURANTS = {"rk4": (0.7, 1.0, 1.2, 1.4), "dormand-prince": (1.0, 1.4)}  # upwind5 and RK4 are stable up to 1.43
+COURANTS = {"rk4": (1.4, 1.2, 1.0, 0.7), "dormand-prince": (1.4, 1.0)}  # upwind5 and RK4 are stable up to 1.43
 
 
 def pipe_table(quick: bool) -> None:
@@ -29,8 +29,8 @@ def pipe_table(quick: bool) -> None:
         end="",
     )
     print(f"{call_time(pulse.rhs, pulse.start.y):.2f} us, interleaved {call_time(pulse.rhs_mixed, pulse.start.y):.2f}")
-    budget = 0.1 if quick else 0.5
-    tolerances = (1e-5, 1e-7) if quick else 10.0 ** -np.arange(4.0, 10.0)
+    budget = 0.1 if quick else 0.3
+    tolerances = (1e-5, 1e-7) if quick else 10.0 ** -np.arange(5.0, 10.0)  # at 1e-4 LSODA turns to full matrices
     groups = {
         "explicit": [stepped(pulse, method, "courant") for method in COURANTS],
         "implicit": [stepped(pulse, method, "rtol") for method in implicit_methods()],
@@ -38,7 +38,9 @@ def pipe_table(quick: bool) -> None:
     }
     settings = {s.name: tolerances for group in groups.values() for s in group}
     settings |= {s.name: courants for s, courants in zip(groups["explicit"], COURANTS.values(), strict=True)}
-    charts = chart([s for group in groups.values() for s in group], settings, pulse.distance, budget)
+    charts = chart(
+        [s for group in groups.values() for s in group], settings, pulse.distance, budget, enough=0.3 * TARGET
+    )
     verdict({of: {s.name: charts[s.name] for s in group} for of, group in groups.items()})
 
 
@@ -94,6 +96,7 @@ def verdict(charts) -> None:
         for name, runs in solvers.items()
         if runs
     }
+    prices = {name: found for name, found in prices.items() if np.isfinite(found[0])}
     least = {of: min((cost for cost, _, g in prices.values() if g == of), default=np.nan) for of in GOALS}
     print(f"\n  end error {TARGET:.0e}: wall time, and how many times that of fvsolve's best explicit and implicit")
     for name, (cost, how, group) in sorted(prices.items(), key=lambda item: item[1][0]):

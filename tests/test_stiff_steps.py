@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -112,6 +114,14 @@ def test_where_it_is_not_stiff_the_order_is_whole(name):
     order = METHODS[name].order
     coarse, fine = errors(name, mild, {9: (12, 24), 6: (24, 48), 5: (36, 72)}.get(order, (192, 384)))
     assert math.log2(coarse / fine) >= order - 0.1
+
+
+def test_the_page_says_what_its_example_prints(capsys):
+    page = (Path(__file__).parent.parent / "docs" / "choosing-a-method.md").read_text(encoding="utf-8")
+    section = page.split("## Orders that stiffness leaves")[1].split("\n## ")[0]
+    code, printed = re.findall(r"```(?:python)?\n(.*?)```", section, re.DOTALL)
+    exec(compile(code, "example", "exec"), {})
+    assert capsys.readouterr().out == printed
 
 
 def test_the_last_stage_as_the_end_of_the_step_is_worth_a_factor_of_lambda():

@@ -101,12 +101,13 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
         yield ("numerics", "step"), f"{numerics.step:g} s would not move the time; wanted more than {least:.2g} s"
     if numerics.rtol is not None and numerics.rtol < LEAST_TOLERANCE:
         yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding; wanted {LEAST_TOLERANCE:g} or more"
-    if numerics.method == AUTO and numerics.rtol is None:
+    if numerics.method == AUTO and not numerics.courant is numerics.step is None:
         yield ("numerics", "method"), 'method "auto" goes by the error of its steps; give rtol, not courant or step'
-    if numerics.rtol is not None and method is not None and not method.adaptive:
+    by_error = numerics.rtol is not None or (not has_cells and numerics.courant is numerics.step is None)
+    if by_error and method is not None and not method.adaptive:
         able = " or ".join(dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive))
-        message = f"method {show(method.name)} estimates no error; use {able}, or courant or step"
-        yield ("numerics", "rtol"), message
+        message = f"method {show(method.name)} estimates no error; use {able}, or {'courant or ' * has_cells}step"
+        yield ("numerics", "method" if numerics.rtol is None else "rtol"), message
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:

@@ -55,6 +55,7 @@ class Run:
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         model.tables[rec.I_MARKS][:] = np.nan
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
+        self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
         if not self.fresh:
             self.remember(state.memory)
         self.setup = time.perf_counter() - self.began
@@ -172,12 +173,11 @@ class Run:
 
     def steps(self) -> str:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
-        left, spent = self.budget, 0.0  # rows and frames interrupt a chunk, they do not begin another
         while True:
             before, steps = time.perf_counter(), self.loop.memory[told.STEPS]
-            code = self.loop.run(left)
-            left = max(1.0, left - (self.loop.memory[told.STEPS] - steps))
-            spent += time.perf_counter() - before
+            code = self.loop.run(self.left)
+            self.left = max(1.0, self.left - (self.loop.memory[told.STEPS] - steps))
+            self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
             if code == told.FIELD:
@@ -187,8 +187,8 @@ class Run:
             elif code == told.CHUNK and automatic.wants_change(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
             elif code == told.CHUNK:
-                self.pause(spent)
-                left, spent = self.budget, 0.0
+                self.pause(self.spent)
+                self.left, self.spent = self.budget, 0.0
             elif code == told.DONE:
                 return ""
             elif code != told.ROWS_FULL:

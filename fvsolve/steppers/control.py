@@ -103,6 +103,8 @@ def watch(orders, memory, h, e, out_rate):
     if orders[KIND] == EXPLICIT:
         could = 0.9 * max(e, 1e-30) ** (-1.0 / orders[ORDER])
         held = out_rate > 0.0 and h * out_rate > 1.98 and could > orders[PRICE]
+        if held:
+            memory[RADIUS] = max(memory[RADIUS], out_rate)
         other = held or h * memory[RADIUS] > HELD
     else:
         other = 2.0 * max(1.0, h * memory[RADIUS] / BOUNDARY) < orders[PRICE]

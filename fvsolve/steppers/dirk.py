@@ -104,7 +104,7 @@ def try_stages(
             continue
         shift = 1.0 / (h * row[i])
         if work[SHIFT] != shift:
-            memory[FACTORS] += 1.0
+            memory[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
             work[SHIFT] = 0.0
             if factor(shape, work[HEADER:], shift, store) != 0:
                 return FAILED

@@ -8,16 +8,21 @@ EVENT_TOLERANCE = 1e-13
 
 @njit(forceinline=True)
 def arm(g, armed):
-    """Note which event functions are at or below zero, where the rhs follows another rule; whether any changed.
+    """Note which event functions are at or below zero, where the rhs follows another rule.
 
     Only accepted states are asked, so no step, not even its stages beyond an event, meets the change of rule.
     """
-    changed = False
     for i in range(g.size):
-        now = 1.0 if g[i] <= 0.0 else 0.0
-        changed = changed or now != armed[i]
-        armed[i] = now
-    return changed
+        armed[i] = 1.0 if g[i] <= 0.0 else 0.0
+
+
+@njit(forceinline=True)
+def turned(g, armed):
+    """Whether an event function has crossed zero since it was armed."""
+    for i in range(g.size):
+        if (g[i] <= 0.0) != (armed[i] > 0.0):
+            return True
+    return False
 
 
 @njit(forceinline=True)

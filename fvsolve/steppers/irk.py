@@ -127,13 +127,12 @@ def predict(coefficients, h, h_last, s, room, vectors):
 
 
 @inner
-def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n, memory):
+def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
     """Factors for every block of L / h behind one another; False without a pivot."""
     q, blocks, b, real, pair = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n
     jacobian, size = work[HEADER:], int(work[STORE])
     while b < q:
         shift = blocks[b * q + b] / h
-        memory[FACTORS] += 1.0
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
             if factor_complex(shape, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), store_complex[pair:]) != 0:
                 return False
@@ -285,8 +284,10 @@ def attempt(
             renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
         why = FAILED
         if work[SHIFT] != 1.0 / h:
+            factors = (store.size + store_complex.size - n) // int(work[STORE])
+            memory[FACTORS] += 0.0 if work[SHIFT] == -1.0 / h else factors
             work[SHIFT] = 0.0
-            if factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n, memory):
+            if factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
             if work[KNOWN] == 1.0 and (q < 5 or h <= 2.0 * memory[LAST]):  # high powers of a long step mislead

@@ -10,11 +10,13 @@ from math import isfinite
 from fvsolve.jit import argument, njit
 from fvsolve.steppers.coefficients import row_of, weights_of
 from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
-from fvsolve.steppers.events import arm, fallen, locate
+from fvsolve.steppers.events import arm, fallen, locate, turned
+from fvsolve.steppers.newton import KNOWN
 from fvsolve.steppers.orders import (
     BAD_STATUS,
     BAD_VALUE,
     BEHIND,
+    BENT,
     BUDGET,
     CALLS,
     CASES,
@@ -149,7 +151,7 @@ def may_leap(orders, memory, times, h):
 
 @njit
 def emit(
-    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, k, dense, out, y_out, rows, steep,
+    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
@@ -161,7 +163,7 @@ def emit(
             return DONE
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
-        interpolate((due - t_old) / h, h, y_old, f_old, y, k[k.shape[0] - 1] if steep else k[0], k, dense, y_out)
+        interpolate((due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
@@ -176,8 +178,8 @@ def emit(
 @njit
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
-    coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
-    values, g, g_new, armed, stored, carry, y_out, rows, work, vectors, store, store_complex,
+    coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, f_end, supply, where, ledger, scale, out,
+    out_row, values, g, g_new, armed, stored, carry, y_out, rows, work, vectors, store, store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -199,7 +201,13 @@ def march(
         new = 3 - now - old
         if flags[PHASE] == FRESH:
             events(memory[T], y[now], handle, g)
-            if arm(g, armed):
+            flags[BENT] = 0
+            if turned(g, armed):
+                if flags[BEHIND] == 1:  # the step behind ends with the slope of its own rule
+                    rhs(memory[T], y[now], f_end, out, handle)
+                    memory[CALLS] += 1.0
+                    flags[BENT] = 1
+                arm(g, armed)
                 reuse = False
             if reuse:
                 copy(k[s - 1], k[0])
@@ -225,7 +233,7 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
-                    y[now], k, dense, out_row, y_out, rows, steep,
+                    y[now], k[s - 1] if steep else f_end if flags[BENT] == 1 else k[0], k, dense, out_row, y_out, rows,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -246,8 +254,6 @@ def march(
             memory[CALLS] -= 1.0
             continue
         failed, rate = TINY_STEP, out[RATE]
-        if steep:
-            copy(k[s - 1] if flags[BEHIND] == 1 else k[0], f_old)
         while not leaping:
             rest = orders[END] - memory[T]
             last = h >= rest * (1.0 - 1e-9)
@@ -269,6 +275,8 @@ def march(
                 break
             if e <= 1.0 or (e == e and rest <= 1e3 * shortest(orders, memory)):  # round-off rules before a kink
                 grow = grown(orders, memory, h, e)
+                if failed == NEWTON_STUCK:
+                    grow = min(grow, 1.0)
                 if (not last or grow < 1.0) and not kept(orders, grow):
                     memory[STEP] = h * grow
                 memory[ERROR_OLD] = e
@@ -302,8 +310,8 @@ def march(
         memory[LAST] = memory[T] - t_old
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
-        if not steep and next_due(orders, memory, times) <= memory[T]:
-            copy(k[0], f_old)
+        if next_due(orders, memory, times) <= memory[T]:
+            copy(vectors[s - 1] if steep and work[KNOWN] == 1.0 and flags[BENT] == 0 else k[0], f_old)
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
@@ -334,7 +342,7 @@ def compiled():
 
     i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
     march.compile(
-        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, v,
+        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, v,
          w, v, types.complex128[::1])
     )  # fmt: skip
     march.disable_compile()

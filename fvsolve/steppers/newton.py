@@ -14,8 +14,8 @@ from fvsolve.steppers.orders import CALLS, CONTROL, JACOBIANS, LAST, SIZE, STEPS
 from fvsolve.steppers.step import copy
 
 # The header of `work`: whether there is a Jacobian, the step it was made at, whether the last step's stages are known,
-# the step that the present stages belong to, the shift factored last (0: none), the worst ratio of two increments
-# of a step, the last such ratio / (1 - ratio), and the size of a factor.
+# the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
+# factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the size of a factor.
 HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, STORE = range(8)
 HEADER = 8
 # Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
@@ -96,9 +96,9 @@ def verdict(turn, size, before, orders, work):
         return True, FAILED
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
+        work[RATIO] = max(work[RATIO], ratio)
         if ratio >= 0.3 and size <= floor:  # what remains is rounding, or a kink that no iteration sees through
             return True, CONVERGED
-        work[RATIO] = max(work[RATIO], ratio)
         if ratio >= 0.99:
             return True, FAILED
         work[SURE] = ratio / (1.0 - ratio)

@@ -12,7 +12,7 @@ from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
 from fvsolve.steppers.newton import HAS, HEADER, INCREMENT, RATE, SEEN, SHIFT, renew
-from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, RADIUS, SIZE, STEPS, TOLERANCE, WATCH
+from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, RADIUS, SIZE, STEPS, TOLERANCE, WATCH, WORST
 from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
@@ -74,9 +74,11 @@ def attempt(
             memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])
     shift = 1.0 / (h * gamma)
     if work[SHIFT] != shift:
-        memory[FACTORS] += 1.0
+        memory[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
         work[SHIFT] = 0.0
-        if factor(shape, work[HEADER:], shift, store) != 0:
+        why = factor(shape, work[HEADER:], shift, store)
+        if why != 0:
+            memory[WORST] = why - 1.0
             return NEWTON_FAILED
         work[SHIFT] = shift
     per = 1.0 / h

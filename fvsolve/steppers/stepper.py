@@ -27,9 +27,10 @@ class Stepper:
         self, method: Method, n: int, ledgers: int, structure: Callable[[], Structure], scale: np.ndarray
     ) -> None:
         self.structure, self.scale, self.march = structure, scale, compiled()
-        self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(2 * ledgers)
+        self.y, self.f_old, self.f_end = np.zeros((4, n)), np.zeros(n), np.zeros(n)
+        self.ledger = np.zeros(2 * ledgers)
         self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
-        self.flags = np.array([told.FRESH, 0, 0, 1, 0], dtype=np.int64)
+        self.flags = np.array([told.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
         self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
@@ -63,7 +64,6 @@ class Stepper:
 
             q, pairs = s - 1, pairs_of(self.method)
         reals = q - 2 * pairs if q else 1
-        self.factors = reals + pairs  # made for one length of step
         size, self.shape = structure.store_size, structure.shape
         self.work = np.zeros(newton.HEADER + structure.nnz + n + 2 * ledgers + q * q)
         self.work[newton.STORE] = size
@@ -102,9 +102,7 @@ class Stepper:
         if self.work.size:
             from fvsolve.steppers.newton import SHIFT
 
-            if self.work[SHIFT] != 0.0:  # factors are made anew from the same matrix, which is not counted again
-                self.memory[told.FACTORS] -= self.factors
-            self.work[SHIFT] = 0.0
+            self.work[SHIFT] *= -1.0  # to be factored once more, which is not counted again
         return memory
 
     def counts(self) -> dict[str, int]:
@@ -115,8 +113,8 @@ class Stepper:
         """March on; returns one of the codes of `steppers.orders`."""
         return self.march(
             self.attempt, leap, observe, record, events, rhs, *self.algebra, handle, self.coefficients, self.shape,
-            self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.supply,
-            where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
+            self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.f_end,
+            self.supply, where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
             self.stored, self.carry, self.y_out, self.rows, self.work, self.vectors, self.store,
             self.store_complex,
         )  # fmt: skip

@@ -1,0 +1,87 @@
+"""`method = "auto"`: explicit where that is cheaper, implicit where it is not, and it says so."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from truth.scenes import chamber, lake, pipe, reservoir, scene, tank, valve
+
+import fvsolve
+
+CASES = Path(__file__).parent.parent / "cases"
+IMPLICIT = ("newton", "ros", "dirk", "irk", "differences", "linear_dense", "linear_banded", "linear_sparse")
+PROBE = f"""
+import json, sys, fvsolve
+result = fvsolve.run(json.load(sys.stdin))
+print(result.reason, [row["method"] for row in result.summary["methods"]])
+print([name for name in {IMPLICIT} if "fvsolve.steppers." + name in sys.modules])
+"""
+
+
+@pytest.mark.parametrize("method, loaded", [("auto", []), ("dormand-prince", []), ("rodas-5p", ["newton", "ros"])])
+def test_a_scene_that_is_not_stiff_stays_explicit_and_imports_nothing_else(method, loaded):
+    nodes = {"lake": lake(10.0), "surge": tank(2.0, 12.0)}
+    links = {"main": pipe("lake", "surge", 200.0, 0.4, 1000.0, 20)}
+    case = json.dumps(scene(nodes, links, 5.0, {"method": method, "rtol": 1e-6, "initial": "rest"}))
+    done = subprocess.run([sys.executable, "-c", PROBE], input=case, capture_output=True, text=True, env=os.environ)
+    reason, found = done.stdout.splitlines()
+    assert reason == f"finished ['{'dormand-prince' if method == 'auto' else method}']", done.stderr
+    assert all(name in found for name in loaded) and bool(loaded) == (found != "[]")
+
+
+def servo(**numerics):
+    return fvsolve.run(CASES / "cylinder-servo.toml", set={f"numerics.{key}": x for key, x in numerics.items()})
+
+
+def test_it_turns_implicit_where_the_scene_turns_stiff_and_back_where_that_ends():
+    """The servo's edges close at 95 ms while the load stands, and open again: 3e7 per second between."""
+    result = servo(method="auto", rtol=1e-6)
+    assert [e for e in result.expectations if not e.ok] == []
+    methods = result.summary["methods"]
+    assert [row["method"] for row in methods] == ["dormand-prince", "rodas-5p", "dormand-prince"]
+    assert methods[0] == {"time": 0.0, "method": "dormand-prince", "why": "until the spectrum forbids it"}
+    stiff, calm = methods[1], methods[2]
+    assert 0.0 < stiff["time"] < 0.095 < calm["time"] < 0.16
+    assert stiff["why"].startswith("stiff: rates of about ") and "hold explicit steps to" in stiff["why"]
+    assert calm["why"].startswith("no longer stiff: rates of about ")
+    assert 0 < result.summary["jacobians"] < result.summary["steps"]
+    assert result.summary["steps"] < 0.2 * servo(method="dormand-prince", rtol=1e-6).summary["steps"]
+
+
+def test_what_it_says_of_the_rate_and_the_step_fits_together():
+    """A thimble behind a bore: the rate that holds explicit steps is of the size of one over them."""
+    for case in ("chamber-chain", "pipe-tiny-chamber"):
+        result = fvsolve.run(CASES / f"{case}.toml", set={"numerics.method": "auto", "numerics.rtol": 1e-6})
+        assert [e for e in result.expectations if not e.ok] == []
+        why = result.summary["methods"][1]["why"].split()
+        rate, step = float(why[why.index("about") + 1]), float(why[why.index("to") + 1])
+        assert 0.5 < rate * step < 10.0, case
+
+
+def thimble(**numerics) -> dict:
+    """A thimble between a pump and a tub, whose way out closes at 1 s."""
+    nodes = {"pump": reservoir(8e6), "pot": chamber(1e-6, 1e6), "tub": chamber(0.05, 3e6), "out": reservoir(5e5)}
+    links = {
+        "in": valve("pump", "pot", 2e-6),
+        "mid": valve("pot", "tub", 4e-6, {"time": [0.0, 1.0, 1.2], "value": [1.0, 1.0, 0.0]}),
+        "leak": valve("tub", "out", 1e-7),
+    }
+    return scene(nodes, links, 2.0, numerics, ["pot.pressure", "tub.pressure"], 0.05)
+
+
+def test_it_ends_where_a_single_method_does():
+    auto, fixed = (fvsolve.run(thimble(method=name, rtol=1e-8)) for name in ("auto", "rodas-5p"))
+    assert auto.ok and [row["method"] for row in auto.summary["methods"]][:2] == ["dormand-prince", "rodas-5p"]
+    for name in ("pot.pressure", "tub.pressure"):
+        assert auto[name] == pytest.approx(fixed[name], rel=1e-6)
+
+
+def test_auto_goes_by_the_error_even_where_there_are_cells():
+    nodes = {"lake": lake(10.0), "surge": tank(2.0, 12.0)}
+    case = scene(nodes, {"main": pipe("lake", "surge", 200.0, 0.4, 1000.0, 20)}, 1.0, {"method": "auto"})
+    assert fvsolve.load(case).numerics.rtol == 1e-6

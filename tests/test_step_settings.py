@@ -1,0 +1,102 @@
+"""What cannot be stepped as asked is said at once, with what can: in the file, by --set and in integrate."""
+
+from __future__ import annotations
+
+import pytest
+from truth.scenes import lake, pipe, scene, tank, valve
+
+import fvsolve
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.steppers import METHODS, integrate
+
+ABLE = list(dict.fromkeys(method.name for method in METHODS.values() if method.adaptive))
+
+
+def piped(**numerics) -> dict:
+    nodes = {"lake": lake(10.0), "surge": tank(2.0, 12.0)}
+    return scene(nodes, {"main": pipe("lake", "surge", 200.0, 0.4, 1000.0, 20)}, 1.0, numerics)
+
+
+def cellless(**numerics) -> dict:
+    return scene({"lake": lake(10.0), "surge": tank(2.0, 12.0)}, {"tap": valve("lake", "surge", 0.01)}, 1.0, numerics)
+
+
+FAULTS = {
+    "no such method": (piped(method="radau5"), 'numerics.method: no method named "radau5"; did you mean "'),
+    "misspelt": (piped(method="esdirk4"), 'no method named "esdirk4"; did you mean "esdirk-4"?'),
+    "auto misspelt": (piped(method="atuo"), 'no method named "atuo"; did you mean "auto"?'),
+    "no error estimate": (
+        piped(method="gauss-4", rtol=1e-6),
+        'method "gauss-4" estimates no error; use ',
+    ),
+    "no estimate by default": (cellless(method="gauss-4"), 'numerics.method: method "gauss-4" estimates no error; use'),
+    "rtol below rounding": (piped(method="radau-iia-5", rtol=1e-14), "numerics.rtol: 1e-14 is below rounding; wanted"),
+    "rtol of no kind": (piped(method="radau-iia-5", rtol="small"), "numerics.rtol"),
+    "step that moves nothing": (piped(method="gauss-4", step=1e-17), "numerics.step: 1e-17 s would not move the time"),
+    "step of no time": (piped(method="gauss-4", step="1 m"), "numerics.step"),
+    "step of zero": (piped(method="gauss-4", step=0.0), "numerics.step"),
+    "courant of zero": (piped(method="gauss-4", courant=0.0), "numerics.courant"),
+    "courant of text": (piped(method="gauss-4", courant="fast"), "numerics.courant"),
+    "courant without cells": (
+        cellless(method="gauss-4", courant=20.0),
+        "no pipe, so no cell to cross",
+    ),
+    "auto by courant": (piped(method="auto", courant=0.9), 'method "auto" goes by the error of its steps; give rtol'),
+    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" goes by the error of its steps; give rtol'),
+    "two settings": (piped(method="radau-iia-5", rtol=1e-6, courant=2.0), "courant and rtol are given; keep one"),
+    "no such algebra": (piped(method="gauss-4", linear_algebra="bandid"), 'did you mean "banded"?'),
+}
+
+
+@pytest.mark.parametrize("case, wanted", FAULTS.values(), ids=FAULTS)
+def test_the_file_is_refused(case, wanted):
+    with pytest.raises(CaseError) as caught:
+        fvsolve.load(case)
+    assert wanted in str(caught.value)
+
+
+def test_who_asks_for_error_control_is_told_who_can():
+    with pytest.raises(CaseError) as caught:
+        fvsolve.load(piped(method="trapezoid", rtol=1e-6))
+    assert all(f'"{name}"' in str(caught.value) for name in ABLE)
+    with pytest.raises(FvsolveError) as said:
+        integrate(lambda t, y: -y, [1.0], [0.0, 1.0], "trapezoid")
+    assert all(name in str(said.value) for name in ABLE)
+
+
+INTEGRATE = {
+    "misspelt": (dict(method="radau-iia5"), 'no method named "radau-iia5"; did you mean "radau-iia-5"'),
+    "below rounding": (dict(method="radau-iia-5", rtol=1e-14), "rtol = 1e-14 is below rounding; wanted 1e-13 or more"),
+    "moves nothing": (
+        dict(method="gauss-4", step=1e-17),
+        "step = 1e-17 would not move the time; wanted more",
+    ),
+    "neither": (dict(method="gauss-4"), "gauss-4 has no error estimate; give step, or one of"),
+    "rtol without an estimate": (dict(method="gauss-4", rtol=1e-6), "gauss-4 has no error estimate"),
+    "both": (dict(method="radau-iia-5", rtol=1e-6, step=0.1), "rtol and step both set the step; keep one"),
+    "negative": (dict(method="radau-iia-5", rtol=-1e-6), "rtol = -1e-06 is not a positive number"),
+    "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
+}
+
+
+@pytest.mark.parametrize("settings, wanted", INTEGRATE.values(), ids=INTEGRATE)
+def test_integrate_refuses_it(settings, wanted):
+    with pytest.raises(FvsolveError) as caught:
+        integrate(lambda t, y: -y, [1.0], [0.0, 1.0], **settings)
+    assert wanted in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "numerics, found",
+    [
+        ({}, ("ssp-rk3", "courant", 0.9)),
+        ({"rtol": 1e-5}, ("dormand-prince", "rtol", 1e-5)),
+        ({"method": "radau-iia-5"}, ("radau-iia-5", "rtol", 1e-6)),
+        ({"method": "gauss-4"}, ("gauss-4", "courant", 0.9)),
+        ({"method": "auto"}, ("auto", "rtol", 1e-6)),
+        ({"method": "dormand-prince"}, ("dormand-prince", "courant", 0.9)),
+    ],
+)
+def test_what_is_left_out_is_filled_in(numerics, found):
+    filled = fvsolve.load(piped(**numerics)).numerics
+    assert (filled.method, getattr(filled, found[1])) == (found[0], found[2])
