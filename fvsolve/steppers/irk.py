@@ -34,7 +34,6 @@ from fvsolve.steppers.newton import (
     book_increment,
     find_worst,
     renew,
-    size_of,
     verdict,
 )
 from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
@@ -197,11 +196,13 @@ def iterate(
                 r[e] += own * wi[e] + other * wj[e]
         solve_blocks(solve, solve_complex, shape, coefficients, s, int(work[STORE]), store, store_complex, vectors)
         total = 0.0
-        for i in range(q):
-            r, wi = vectors[r_at + i], vectors[w_at + i]
-            for e in range(n):
-                wi[e] += r[e]
-            total += size_of(r, weights)
+        for e in range(n):
+            per, part = weights[e], 0.0
+            for i in range(q):
+                r = vectors[r_at + i, e]
+                vectors[w_at + i, e] += r
+                part += r * r
+            total += per * per * part
         size = sqrt(total / (q * n))
         done, why = verdict(turn, size, before, orders, work)
         before = size
@@ -289,7 +290,7 @@ def attempt(
             if factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
-            if work[KNOWN] == 1.0:
+            if work[KNOWN] == 1.0 and (q < 5 or h <= 2.0 * memory[LAST]):  # high powers of a long step mislead
                 predict(coefficients, h, memory[LAST], s, work[work.size - q * q :], vectors)
             else:
                 for i in range(q):

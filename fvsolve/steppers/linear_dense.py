@@ -5,7 +5,6 @@ The store holds the rows of L and U, 1 / U_ii on the diagonal, and behind them t
 
 import numpy as np
 
-from fvsolve.jit import njit
 from fvsolve.steppers.pivots import LEAST, reciprocal, size_of
 from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
@@ -16,44 +15,37 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     return np.zeros(0, dtype=np.int64), n * n + n
 
 
-@njit(forceinline=True)
-def subtract(factor, x, y):
-    """y <- y - factor x."""
-    for i in range(y.size):
-        y[i] -= factor * x[i]
-
-
 def factor(shape, jacobian, shift, store):
     """store <- L U of shift I - J, rows exchanged; returns 0, or 1 + the column without a pivot."""
     n = shape[SIZE]
     starts, rows, came = shape[shape[STARTS] :], shape[shape[ROWS] :], store[n * n :]
+    a = store[: n * n].reshape((n, n))
     for e in range(n * n):
         store[e] = 0.0
     for j in range(n):
         for p in range(starts[j], starts[j + 1]):
             if rows[p] < n:
-                store[rows[p] * n + j] = -jacobian[p]
-        store[j * n + j] += shift
+                a[rows[p], j] = -jacobian[p]
+        a[j, j] += shift
     for k in range(n):
-        best, pivot = size_of(store[k * n + k]), k
+        best, pivot = size_of(a[k, k]), k
         for i in range(k + 1, n):
-            here = size_of(store[i * n + k])
+            here = size_of(a[i, k])
             if here > best:
                 best, pivot = here, i
         if not LEAST < best < 1.0 / LEAST:
             return k + 1
         came[k] = pivot
-        above = store[k * n : k * n + n]
         if pivot != k:
-            other = store[pivot * n : pivot * n + n]
             for j in range(n):
-                above[j], other[j] = other[j], above[j]
-        per = reciprocal(above[k])
-        above[k] = per
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        per = reciprocal(a[k, k])
+        a[k, k] = per
         for i in range(k + 1, n):
-            row = store[i * n : i * n + n]
-            row[k] *= per
-            subtract(row[k], above[k + 1 :], row[k + 1 :])
+            if a[i, k] != 0.0:
+                a[i, k] *= per
+                for j in range(k + 1, n):
+                    a[i, j] -= a[i, k] * a[k, j]
     return 0
 
 

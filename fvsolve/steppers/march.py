@@ -8,9 +8,10 @@ import functools
 from math import isfinite
 
 from fvsolve.jit import argument, njit
-from fvsolve.steppers.coefficients import weights_of
+from fvsolve.steppers.coefficients import row_of, weights_of
 from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
+from fvsolve.steppers.newton import KNOWN
 from fvsolve.steppers.orders import (
     BAD_STATUS,
     BAD_VALUE,
@@ -31,12 +32,14 @@ from fvsolve.steppers.orders import (
     FIELD_EVERY,
     FRESH,
     FSAL,
+    KIND,
     LAST,
     LEAPS,
     LEAPT,
     N_MARK,
     NEWTON_FAILED,
     NEWTON_FAILURES,
+    NEWTON_SOLVED,
     NEWTON_STUCK,
     NEXT_FIELD,
     NEXT_OUTPUT,
@@ -190,6 +193,9 @@ def march(
     """
     s, reuse = k.shape[0], False
     b = weights_of(coefficients, s)
+    steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
+    for j in range(s):  # the last stage does not, where it is the end
+        steep = steep and row_of(coefficients, s, s - 1)[j] == b[j]
     for _ in range(1 << 62):
         now, old = flags[NOW], flags[OLD]
         new = 3 - now - old
@@ -227,7 +233,7 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
-                    y[now], f_end if flags[BENT] == 1 else k[0], k, dense, out_row, y_out, rows,
+                    y[now], k[s - 1] if steep else f_end if flags[BENT] == 1 else k[0], k, dense, out_row, y_out, rows,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -305,7 +311,7 @@ def march(
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
         if next_due(orders, memory, times) <= memory[T]:
-            copy(k[0], f_old)
+            copy(vectors[s - 1] if steep and work[KNOWN] == 1.0 and flags[BENT] == 0 else k[0], f_old)
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE

@@ -53,7 +53,7 @@ def integrate(
     orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
     if watched:
         automatic.watch(stepper, _full(n))
-    lands = method.order > stepper.dense_order + 2
+    lands = stepper.dense_order < (method.error_order - 1 if step is None else method.order - 2)
     stops = t[1:] if lands else t[-1:]
     stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, n + 1))
     if f not in _COMPILED:
