@@ -10,14 +10,9 @@ from fvsolve.steppers.newton import (
     BASE,
     CONVERGED,
     FAILED,
-    HAS,
-    HEADER,
     INCREMENT,
-    KNOWN,
-    MADE,
     MOST,
     RATE,
-    SHIFT,
     WEIGHTS,
     begin,
     book_increment,
@@ -26,7 +21,22 @@ from fvsolve.steppers.newton import (
     size_of,
     verdict,
 )
-from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
+from fvsolve.steppers.orders import (
+    CALLS,
+    CONTROL,
+    FACTORS,
+    HAS,
+    HEADER,
+    KNOWN,
+    LAST,
+    MADE,
+    NEWTON,
+    NEWTON_FAILED,
+    SHIFT,
+    SIZE,
+    STEPS,
+    TOLERANCE,
+)
 from fvsolve.steppers.step import combine, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS

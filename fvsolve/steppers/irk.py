@@ -18,17 +18,10 @@ from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
 from fvsolve.steppers.newton import (
     CONVERGED,
     FAILED,
-    HAS,
-    HEADER,
     INCREMENT,
-    KNOWN,
-    MADE,
     MOST,
     RATE,
-    SEEN,
-    SHIFT,
     STAGES,
-    STORE,
     WEIGHTS,
     begin,
     book_increment,
@@ -36,7 +29,24 @@ from fvsolve.steppers.newton import (
     renew,
     verdict,
 )
-from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, LAST, NEWTON, NEWTON_FAILED, SIZE, STEPS, TOLERANCE
+from fvsolve.steppers.orders import (
+    CALLS,
+    CONTROL,
+    FACTORS,
+    HAS,
+    HEADER,
+    KNOWN,
+    LAST,
+    MADE,
+    NEWTON,
+    NEWTON_FAILED,
+    SEEN,
+    SHIFT,
+    SIZE,
+    STEPS,
+    STORE,
+    TOLERANCE,
+)
 from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS

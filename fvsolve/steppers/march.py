@@ -11,7 +11,6 @@ from fvsolve.jit import argument, njit
 from fvsolve.steppers.coefficients import row_of, weights_of
 from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
-from fvsolve.steppers.newton import KNOWN
 from fvsolve.steppers.orders import (
     BAD_STATUS,
     BAD_VALUE,
@@ -33,6 +32,7 @@ from fvsolve.steppers.orders import (
     FRESH,
     FSAL,
     KIND,
+    KNOWN,
     LAST,
     LEAPS,
     LEAPT,

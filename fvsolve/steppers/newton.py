@@ -10,14 +10,27 @@ import numpy as np
 
 from fvsolve.jit import inner
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.orders import CALLS, CONTROL, JACOBIANS, LAST, SIZE, STEPS, TOLERANCE, WORST
+from fvsolve.steppers.orders import (
+    CALLS,
+    CONTROL,
+    HAS,
+    HEADER,
+    JACOBIANS,
+    KNOWN,
+    LAST,
+    MADE,
+    RATIO,
+    SEEN,
+    SHIFT,
+    SIZE,
+    STEPS,
+    STORE,
+    SURE,
+    TOLERANCE,
+    WORST,
+)
 from fvsolve.steppers.step import copy
 
-# The header of `work`: whether there is a Jacobian, the step it was made at, whether the last step's stages are known,
-# the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
-# factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the size of a factor.
-HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, STORE = range(8)
-HEADER = 8
 # Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
 # what a stage starts from; then, for fully implicit methods, transformed increments, f and residuals of all stages.
 FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, STAGES = range(7)

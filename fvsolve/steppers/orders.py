@@ -27,3 +27,9 @@ RATE, STATUS, WHERE = 0, 1, 2  # the entries of `out` that the loop reads
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step
+
+# The header of `work`: whether there is a Jacobian, the step it was made at, whether the last step's stages are known,
+# the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
+# factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the size of a factor.
+HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, STORE = range(8)
+HEADER = 8

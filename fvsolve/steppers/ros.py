@@ -11,8 +11,23 @@ from math import sqrt
 from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
-from fvsolve.steppers.newton import HAS, HEADER, INCREMENT, RATE, SEEN, SHIFT, renew
-from fvsolve.steppers.orders import CALLS, CONTROL, FACTORS, NEWTON_FAILED, RADIUS, SIZE, STEPS, TOLERANCE, WATCH, WORST
+from fvsolve.steppers.newton import INCREMENT, RATE, renew
+from fvsolve.steppers.orders import (
+    CALLS,
+    CONTROL,
+    FACTORS,
+    HAS,
+    HEADER,
+    NEWTON_FAILED,
+    RADIUS,
+    SEEN,
+    SHIFT,
+    SIZE,
+    STEPS,
+    TOLERANCE,
+    WATCH,
+    WORST,
+)
 from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS

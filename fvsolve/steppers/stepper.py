@@ -65,10 +65,10 @@ class Stepper:
             q, pairs = s - 1, pairs_of(self.method)
         reals = q - 2 * pairs if q else 1
         size, self.shape = structure.store_size, structure.shape
-        self.work = np.zeros(newton.HEADER + structure.nnz + n + 2 * ledgers + q * q)
-        self.work[newton.STORE] = size
+        self.work = np.zeros(told.HEADER + structure.nnz + n + 2 * ledgers + q * q)
+        self.work[told.STORE] = size
         self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
-        self.kept = newton.HEADER + structure.nnz
+        self.kept = told.HEADER + structure.nnz
         self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
         real = arguments(structure.functions()) if reals else no_algebra()[:2]
         self.algebra = (*real, *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]))
@@ -100,9 +100,7 @@ class Stepper:
             view[...] = memory[: view.size].reshape(view.shape)
             memory = memory[view.size :]
         if self.work.size:
-            from fvsolve.steppers.newton import SHIFT
-
-            self.work[SHIFT] *= -1.0  # to be factored once more, which is not counted again
+            self.work[told.SHIFT] *= -1.0  # to be factored once more, which is not counted again
         return memory
 
     def counts(self) -> dict[str, int]:
