@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fvsolve.jit import argument
+from fvsolve.jit import argument, beside
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.coefficients import coefficients
 from fvsolve.steppers.march import compiled, compiled_step, no_algebra
@@ -43,12 +43,17 @@ class Stepper:
         n, ledgers = self.scale.size, self.ledger.size // 2
         self.method = method
         self.coefficients, self.dense, s = coefficients(method)
-        self.attempt, self.algebra = attempt_of(method.kind), no_algebra()
+        self.algebra = no_algebra()
         self.k, self.supply = np.zeros((s, n)), np.zeros((s, ledgers))
         self.shape, self.work, self.vectors = self.nobody, self.none, np.zeros((0, n))
         self.store, self.store_complex, self.kept = self.none, np.zeros(0, dtype=complex), 0
-        if not method.explicit:
-            self.solve_by(self.structure(), s, n, ledgers)
+        if method.explicit:
+            self.attempt = attempt_of(method.kind)
+        else:
+            structure = self.structure()
+            with algebra_beside(structure.kind, method.kind == "full"):
+                self.attempt = attempt_of(method.kind)
+            self.solve_by(structure, s, n, ledgers)
         self.orders[told.ORDER] = method.control_order
         self.orders[told.FSAL] = method.explicit and method.first_same_as_last
         self.orders[told.KIND] = KINDS[method.kind][1]
@@ -131,6 +136,12 @@ KINDS = {
     "full": ("irk", told.NEWTON_SOLVED),
     "linear": ("ros", told.LINEARLY_IMPLICIT),
 }
+
+
+def algebra_beside(kind: str, complex: bool):
+    """Have a second process compile the linear algebra meanwhile, for real and, where asked, complex shifts."""
+    code = f"from fvsolve.steppers.structure import functions; [functions({kind!r}, of) for of in {{False, {complex}}}]"
+    return beside(code, f"linear_{kind}.factor-*.nbi")
 
 
 @functools.cache
