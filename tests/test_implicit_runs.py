@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from test_rest import ROUGH, moved, still_probes, town
 from test_resume import OFTEN, long_run, same_files, started
 from truth import vessels
@@ -207,3 +208,49 @@ def busy(numerics: dict) -> dict:
     case["links"]["valve"]["opening"] = opening
     case["numerics"] = {"end": 500.0, "scheme": "upwind", **numerics}
     return case
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+@pytest.mark.parametrize("method", ["dormand-prince", "auto", "rodas-5p", "radau-iia-5", "radau-iia-9", "esdirk-4"])
+def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(method, rtol):
+    """The force of the dashpot sets in with a jump, which differences must not take for a slope."""
+    nodes = {"ground": {"type": "frame"}, "ball": {"type": "mass", "mass": 2.0, "initial_position": 0.1}}
+    nodes["ball"]["initial_velocity"] = -1.0
+    links = {
+        "stop": {"type": "end-stop", "from": "ground", "to": "ball", "least": 0.0, "stiffness": 1e5, "damping": 60.0},
+        "weight": {"type": "force", "to": "ball", "force": -20.0},
+    }
+    case = scene(nodes, links, 0.5, {"method": method, "rtol": rtol}, ["ball.position", "ball.velocity"], 0.01)
+    result = fvsolve.run(case)
+    x, v, t = 0.1, -1.0, 0.0
+    while True:  # flight to the stop, then contact until it would pull, by its own solution
+        down = (v + math.sqrt(v * v + 20.0 * x)) / 10.0
+        if t + down > 0.5:
+            left = 0.5 - t
+            x, v = x + v * left - 5.0 * left**2, v - 10.0 * left
+            break
+        t, v = t + down, v - 10.0 * down
+        contact = solve_ivp(
+            lambda _, s: [s[1], -10.0 - 5e4 * s[0] - 30.0 * s[1]], (0.0, 1.0), [0.0, v], "DOP853", events=released,
+            rtol=1e-12, atol=1e-14,
+        )  # fmt: skip
+        t, (x, v) = t + contact.t[-1], contact.y[:, -1]
+    assert (result["ball.position"][-1], result["ball.velocity"][-1]) == (
+        pytest.approx(x, abs=300 * rtol), pytest.approx(v, abs=3000 * rtol))  # fmt: skip
+
+
+def released(_, s):
+    """Force of the stop [N / 2 kg]; it never pulls."""
+    return 5e4 * -s[0] - 30.0 * s[1] + 1e-9
+
+
+released.terminal, released.direction = True, -1
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-8])
+def test_a_tank_that_runs_dry_through_another_does_not_stop_newton(rtol):
+    nodes = {"a": tank(1.0, 0.5), "b": tank(0.3, 0.1, height=0.6), "sink": reservoir(90000.0)}
+    links = {"v": valve("a", "b", 0.01), "d": valve("a", "sink", 0.02)}
+    result = fvsolve.run(scene(nodes, links, 60.0, {"method": "esdirk-4", "rtol": rtol}, ["a.level"], 1.0))
+    assert result.ok, result.reason
+    assert result.ledger["mass"]["relative"] < 1e-13

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from truth.scenes import lake, pipe, scene, tank, valve
 
@@ -76,6 +77,10 @@ INTEGRATE = {
     "both": (dict(method="radau-iia-5", rtol=1e-6, step=0.1), "rtol and step both set the step; keep one"),
     "negative": (dict(method="radau-iia-5", rtol=-1e-6), "rtol = -1e-06 is not a positive number"),
     "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
+    "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
+    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" goes by the error of its steps'),
+    "negative atol": (dict(atol=-1.0), "atol must be a positive number, or 1 of them"),
+    "atol of another length": (dict(atol=[1e-6, 1e-6]), "atol must be a positive number, or 1 of them"),
 }
 
 
@@ -84,6 +89,29 @@ def test_integrate_refuses_it(settings, wanted):
     with pytest.raises(FvsolveError) as caught:
         integrate(lambda t, y: -y, [1.0], [0.0, 1.0], **settings)
     assert wanted in str(caught.value)
+
+
+WRONG = {
+    "too few": (lambda t, y: np.array([y[1]]), [1.0, 0.0], "f(t, y) gives 1 rates for 2 states"),
+    "too many": (lambda t, y: np.array([y[1], y[0], 0.0]), [1.0, 0.0], "f(t, y) gives 3 rates for 2 states"),
+    "nothing": (lambda t, y: None, [1.0], "f(t, y) gives 0 rates for 1 states"),
+    "no function": (5, [1.0], "f = 5 cannot be called"),
+    "no numbers": (lambda t, y: -y, ["a"], "y0 = ['a'] is not made of numbers"),
+}
+
+
+@pytest.mark.parametrize("f, y0, wanted", WRONG.values(), ids=WRONG)
+def test_integrate_refuses_what_is_no_equation(f, y0, wanted):
+    with pytest.raises(FvsolveError) as caught:
+        integrate(f, y0, [0.0, 1.0])
+    assert wanted in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["rk4", "gauss-2", "rodas-5p", "auto", "", " spaced "])
+def test_no_tableau_takes_the_place_of_a_method_that_is_there(name):
+    with pytest.raises(FvsolveError, match="is not free"):
+        fvsolve.tableau(name, "0 |\n--+--\n | 1")
+    assert name not in METHODS or METHODS[name].order > 1
 
 
 @pytest.mark.parametrize(

@@ -59,8 +59,11 @@ def between(tables, y, i, j):
 
 @njit(forceinline=True)
 def contact(stiffness, damping, depth, speed):
-    """Force of a contact that is `depth` deep and gets deeper at `speed`; it never pulls [N]."""
-    return max(0.0, stiffness * depth + damping * speed) if depth > 0.0 else 0.0
+    """Force of an armed contact that is `depth` deep and gets deeper at `speed`; it never pulls [N].
+
+    Without a jump at depth 0: differences there would take it for an endless slope.
+    """
+    return max(0.0, stiffness * depth + damping * speed)
 
 
 @njit

@@ -96,6 +96,18 @@ class Run:
         rows = self.loop.take_rows()
         if len(rows):
             self.sink.rows(rows[:, 0], rows[:, 1:])
+            if self.loop.orders[told.CONTROL] == told.TOLERANCE:
+                self.widen(rows)
+
+    def widen(self, rows: np.ndarray) -> None:
+        """Extremes by rows as well: steps under error control are long, and what lies between is as accurate."""
+        least, t_least, greatest, t_greatest = self.model.tables[rec.I_EXTREMES]
+        for k in range(rows.shape[1] - 1):
+            low, high = rows[np.argmin(rows[:, k + 1])], rows[np.argmax(rows[:, k + 1])]
+            if low[k + 1] < least[k]:
+                least[k], t_least[k] = low[k + 1], low[0]
+            if high[k + 1] > greatest[k]:
+                greatest[k], t_greatest[k] = high[k + 1], high[0]
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.sink.field(t, self.model.frame(y, out))

@@ -94,8 +94,9 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the contents."""
     nodes = model.tables[rec.I_NODES]
     initial, change = model.contents(y)
-    spilled = sum(-x for x, row in zip(ledger, nodes, strict=True) if row["kind"] == rec.TANK and x < 0)
-    made_up = sum(x for x, row in zip(ledger, nodes, strict=True) if row["kind"] == rec.TANK and x > 0)
+    tanks = [(x, row["full"]) for x, row in zip(ledger, nodes, strict=True) if row["kind"] == rec.TANK]
+    spilled = sum(-x for x, full in tanks if x < 0 and full < np.inf)
+    made_up = sum(x for x, full in tanks if x > 0 or full == np.inf)
     outside = [(name, float(x)) for name, x, row in zip(model.node_names, ledger, nodes, strict=True)
                if row["kind"] in (rec.FIXED, rec.JUNCTION)]  # fmt: skip
     remainder = change - float(np.sum(ledger))

@@ -26,11 +26,13 @@ from fvsolve.steppers.orders import (
     END,
     ERROR_OLD,
     EVERY,
+    EXPLICIT,
     FIELD,
     FIELD_COUNT,
     FIELD_EVERY,
     FRESH,
     FSAL,
+    HAS,
     KIND,
     KNOWN,
     LAST,
@@ -52,6 +54,7 @@ from fvsolve.steppers.orders import (
     REJECTIONS,
     ROWS,
     ROWS_FULL,
+    SEEN,
     START,
     STATUS,
     STEP,
@@ -209,6 +212,11 @@ def march(
                     flags[BENT] = 1
                 arm(g, armed)
                 reuse = False
+                if flags[BEHIND] == 1:  # nothing learnt under the old rule holds
+                    if orders[CONTROL] == TOLERANCE:
+                        memory[STEP] = 0.0
+                    if orders[KIND] != EXPLICIT:
+                        work[HAS], work[SEEN] = 0.0, -1.0
             if reuse:
                 copy(k[s - 1], k[0])
             else:

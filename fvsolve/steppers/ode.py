@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
+from numbers import Real
 from weakref import WeakKeyDictionary
 
 import numba
@@ -40,10 +41,16 @@ def integrate(
     and where the solution does not stay finite or Newton fails.
     """
     watched = method == AUTO
+    if watched and step is not None:
+        raise FvsolveError('method "auto" goes by the error of its steps; give rtol, not step')
     method = method_named(automatic.first_method(method)) if isinstance(method, str) else method
-    t, y0 = np.asarray(t, dtype=np.float64), np.atleast_1d(np.asarray(y0, dtype=np.float64))
+    t, y0 = _numbers("t", t), np.atleast_1d(_numbers("y0", y0))
     _check(method, t, rtol, step)
     n = y0.size
+    if atol is not None:
+        atol = _numbers("atol", atol)
+        if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
+            raise FvsolveError(f"atol must be a positive number, or {n} of them, one a state")
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.full(n, 1.0) if atol is None or step is not None else np.broadcast_to(atol / np.float64(size), n).copy()
     stepper = Stepper(method, n, 0, lambda: _full(n), scale)
@@ -57,6 +64,7 @@ def integrate(
     stops = t[1:] if lands else t[-1:]
     stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, n + 1))
     if f not in _COMPILED:
+        _try_out(f, t[0], y0)
         _COMPILED[f] = _functions(f, t[0], y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
     functions, _PYTHON[id(f)] = _COMPILED[f]
     handle = np.array([id(f)])
@@ -95,6 +103,24 @@ def _failure(method, code, memory) -> str:
     return when + "the solution is not finite or the step shrank to nothing; try a smaller step or a larger rtol"
 
 
+def _numbers(name, given) -> np.ndarray:
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise FvsolveError(f"{name} = {given!r} is not made of numbers") from None
+
+
+def _try_out(f, t, y0) -> None:
+    """Compiled code cannot see how many values f gives, so it is asked once before."""
+    if not callable(f):
+        raise FvsolveError(f"f = {f!r} cannot be called; wanted f(t, y) or f(t, y, dydt)")
+    if not in_place(f):
+        given = f(t, y0.copy())
+        count = 0 if given is None else np.size(given)
+        if count != y0.size:
+            raise FvsolveError(f"f(t, y) gives {count} rates for {y0.size} states")
+
+
 def _check(method, t, rtol, step) -> None:
     if rtol is not None and step is not None:
         raise FvsolveError("rtol and step both set the step; keep one")
@@ -103,14 +129,14 @@ def _check(method, t, rtol, step) -> None:
         raise FvsolveError(f"{method.name} has no error estimate; give step, or one of {able}")
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
         raise FvsolveError("t must be at least two times, rising")
+    for name, value in (("rtol", rtol), ("step", step)):
+        if value is not None and not (isinstance(value, Real) and np.isfinite(value) and value > 0):
+            raise FvsolveError(f"{name} = {value!r} is not a positive number")
     least = LEAST_STEP * np.abs(t).max(initial=0.0)
     if step is not None and 0 < step <= least:
         raise FvsolveError(f"step = {step:g} would not move the time; wanted more than {least:.2g}")
     if rtol is not None and 0 < rtol < LEAST_TOLERANCE:
         raise FvsolveError(f"rtol = {rtol:g} is below rounding; wanted {LEAST_TOLERANCE:g} or more")
-    for name, value in (("rtol", rtol), ("step", step)):
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise FvsolveError(f"{name} = {value!r} is not a positive number")
 
 
 _COMPILED: WeakKeyDictionary = WeakKeyDictionary()  # the user's function -> the loop's, and f(t, y, dydt)

@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.steppers.analysis.trees import Conditions
-from fvsolve.steppers.tableau import METHODS, Array, Method
+from fvsolve.steppers.tableau import METHODS, OWN, Array, Method
 
 DIGITS = 14  # that are left of the printed ones once Gamma has been inverted
 
@@ -119,6 +119,7 @@ def _product(x, y):
 
 
 def declare(name: str, text: str, source: str, gamma: str) -> None:
+    OWN.add(name)
     METHODS[name] = Rosenbrock(name, source, text, given_digits=DIGITS, gamma=gamma)
 
 

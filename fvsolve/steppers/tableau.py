@@ -17,6 +17,7 @@ from fvsolve.steppers.exact.expression import digits, root, value_of
 
 METHODS: dict[str, Method] = {}  # some under two names: `gauss-2` is `implicit-midpoint`
 LARGEST = 10**30  # entry
+OWN: set[str] = set()  # names of the package's own, which nobody may take
 EXACT_DECIMALS = 6  # decimals no longer than this are meant as they stand
 
 
@@ -166,6 +167,8 @@ def tableau(
     of them count. `start_weight` is the weight of f(t, y) in an embedded solution of quadrature type.
     Raises FvsolveError with all faults: rows that do not fit, that do not add up to c, entries that are no numbers.
     """
+    if name in OWN or name == "auto" or not name.strip() or name != name.strip():
+        raise FvsolveError(f'"{name}" is not free: it is empty or names a method of the package; choose another name')
     method = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     method.exact  # noqa: B018  (raises)
     METHODS[name] = method
@@ -178,8 +181,10 @@ def declare(
 ) -> Method:  # fmt: skip
     """One of the package's own methods, which is read on first use; `also` is its name within a family."""
     method = METHODS[name] = Method(name, source, text, numbers or {}, dense, start_weight, digits)
+    OWN.add(name)
     if also:
         METHODS[also] = method
+        OWN.add(also)
     return method
 
 
