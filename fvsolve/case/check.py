@@ -93,9 +93,10 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
     """Faults of times and of step control."""
     if not numerics.end > numerics.start:
         yield ("numerics", "end"), f"{numerics.end:g} s is not after the start at {numerics.start:g} s"
-    if numerics.courant is not None and not has_cells:
-        yield ("numerics", "courant"), "no pipe, so no cell to cross; give step or rtol"
     method = METHODS.get(numerics.method)
+    if numerics.courant is not None and not has_cells:
+        or_rtol = " or rtol" if method is None or method.adaptive else ""
+        yield ("numerics", "courant"), f"no pipe, so no cell to cross; give step{or_rtol}"
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.step is not None and not numerics.step > least:
         yield ("numerics", "step"), f"{numerics.step:g} s would not move the time; wanted more than {least:.2g} s"

@@ -181,8 +181,8 @@ def emit(
 @njit
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
-    coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, f_end, supply, where, ledger, scale, out,
-    out_row, values, g, g_new, armed, stored, carry, y_out, rows, work, vectors, store, store_complex,
+    coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
+    values, g, g_new, armed, stored, carry, y_out, rows, work, vectors, store, store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -204,19 +204,10 @@ def march(
         new = 3 - now - old
         if flags[PHASE] == FRESH:
             events(memory[T], y[now], handle, g)
-            flags[BENT] = 0
             if turned(g, armed):
-                if flags[BEHIND] == 1:  # the step behind ends with the slope of its own rule
-                    rhs(memory[T], y[now], f_end, out, handle)
-                    memory[CALLS] += 1.0
-                    flags[BENT] = 1
-                arm(g, armed)
-                reuse = False
-                if flags[BEHIND] == 1:  # nothing learnt under the old rule holds
-                    if orders[CONTROL] == TOLERANCE:
-                        memory[STEP] = 0.0
-                    if orders[KIND] != EXPLICIT:
-                        work[HAS], work[SEEN] = 0.0, -1.0
+                flags[BENT] = flags[BEHIND]  # what is due before its end goes by the rule of the step behind
+                if flags[BENT] == 0:
+                    arm(g, armed)
             if reuse:
                 copy(k[s - 1], k[0])
             else:
@@ -241,10 +232,18 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
-                    y[now], k[s - 1] if steep else f_end if flags[BENT] == 1 else k[0], k, dense, out_row, y_out, rows,
+                    y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows,
                 )  # fmt: skip
                 if why != DONE:
                     return why
+            if flags[BENT] == 1:  # now the other rule holds, and nothing learnt under the old one
+                arm(g, armed)
+                flags[BENT], flags[PHASE] = 0, FRESH
+                if orders[CONTROL] == TOLERANCE:
+                    memory[STEP] = 0.0
+                if orders[KIND] != EXPLICIT:
+                    work[HAS], work[SEEN] = 0.0, -1.0
+                continue
             flags[PHASE] = READY
         if memory[T] >= orders[END]:
             return DONE
@@ -319,7 +318,7 @@ def march(
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
         if next_due(orders, memory, times) <= memory[T]:
-            copy(vectors[s - 1] if steep and work[KNOWN] == 1.0 and flags[BENT] == 0 else k[0], f_old)
+            copy(vectors[s - 1] if steep and work[KNOWN] == 1.0 else k[0], f_old)
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
@@ -350,7 +349,7 @@ def compiled():
 
     i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
     march.compile(
-        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, v,
+        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, v,
          w, v, types.complex128[::1])
     )  # fmt: skip
     march.disable_compile()

@@ -27,8 +27,7 @@ class Stepper:
         self, method: Method, n: int, ledgers: int, structure: Callable[[], Structure], scale: np.ndarray
     ) -> None:
         self.structure, self.scale, self.march = structure, scale, compiled()
-        self.y, self.f_old, self.f_end = np.zeros((4, n)), np.zeros(n), np.zeros(n)
-        self.ledger = np.zeros(2 * ledgers)
+        self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(2 * ledgers)
         self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
         self.flags = np.array([told.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -116,8 +115,8 @@ class Stepper:
         """March on; returns one of the codes of `steppers.orders`."""
         return self.march(
             self.attempt, leap, observe, record, events, rhs, *self.algebra, handle, self.coefficients, self.shape,
-            self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.f_end,
-            self.supply, where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
+            self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.supply,
+            where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
             self.stored, self.carry, self.y_out, self.rows, self.work, self.vectors, self.store,
             self.store_complex,
         )  # fmt: skip
