@@ -50,8 +50,7 @@ class Stepper:
             self.attempt = attempt_of(method.kind)
         else:
             structure = self.structure()
-            with algebra_beside(structure.kind, method.kind == "full"):
-                self.attempt = attempt_of(method.kind)
+            self.attempt = attempt_of(method.kind, structure.kind)
             self.solve_by(structure, s, n, ledgers)
         self.orders[told.ORDER] = method.control_order
         self.orders[told.FSAL] = method.explicit and method.first_same_as_last
@@ -137,13 +136,16 @@ KINDS = {
 }
 
 
-def algebra_beside(kind: str, complex: bool):
-    """Have a second process compile the linear algebra meanwhile, for real and, where asked, complex shifts."""
-    code = f"from fvsolve.steppers.structure import functions; [functions({kind!r}, of) for of in {{False, {complex}}}]"
-    return beside(code, f"linear_{kind}.factor-*.nbi")
-
-
 @functools.cache
-def attempt_of(kind: str):
-    """The compiled step of a kind of methods, compiled only where one is used."""
-    return compiled_step(importlib.import_module(f"fvsolve.steppers.{KINDS[kind][0]}").attempt)
+def attempt_of(kind: str, algebra: str = ""):
+    """The compiled step of a kind of methods, compiled only where one is used.
+
+    A second process compiles the linear algebra meanwhile, for real shifts and those of full methods.
+    """
+    room = f"fvsolve.steppers.{KINDS[kind][0]}"
+    if not algebra:
+        return compiled_step(importlib.import_module(room).attempt)
+    shifts = {False, kind == "full"}
+    code = f"from fvsolve.steppers.structure import functions; [functions({algebra!r}, of) for of in {shifts}]"
+    with beside(code, f"linear_{algebra}.factor-*.nbi"):
+        return compiled_step(importlib.import_module(room).attempt)
