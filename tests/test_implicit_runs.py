@@ -254,3 +254,12 @@ def test_a_tank_that_runs_dry_through_another_does_not_stop_newton(rtol):
     result = fvsolve.run(scene(nodes, links, 60.0, {"method": "esdirk-4", "rtol": rtol}, ["a.level"], 1.0))
     assert result.ok, result.reason
     assert result.ledger["mass"]["relative"] < 1e-13
+
+
+@pytest.mark.parametrize(
+    "numerics", [{"method": name, "rtol": 1e-6} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")], ids=said
+)
+def test_a_scene_without_a_state_runs_as_any_other(numerics):
+    nodes = {"high": reservoir(3e5), "low": reservoir(1e5)}
+    result = fvsolve.run(scene(nodes, {"hole": valve("high", "low", 1e-3)}, 1.0, numerics, ["hole.flow"], 0.1))
+    assert result.ok and result["hole.flow"] == pytest.approx(1e-3 * math.sqrt(2 * 2e5 / 1000.0), rel=1e-12)

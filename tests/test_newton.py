@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from truth.scenes import WATER, chamber, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import METHODS, integrate
+from fvsolve.solve.loop import Loop
+from fvsolve.steppers import METHODS, integrate, orders
 
+CASES = Path(__file__).parent.parent / "cases"
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]
 ITERATED = [name for name in IMPLICIT if METHODS[name].kind != "linear"]
@@ -180,3 +183,27 @@ def test_a_summary_counts_what_newton_did():
     assert said["rhs"] >= said["steps"] + 3 * said["newton"] + said["jacobians"]
     explicit = fvsolve.run({**case, "numerics": {"end": 0.05, "method": "dormand-prince"}}).summary
     assert [explicit[what] for what in ("jacobians", "factorisations", "newton", "newton_failures")] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("name", ["radau-iia-5", "esdirk-4"])
+def test_what_is_remembered_twice_has_no_factors_either(name):
+    """A resumed run may be stored again before it has taken a step."""
+    model = fvsolve.build(fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name}))
+    loop = Loop(model)
+    loop.begin(0.01, 1e308)
+    assert loop.run(30) == orders.CHUNK
+    memory, states = flat(loop), []
+    for _ in range(2):  # stored and taken back
+        again = Loop(model)
+        again.stepper.remember(memory)
+        memory = flat(again)
+    again.now[:] = loop.now
+    for one in (loop, again):
+        one.resume(0.01, 1e308)
+        one.run(5)
+        states.append(one.now.copy())
+    assert np.array_equal(*states) and loop.stepper.counts() == again.stepper.counts()
+
+
+def flat(loop) -> np.ndarray:
+    return np.concatenate([view.ravel() for view in loop.stepper.memories()])

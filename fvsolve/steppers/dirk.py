@@ -81,7 +81,7 @@ def solve_stage(
         solve(shape, store, d)
         for j in range(n):
             ki[j] += shift * d[j]
-        size = sqrt(size_of(d, weights) / n)
+        size = sqrt(size_of(d, weights) / max(n, 1))
         done, why = verdict(turn, size, before, orders, work)
         before = size
         if done:

@@ -59,7 +59,7 @@ W, F, R = range(3)
 
 
 def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
-    """[T, T^-1, L, T L, T^-1 P, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
+    """[T, T^-1, L, T L, P, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
 
     Pairs in L stand as [[a, -b], [b, a]], b > 0. P, ahead : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of
     the j-th Lagrange polynomial on c: what the last step's slopes say of this one; zero where c repeats.
@@ -213,7 +213,7 @@ def iterate(
                 vectors[w_at + i, e] += r
                 part += r * r
             total += per * per * part
-        size = sqrt(total / (q * n))
+        size = sqrt(total / max(q * n, 1))
         done, why = verdict(turn, size, before, orders, work)
         before = size
         if done:
@@ -265,7 +265,7 @@ def filtered_error(
         for e in range(n):
             w = d[e] / (orders[SIZE] * (scale[e] + max(abs(y[now, e]), abs(y[new, e]))))
             found += w * w
-        found = sqrt(found / n)
+        found = sqrt(found / max(n, 1))
         if found < 1.0 or turn == 1 or not doubt:
             break
         for e in range(n):
@@ -294,7 +294,7 @@ def attempt(
             renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
         why = FAILED
         if work[SHIFT] != 1.0 / h:
-            factors = (store.size + store_complex.size - n) // int(work[STORE])
+            factors = (store.size + store_complex.size - n) // max(int(work[STORE]), 1)
             memory[FACTORS] += 0.0 if work[SHIFT] == -1.0 / h else factors
             work[SHIFT] = 0.0
             if factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):

@@ -1,7 +1,7 @@
 """What implicit steps share: Jacobian and factors and when to renew them, stopping of Newton. Knows no tableau.
 
-Kept between steps: `work`, a header and the Jacobian; the first rows of `vectors`, the last step's stages. A restart
-stores both and factors anew: factors follow from the Jacobian and the shift to the last bit.
+Kept between steps: `work`, a header and the Jacobian; in `vectors` f at the last step's start; its stages. A restart
+stores them (`Stepper.memories`) and factors anew: factors follow from the Jacobian and the shift to the last bit.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ class Stepper:
             view[...] = memory[: view.size].reshape(view.shape)
             memory = memory[view.size :]
         if self.work.size:
-            self.work[told.SHIFT] *= -1.0  # to be factored once more, which is not counted again
+            self.work[told.SHIFT] = -abs(self.work[told.SHIFT])  # to be factored once more, which is not counted again
         return memory
 
     def counts(self) -> dict[str, int]:
