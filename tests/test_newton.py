@@ -197,6 +197,7 @@ def test_what_is_remembered_twice_has_no_factors_either(name):
         again = Loop(model)
         again.stepper.remember(memory)
         memory = flat(again)
+    assert again.stepper.work[orders.SHIFT] == -loop.stepper.work[orders.SHIFT] < 0.0  # the sign of factors to be made
     again.now[:] = loop.now
     for one in (loop, again):
         one.resume(0.01, 1e308)
