@@ -7,7 +7,7 @@ from functools import cached_property
 import networks
 import numba
 import numpy as np
-from numbalsoda import address_as_void_pointer
+from pointer import pointer
 from scipy.sparse import csc_array, hstack
 from scipy.sparse.linalg import expm_multiply
 
@@ -87,8 +87,8 @@ class Acoustics:
 
         @numba.njit(error_model="numpy")
         def function(t, y, dydt):
-            tables = numba.carray(address_as_void_pointer(handle_at), handle_size, np.int64)
-            beside = numba.carray(address_as_void_pointer(out_at), out_size, np.float64)
+            tables = numba.carray(pointer(handle_at), handle_size, np.int64)
+            beside = numba.carray(pointer(out_at), out_size, np.float64)
             rhs(t, y, dydt, beside, tables)
 
         return function

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
 
 import numpy as np
@@ -99,5 +99,13 @@ def machine(*packages: str) -> str:
     """Processor and versions, in a line."""
     with open("/proc/cpuinfo") as lines:
         names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
-    versions = ", ".join(f"{p} {version(p)}" for p in packages)
+    versions = ", ".join(f"{p} {installed(p)}" for p in packages)
     return f"{names[0] if names else platform.processor()}; Python {platform.python_version()}, {versions}"
+
+
+def installed(package: str) -> str:
+    """Its version, if any."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

@@ -45,12 +45,12 @@ def node(name, kind, head, demand=0.0):
     return n
 
 
-def timed(solver, end, dt, repeats=1):
-    """Best CPU time [s] of `repeats` runs, and the results of one."""
+def timed(solver, end, dt, repeats=1, friction=None):
+    """Best CPU time [s] of `repeats` runs, and the results of one; `friction`: usf_tau [s], k_bru; steady if None."""
     best = np.inf
     for _ in range(repeats):
         start = process_time()
-        results = solver.run(end, dt, OUT_OF_REACH, dt, 0.0)
+        results = solver.run(end, dt, OUT_OF_REACH, *(friction or (dt, 0.0)))
         best = min(best, process_time() - start)
     return best, results
 
@@ -114,7 +114,7 @@ def hazen_williams(pipe):
     return (10.44 / (slope * (pipe.diameter / INCH) ** 4.871)) ** (1 / 1.852) * pipe.flow / GPM
 
 
-def uniform_pipe(uniform, nodes, steps, repeats=1):
+def uniform_pipe(uniform, nodes, steps, repeats=1, friction=None):
     """One pipe with friction whose gate shuts: `nodes` reaches, `steps` steps at Courant 1."""
     dt = uniform.length / uniform.wave_speed / nodes
     solver = rthym_moc.MOCSolver()
@@ -125,5 +125,5 @@ def uniform_pipe(uniform, nodes, steps, repeats=1):
     solver.add_pipe(p)
     shut = [(-dt, uniform.flow / GPM), (uniform.duration - dt, 0.0)]
     solver.set_demand_schedule("gate", shut)
-    cpu, results = timed(solver, (steps - 0.5) * dt, dt, repeats)
+    cpu, results = timed(solver, (steps - 0.5) * dt, dt, repeats, friction)
     return Trace(cpu, np.asarray(results["time"]), np.asarray(results["node_head"]["gate"]) * FOOT)

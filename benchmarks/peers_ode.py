@@ -11,10 +11,15 @@ import numba
 import numpy as np
 from measure import Solver
 from numba import types
-from numbalsoda import address_as_void_pointer, dop853, lsoda, lsoda_sig
+from pointer import pointer
 from scipy import sparse
 from scipy.integrate import odeint, solve_ivp
 from sksundae.cvode import CVODE
+
+try:
+    import numbalsoda
+except ImportError:
+    numbalsoda = None
 
 MANY = 10**8  # steps allowed between two times
 
@@ -34,7 +39,7 @@ class Problem:
 
 def peers(problem: Problem) -> list[Solver]:
     """All that are made for stiff problems."""
-    found = [numba_lsoda(problem), *cvodes(problem)]
+    found = [*numbalsodas(problem, "LSODA"), *cvodes(problem)]
     return found + [scipy_ivp(problem, name) for name in ("Radau", "BDF", "LSODA")] + [scipy_odeint(problem)]
 
 
@@ -49,46 +54,38 @@ def address(problem: Problem):
         data[0] += 1.0
         rhs(t, numba.carray(u, (n,)), numba.carray(du, (n,)))
 
-    return numba.cfunc(lsoda_sig)(function)
+    return numba.cfunc(numbalsoda.lsoda_sig)(function)
 
 
-def numba_lsoda(problem: Problem) -> Solver:
-    """LSODA in C++, compiled f. It knows full matrices only."""
-    function = address(problem)
+def numbalsodas(problem: Problem, *names: str) -> list[Solver]:
+    """Its LSODA (C++; it knows full matrices only) and DOP853 (Fortran), compiled f; none where it is not installed."""
+    if numbalsoda is None:
+        print(f"numbalsoda is not installed: its {' and '.join(names)} left out")
+        return []
+    return [numba_solver(problem, name) for name in names]
+
+
+def numba_solver(problem: Problem, name: str) -> Solver:
+    """One of them by its name."""
+    function, run = address(problem), getattr(numbalsoda, name.lower())
     counter = np.zeros(1)
 
     def solve(tolerance):
         counter[0] = 0.0
-        y, well = lsoda(function.address, problem.y0, problem.t, counter, tolerance, tolerance, MANY)
+        y, well = run(function.address, problem.y0, problem.t, counter, tolerance, tolerance, MANY)
         return y if well else np.full_like(y, np.nan)
 
     def count(tolerance):
         solve(tolerance)
         return np.nan, counter[0]
 
-    return Solver("numbalsoda LSODA", solve, count)
-
-
-def numba_dop853(problem: Problem) -> Solver:
-    """DOP853 in Fortran, compiled f."""
-    function = address(problem)
-    counter = np.zeros(1)
-
-    def solve(tolerance):
-        counter[0] = 0.0
-        y, well = dop853(function.address, problem.y0, problem.t, counter, tolerance, tolerance, MANY)
-        return y if well else np.full_like(y, np.nan)
-
-    def count(tolerance):
-        solve(tolerance)
-        return np.nan, counter[0]
-
-    return Solver("numbalsoda DOP853", solve, count)
+    return Solver(f"numbalsoda {name}", solve, count)
 
 
 def explicit_reference(problem: Problem, tolerance: float = 1e-13) -> np.ndarray:
-    """y at all times by DOP853, whose steps stability keeps short."""
-    return numba_dop853(problem).solve(tolerance)
+    """y at all times by DOP853, whose steps stability keeps short; by SciPy's where there is no numbalsoda."""
+    solver = scipy_ivp(problem, "DOP853") if numbalsoda is None else numba_solver(problem, "DOP853")
+    return solver.solve(tolerance)
 
 
 # scikit-sundae ------------------------------------------------------------------------------------------------
@@ -120,7 +117,7 @@ def cvode(problem: Problem, name: str, options: dict) -> Solver:
 
     @numba.njit(types.void(types.float64, READ, WRITE), error_model="numpy")
     def function(t, y, yp):  # y is read-only there, which is another type to numba
-        rhs(t, numba.carray(address_as_void_pointer(y.ctypes.data), y.size, np.float64), yp)
+        rhs(t, numba.carray(pointer(y.ctypes.data), y.size, np.float64), yp)
 
     def solver(tolerance):
         return CVODE(function, rtol=tolerance, atol=tolerance, max_num_steps=MANY, **options)

@@ -3,22 +3,27 @@
 import numpy as np
 
 
+def front(runs):
+    """Runs that beat all cheaper ones, cheapest first."""
+    runs = sorted(runs)
+    return [(cost, error) for k, (cost, error) in enumerate(runs) if all(error < e for _, e in runs[:k])]
+
+
 def price(runs, target):
     """Cost at which runs, (cost, error) each, reach an error, and how it was found.
 
-    "": log-log between the two runs about it, counting only runs that beat all cheaper ones; "<": the
-    cheapest run is better already; "~": beyond the best run, along the least-squares line of the logarithms.
+    "": log-log between the two runs of the front about it; "<": the cheapest run is better already; "~": beyond the
+    best run, along the least-squares line of the logarithms of all.
     """
-    runs = sorted(runs)
-    front = [(cost, error) for k, (cost, error) in enumerate(runs) if all(error < e for _, e in runs[:k])]
-    if front[0][1] <= target:
-        return front[0][0], "<"
-    for (cost_a, error_a), (cost_b, error_b) in zip(front, front[1:], strict=False):
+    best = front(runs)
+    if best[0][1] <= target:
+        return best[0][0], "<"
+    for (cost_a, error_a), (cost_b, error_b) in zip(best, best[1:], strict=False):
         if error_b <= target:
             part = np.log(error_a / target) / np.log(error_a / error_b)
             return cost_a * (cost_b / cost_a) ** part, ""
     if len(runs) < 2:
         return np.nan, "~"
-    costs, errors = np.log(np.array(runs)).T
+    costs, errors = np.log(np.array(sorted(runs))).T
     slope, level = np.polyfit(costs, errors, 1)
-    return max(front[-1][0], np.exp((np.log(target) - level) / slope)), "~"
+    return max(best[-1][0], np.exp((np.log(target) - level) / slope)), "~"

@@ -9,12 +9,12 @@ import numba
 import numpy as np
 from measure import Run, Solver, against, chart
 from peers_ode import Problem, explicit_reference, peers
-from price import price
+from price import front, price
 
 import fvsolve
 from fvsolve.steppers.methods import METHODS
 
-TARGETS = (1e-3, 1e-6, 1e-9)
+TARGETS = (1e-3, 1e-5, 1e-6, 1e-7, 1e-9)
 DEFAULT = "radau-iia-5"
 GOALS = {"scikit-sundae CVODE": 15.0, "SciPy Radau": 90.0, "numbalsoda LSODA": 1 / 1.5}  # times slower, at 1e-6
 PICTURE = Path(__file__).with_name("stiff.png")
@@ -35,7 +35,8 @@ def cylinder_table(quick: bool) -> None:
     print(f"{cylinder.greatest_eigenvalue(problem.t, truth):.1e} 1/s; ", end="")
     print(f"the reference (DOP853, 1e-13) and Dormand-Prince at 1e-12 differ by {distance(other):.0e}")
     tolerances = 10.0 ** -(np.array([3.0, 5, 7, 9]) if quick else np.arange(3.0, 11.0))
-    solvers = [fvsolve_solver(problem, name) for name in implicit_methods()] + peers(problem)
+    methods = [*implicit_methods(), "auto", "dormand-prince"]
+    solvers = [fvsolve_solver(problem, name) for name in methods] + peers(problem)
     charts = chart(solvers, tolerances, distance, 0.06 if quick else 0.3)
     for target in TARGETS:
         verdict(charts, target)
@@ -64,7 +65,7 @@ def fvsolve_solver(problem: Problem, method: str) -> Solver:
 
 def verdict(charts: dict[str, list[Run]], target: float) -> None:
     """Print what an error costs, each peer beside fvsolve's best method and its default."""
-    prices = {name: price([(r.wall, r.error) for r in runs], target) for name, runs in charts.items() if runs}
+    prices = {name: price(front([(r.wall, r.error) for r in runs]), target) for name, runs in charts.items() if runs}
     prices = {name: found for name, found in prices.items() if np.isfinite(found[0])}
     ours = {name: cost for name, (cost, _) in prices.items() if name.startswith("fvsolve")}
     quickest = min(ours, key=ours.get) if ours else "fvsolve"
@@ -84,7 +85,8 @@ def draw(charts: dict[str, list[Run]]) -> None:
     for k, (name, runs) in enumerate(charts.items()):
         line = "-" if name.startswith("fvsolve") else "--"
         where = [r.error for r in runs], [r.wall * 1e3 for r in runs]
-        axes.loglog(*where, line, marker=".", lw=1.3, color=style.COLOURS[k % len(style.COLOURS)], label=name)
+        again, colour = divmod(k, len(style.COLOURS))
+        axes.loglog(*where, line, marker=".x+"[again], ms=5, lw=1.3, color=style.COLOURS[colour], label=name)
     axes.set_xlabel("greatest error of the trajectory, in each state's range", fontsize=8.5, color=style.INK)
     axes.set_ylabel("wall time [ms]", fontsize=8.5, color=style.INK)
     axes.grid(True, color=style.HAIR, linewidth=0.5)

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from acoustics import END, Acoustics
 from measure import Solver, against, best, chart
-from peers_ode import Problem, cvode, cvode_options, numba_dop853, numba_lsoda, scipy_ivp, scipy_odeint
+from peers_ode import Problem, cvode, cvode_options, numbalsodas, scipy_ivp, scipy_odeint
 from price import price
 from stiff_cylinder import implicit_methods
 
@@ -74,7 +74,7 @@ def pipe_peers(pulse: Acoustics) -> list[Solver]:
     straight = Problem(pulse.rhs, pulse.start.y, t)
     mixed = Problem(pulse.rhs_mixed, pulse.start.y[pulse.mixed], t, pulse.band)
     back = np.argsort(pulse.mixed)
-    found = [at_end(solver, slice(None)) for solver in (numba_dop853(straight), numba_lsoda(straight))]
+    found = [at_end(solver, slice(None)) for solver in numbalsodas(straight, "DOP853", "LSODA")]
     banded = [
         cvode(mixed, "scikit-sundae CVODE, band", cvode_options(mixed)),
         cvode(mixed, "scikit-sundae CVODE Adams, band", cvode_options(mixed) | {"method": "Adams"}),

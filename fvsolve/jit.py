@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["argument", "beside", "cache_folder", "inner", "njit", "source_hash"]
+__all__ = ["argument", "beside", "cache_folder", "composed_folder", "inner", "njit", "source_hash"]
 
 KEPT = 3  # generations of compiled code kept beside the present one
 
@@ -57,14 +57,15 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
     Arrays are not reference counted (`_nrt=False`): each count is an atomic operation, and with the tables of a
     model they cost microseconds a step. So compiled code allocates nothing; a function that must says `_nrt=True`.
     Used bare or with numba's own options. With `NUMBA_DISABLE_JIT=1` the plain function comes back.
-    Only functions of `ROOMS` are cached: the hash does not see other files, and `exec` has none.
+    Only functions of `ROOMS` and of modules written from them are cached: the hash does not see other files.
     """
     if function is None:
         return functools.partial(njit, **options)
     if _disabled():
         return function
     numba = _numba()
-    cache = Path(function.__code__.co_filename).resolve() in _sources()
+    home = Path(function.__code__.co_filename).resolve()
+    cache = home in _sources() or home.parent == composed_folder().resolve()
     options = {"error_model": "numpy", "cache": cache, "_nrt": False} | options
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_code_folder()) if options["cache"] else before
@@ -154,6 +155,14 @@ def _code_folder() -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     os.utime(folder)
     _prune(folder)
+    return folder
+
+
+@functools.cache
+def composed_folder() -> Path:
+    """Where modules that are written from others lie, and go with the sources they were written from."""
+    folder = _code_folder() / "composed"
+    folder.mkdir(exist_ok=True)
     return folder
 
 

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 DENSE = 300  # unknowns up to which a dense solver is quicker
+DAMPING = 1e-12
+ROUNDING = 1e-13  # of changes of Newton, relative to the scales
 SMALL_DROP = 1e-12  # relative difference of potentials that is rounding
 SMALL = 1e-9  # relative residual below which a node counts as balanced
 
@@ -31,6 +33,9 @@ class Edge:
     flow: float = 0.0
     shut: bool = False
     drop: Callable[[float], float] | None = None  # pressure drop at a held flow
+    senses: int = -1  # node whose potential `row` takes as third, and weighs by a fourth number
+    holds: tuple[int, float] | None = None  # node and the potential [Pa] that its flow keeps it at, in place of `row`
+    drives: bool = False  # it makes flow between equal potentials
 
 
 @dataclass
@@ -84,7 +89,8 @@ def _quiet(held, demand, edges) -> set[int]:
     quiet = set()
     for group in _components(held, edges)[0]:
         given = np.array([held[i] for i in group if not np.isnan(held[i])])
-        if given.size == 0 or any(demand[i] != 0.0 or (i in fed and np.isnan(held[i])) for i in group):
+        driven = any(edge.i in group and (edge.drives or edge.holds is not None) for edge in edges)
+        if driven or given.size == 0 or any(demand[i] != 0.0 or (i in fed and np.isnan(held[i])) for i in group):
             continue
         if np.ptp(given) <= SMALL_DROP * (1e5 + np.max(np.abs(given))):
             quiet |= {e for e, edge in enumerate(edges) if edge.row is not None and not edge.shut and edge.i in group}
@@ -159,7 +165,7 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
     if not column:
         return
     p_scale, f_scale = scale
-    change, at = np.zeros(0), {i: k for k, i in enumerate(balances, start=len(rows))}
+    most, change, at = np.inf, np.zeros(0), {i: k for k, i in enumerate(balances, start=len(rows))}
     for sweep in range(200):
         entries, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
         for k, e in enumerate(rows):
@@ -176,17 +182,27 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
         change = _solve(entries, right, len(column), result)
         result.flow[active] += change[: len(active)] * f_scale
         result.potential[nodes] += change[len(active) :] * p_scale
-        most = np.max(np.abs(change), initial=0.0)
+        before, most = most, np.max(np.abs(change), initial=0.0)
         if most <= 1e-15 * (1.0 + np.max(np.abs(result.flow), initial=0.0) / f_scale) or (sweep > 20 and most < 1e-12):
+            return
+        if before <= 2.0 * most < ROUNDING:  # no closer: what is left is rounding
             return
     result.converged = bool(np.max(np.abs(change), initial=0.0) < 1e-9)
 
 
 def _edge_row(entries, column, k, e, edge, result, scale) -> float:
     """Write row k, alpha dM - beta d(drop) = gamma of one edge, in scaled unknowns; returns its right-hand side."""
+    if edge.holds is not None:
+        entries.append((k, column["node", edge.holds[0]], 1.0))
+        return (edge.holds[1] - result.potential[edge.holds[0]]) / scale[0]
     drop = result.potential[edge.i] - result.potential[edge.j]
     if ("flow", e) in column:
-        alpha, beta, gamma = edge.row(result.flow[e], drop)
+        if edge.senses < 0:
+            alpha, beta, gamma = edge.row(result.flow[e], drop)
+        else:
+            alpha, beta, gamma, lift = edge.row(result.flow[e], drop, result.potential[edge.senses])
+            if ("node", edge.senses) in column:
+                entries.append((k, column["node", edge.senses], -lift))
         entries.append((k, column["flow", e], alpha * scale[1] / scale[0]))
     else:
         beta, gamma = 1.0, drop - edge.drop(result.flow[e])
@@ -199,14 +215,10 @@ def _edge_row(entries, column, k, e, edge, result, scale) -> float:
 def _solve(entries, right, size, result):
     """Least-norm solution of the Newton system; remembers whether it had to choose."""
     i, j, values = (np.array(part) for part in zip(*entries, strict=True))
-    if len(right) == size > DENSE:
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-        try:
-            return splu(csc_matrix((values, (i, j)), shape=(size, size))).solve(right)
-        except RuntimeError:  # singular
-            pass
+    if max(len(right), size) > DENSE:
+        found, chosen = _solve_sparse(values, i, j, right, size)
+        result.split = result.split or chosen
+        return found
     matrix = np.zeros((len(right), size))
     np.add.at(matrix, (i, j), values)
     if len(right) == size:
@@ -219,6 +231,26 @@ def _solve(entries, right, size, result):
     found, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
     result.split = result.split or rank < size
     return found
+
+
+def _solve_sparse(values, i, j, right, size):
+    """The same of a large system, and whether it had to choose.
+
+    Where it is singular: r + A x = b, A' r = DAMPING x, the x that makes |A x - b|^2 + DAMPING |x|^2 least.
+    """
+    from scipy.sparse import bmat, csc_matrix, identity
+    from scipy.sparse.linalg import splu
+
+    matrix = csc_matrix((values, (i, j)), shape=(len(right), size))
+    if len(right) == size:
+        try:
+            found = splu(matrix).solve(right)
+            if np.all(np.isfinite(found)) and np.max(np.abs(matrix @ found - right)) < 1e-6:
+                return found, False
+        except RuntimeError:  # singular
+            pass
+    whole = bmat([[identity(len(right)), matrix], [matrix.T, -DAMPING * identity(size)]], format="csc")
+    return splu(whole).solve(np.concatenate((right, np.zeros(size))))[len(right) :], True
 
 
 def _through_shut(result, held, edges, free_sets, floating):

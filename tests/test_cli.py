@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import fvsolve
-from fvsolve.cli import main
 
 CASE = """
 title = "A valve shuts"
@@ -63,19 +62,6 @@ def case(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "shut.toml").write_text(CASE)
     return "shut.toml"
-
-
-@pytest.fixture
-def fvs(monkeypatch, capsys):
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fvsolve", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err + said.out
-        return left.value.code or 0, said.out, said.err
-
-    return call
 
 
 def test_run_tells_the_extremes_the_claims_and_the_files(case, fvs):

@@ -210,9 +210,24 @@ def busy(numerics: dict) -> dict:
     return case
 
 
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
-@pytest.mark.parametrize("method", ["dormand-prince", "auto", "rodas-5p", "radau-iia-5", "radau-iia-9", "esdirk-4"])
-def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(method, rtol):
+BALL = {  # rtol, method: errors at the end as measured, of the position [m] and of the velocity [m/s]
+    (1e-4, "dormand-prince"): (5.2e-4, 1.7e-2),
+    (1e-4, "auto"): (5.2e-4, 1.7e-2),
+    (1e-4, "rodas-5p"): (4.4e-5, 1.6e-5),
+    (1e-4, "radau-iia-5"): (6.5e-5, 6.3e-4),
+    (1e-4, "radau-iia-9"): (8.6e-5, 9.8e-4),
+    (1e-4, "esdirk-4"): (8.5e-4, 6.3e-3),
+    (1e-6, "dormand-prince"): (3.1e-5, 6.2e-4),
+    (1e-6, "auto"): (3.1e-5, 6.2e-4),
+    (1e-6, "rodas-5p"): (1.3e-6, 2.4e-5),
+    (1e-6, "radau-iia-5"): (6.4e-7, 1.1e-5),
+    (1e-6, "radau-iia-9"): (7.0e-7, 1.5e-5),
+    (1e-6, "esdirk-4"): (1.35e-5, 1.2e-4),
+}
+
+
+@pytest.mark.parametrize("rtol, method", BALL)
+def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
     """The force of the dashpot sets in with a jump, which differences must not take for a slope."""
     nodes = {"ground": {"type": "frame"}, "ball": {"type": "mass", "mass": 2.0, "initial_position": 0.1}}
     nodes["ball"]["initial_velocity"] = -1.0
@@ -235,8 +250,9 @@ def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(method, rtol):
             rtol=1e-12, atol=1e-14,
         )  # fmt: skip
         t, (x, v) = t + contact.t[-1], contact.y[:, -1]
-    assert (result["ball.position"][-1], result["ball.velocity"][-1]) == (
-        pytest.approx(x, abs=300 * rtol), pytest.approx(v, abs=3000 * rtol))  # fmt: skip
+    of_x, of_v = BALL[rtol, method]
+    assert result["ball.position"][-1] == pytest.approx(x, abs=1.5 * of_x)
+    assert result["ball.velocity"][-1] == pytest.approx(v, abs=max(1.5 * of_v, rtol))  # that of rodas-5p is luck
 
 
 def released(_, s):

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from truth import scenes
 from truth.log_law import LogFluid, Riemann, SimpleWave
 from truth.orders import observed_order
-from truth.scenes import AMBIENT, junction, reservoir, scene, stiff_pipe
+from truth.scenes import AMBIENT, chamber, junction, lake, pipe, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
 
@@ -257,3 +257,24 @@ def test_under_the_table_law_a_stopped_stream_rises_along_the_isentrope_of_coolp
     found = result["gate.pressure"][(result.t > 0.1) & (result.t < 0.5)]
     assert u == pytest.approx(velocity, rel=1e-3)
     assert found - p == pytest.approx(wanted - p, rel=1e-4)
+
+
+@pytest.mark.parametrize("law", [{"law": "log"}, {"law": "mixture", "air_fraction": 0.01}])
+def test_a_valve_through_which_nothing_flows_is_solved_to_the_rounding_of_pressures(law):
+    """A chamber behind a valve in equilibrium with a flowing main: its drop is rounding, and so would be its flow."""
+    rough = {"friction": {"model": "quasi-steady", "roughness": 1e-4}}
+    nodes = {
+        "hill": lake(60.0), "low": lake(40.0), "top": junction(elevation=48.0), "fork": junction(elevation=5.0),
+        "pot": chamber(0.1, elevation=20.0),
+    }  # fmt: skip
+    links = {
+        "up": pipe("hill", "top", 200.0, 0.1, 1200.0, 12, **rough),
+        "down": pipe("top", "fork", 300.0, 0.1, 1100.0, 18, **rough),
+        "on": pipe("fork", "low", 150.0, 0.08, 1200.0, 9, **rough),
+        "neck": valve("fork", "pot", 1e-4),
+    }
+    fluid = {"name": "user", "density": 870.0, "bulk_modulus": 1.7e9, "viscosity": 0.04, "vapor_pressure": 10.0, **law}
+    case = scene(nodes, links, 0.5, {"scheme": "weno5", "method": "rk4", "courant": 0.4}, ["pot.pressure"], fluid=fluid)
+    done = fvsolve.run(case)
+    assert done.ok, done.reason
+    assert np.ptp(done["pot.pressure"]) == 0.0

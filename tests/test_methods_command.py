@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
-import sys
 from pathlib import Path
 
 import pytest
 
-from fvsolve.cli import main
 from fvsolve.steppers import METHODS, Facts, analyse
 
 DOCS = (Path(__file__).parent.parent / "docs" / "choosing-a-method.md").read_text(encoding="utf-8")
@@ -22,18 +20,10 @@ ASKED = {
 
 
 @pytest.fixture
-def said(monkeypatch, capsys, tmp_path):
+def said(fvs, monkeypatch, tmp_path):
     """Runs a command in an empty directory; gives exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fvsolve", *words])
-        with pytest.raises(SystemExit) as end:
-            main()
-        found = capsys.readouterr()
-        return end.value.code or 0, found.out, found.err
-
-    return run
+    return fvs
 
 
 def test_the_table_names_every_method(said):

@@ -103,6 +103,15 @@ def test_nor_does_the_log_law_move_the_pipes(scheme):
     assert moved(result, "middle.level") < 1e-4
 
 
+@pytest.mark.parametrize("air", [{"air_fraction": 0.01}, {"air_fraction": 0.02, "gas_exponent": 1.4}])
+def test_nor_does_air_in_the_water(air):
+    case = town(ROUGH, {"scheme": "muscl"}, 20.0)
+    result = fvsolve.run({**case, "fluid": {**scenes.WATER, "law": "mixture", **air}})
+    assert result.ok
+    names = [n for n in still_probes(result)[0] if n.split(".")[0] not in ("in", "on")]
+    assert {n: moved(result, n) for n in names if moved(result, n) != 0.0} == {}
+
+
 @pytest.mark.parametrize("method", ["euler", "rk4", "bogacki-shampine", "dormand-prince"])
 def test_no_method_moves_it(method):
     settings = {"scheme": "upwind", "method": method}

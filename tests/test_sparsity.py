@@ -16,7 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.march import function_types
+from fvsolve.steppers.signatures import function_types
 from fvsolve.steppers.structure import KINDS, Structure
 
 CASES = sorted((Path(__file__).parent.parent / "cases").glob("*.toml"))

@@ -74,14 +74,15 @@ def test_two_tanks_level_in_finite_time_and_rest(levels, numerics, near):
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-@pytest.mark.parametrize("numerics", [CLOSE, {}], ids=["tight", "default"])
-def test_levelled_tanks_stay_within_the_laminar_width_and_do_not_chatter(numerics):
-    """A fixed explicit step cannot promise this: it is longer than that width is stable for."""
+@pytest.mark.parametrize("numerics, drop", [(CLOSE, 0.0), ({}, 1e-7)], ids=["tight", "default"])
+def test_levelled_tanks_stay_within_the_laminar_width_and_do_not_chatter(numerics, drop):
+    """Or, by default, within the tolerance of their levels, 1e-6 of 0.1 m. Fixed explicit steps cannot promise this."""
     nodes = {"one": tank(2.0, 1.5), "two": tank(3.0, 1.0), "air": reservoir(AMBIENT)}
     links = {"gap": valve("one", "two", 0.02), "shut": valve("two", "air", 0.01, 0.0)}
     end = 2 * math.sqrt(0.5) / (0.02 * math.sqrt(2 * GRAVITY) * (1 / 2.0 + 1 / 3.0)) + 60.0
     result = fvsolve.run(scene(nodes, links, end, numerics, ["gap.flow"], 0.37))
-    assert np.max(np.abs(result["gap.flow"][result.t > end - 50.0])) < laminar_flow(0.02)
+    most = max(laminar_flow(0.02), 0.02 * math.sqrt(2 * GRAVITY * drop))
+    assert np.max(np.abs(result["gap.flow"][result.t > end - 50.0])) < most
 
 
 def test_a_drained_tank_stays_within_the_laminar_width_and_does_not_chatter():

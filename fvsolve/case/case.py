@@ -11,7 +11,7 @@ from typing import Any
 from fvsolve.case import text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
-from fvsolve.case.sections import DEFAULT_CELLS, FluidSpec, Numerics, Output
+from fvsolve.case.sections import DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.fluid import Fluid
 from fvsolve.parts import Link, Node, Pipe
 from fvsolve.parts.table import plain
@@ -43,6 +43,7 @@ class Case:
     output: Output
     expect: dict[str, Expect]
     compare: dict[str, Compare]
+    exact: ExactSpec | None
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
     folder: Path | None = field(repr=False)
@@ -62,11 +63,22 @@ class Case:
     @cached_property
     def places(self) -> dict[str, Node]:
         """Places of the fluid: hydraulic nodes, then the chambers that cylinders own, as they are at the start."""
-        found = {name: node for name, node in self.nodes.items() if node.domain == "hydraulic"}
+        found = {}
+        for name, node in self.nodes.items():
+            found |= node.inner(name)[0] if node.domain == "hydraulic" else {}
         for name, link in self.links.items():
-            if link.owns:
+            found |= link.inner(name)[0]
+            if "A" in link.owns:
                 rod, case = (self.nodes[link.ports[port]].initial_position for port in ("rod", "case"))
                 found |= {f"{name}.{place}": chamber for place, chamber in link.chambers(rod - case).items()}
+        return found
+
+    @cached_property
+    def conduits(self) -> dict[str, Link]:
+        """Links as they are solved: those of the file, and what parts own, such as the inlet of a tank."""
+        found = {}
+        for name, part in [*self.nodes.items(), *self.links.items()]:
+            found |= part.inner(name)[1]
         return found
 
     @property
@@ -80,6 +92,8 @@ class Case:
         A reservoir given by head may leave it out where others state theirs: it then lies level with the
         first node that one of its links leads to, since its head alone drives the flow.
         """
+        if (beside := getattr(self.places[name], "level_of", None)) is not None:
+            return self.elevation(beside)
         stated = self.places[name].elevation
         if stated is not None or not self.elevations_stated:
             return stated or 0.0
@@ -115,6 +129,7 @@ class Case:
             "output": self.output.table(),
             "expect": {name: one.table() for name, one in self.expect.items()},
             "compare": {name: one.table() for name, one in self.compare.items()},
+            "exact": self.exact.table() if self.exact else {},
         }
         return {key: value for key, value in said.items() if value not in ("", {})}
 

@@ -10,10 +10,24 @@ from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
 from fvsolve.case.sections import Numerics
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import KINDS, Chamber, Cylinder, EndStop, Reservoir, Spring
+from fvsolve.parts import (
+    KINDS,
+    Accumulator,
+    Chamber,
+    Cylinder,
+    EndStop,
+    Junction,
+    Leak,
+    Pump,
+    Reservoir,
+    Spring,
+    Torque,
+)
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show
+
+CAVITY_SCHEMES = ("upwind", "muscl")  # the others reach over a cavity's edge
 
 Found = Iterator[tuple[tuple, str]]
 
@@ -51,7 +65,7 @@ def network(table: dict[str, Any]) -> Found:
         sizes = " | ".join(listing(island, 6) for island in islands)
         yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
     for island in islands:
-        wet = [name for name in island if places[name] != "translational"]
+        wet = [name for name in island if places[name] not in ("translational", "rotational")]
         kinds = [_kind("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
         if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(islands) == 1 else f" of {listing(island, 6)}"
@@ -65,18 +79,24 @@ def parts(
     """Faults of elevations, pressures and bodies."""
     yield from _elevations(nodes, links)
     yield from _mechanics(nodes, links)
+    yield from _leaks(nodes, links)
+    yield from _shafts(links)
     for name, link in links.items():
-        for place in link.owns if fluid is not None else ():
+        for place in chambers_of(link) if fluid is not None else ():
             key = f"initial_pressure_{place}"
             if getattr(link, key) is not None:
                 yield from _vacuum(("links", name, key), [getattr(link, key)], fluid, raw)
     for name, node in nodes.items():
+        if isinstance(node, Junction):
+            yield from _wants(name, node, ambient)
         level, height = getattr(node, "level", None), getattr(node, "height", None)
         if height is not None and level > height:
             yield ("nodes", name, "level"), f"{level:g} m is above its height of {height:g} m"
+        if isinstance(node, Accumulator) and (node.gas_volume or 0.0) > node.volume:
+            yield ("nodes", name, "gas_volume"), f"{node.gas_volume:g} m3 is more than its volume of {node.volume:g} m3"
         if fluid is None:
             continue
-        if isinstance(node, Chamber) and node.initial_pressure is not None:
+        if isinstance(node, (Accumulator, Chamber)) and node.initial_pressure is not None:
             yield from _vacuum(("nodes", name, "initial_pressure"), [node.initial_pressure], fluid, raw)
         if isinstance(node, Reservoir) and node.pressure is not None:
             yield from _vacuum(("nodes", name, "pressure"), node.pressure.value.tolist(), fluid, raw)
@@ -109,6 +129,14 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
         able = " or ".join(dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive))
         message = f"method {show(method.name)} estimates no error; use {able}, or {'courant or ' * has_cells}step"
         yield ("numerics", "method" if numerics.rtol is None else "rtol"), message
+
+
+def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
+    """Faults of schemes that cannot follow the edge of a cavity."""
+    air = fluid.air if fluid is not None else None
+    if has_cells and air is not None and air.cavitation and numerics.scheme not in CAVITY_SCHEMES:
+        able = " or ".join(map(show, CAVITY_SCHEMES))
+        yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
@@ -159,8 +187,14 @@ def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], li
     return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
 
 
+def chambers_of(link: Any) -> list[str]:
+    """Places of the fluid that a link owns."""
+    return [place for place, domain in link.owns.items() if domain == "hydraulic"]
+
+
 def _unlike_place(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
-    what = f"is a {nodes[place]['type']}" if place in nodes else "is a chamber"
+    owned = "shaft" if places[place] == "rotational" else "chamber"
+    what = f"is a {nodes[place]['type']}" if place in nodes else f"is a {owned}"
     alike = [name for name, other in places.items() if other == domain]
     has = f"; {domain} places are {listing(alike)}" if alike else ""
     return f"{show(place)} {what}, a {places[place]} place, and this port of a {link['type']} a {domain} one{has}"
@@ -198,14 +232,14 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
 
 def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
     wet = {("nodes", name): node for name, node in nodes.items() if node.domain == "hydraulic"}
-    wet |= {("links", name): link for name, link in links.items() if link.owns}
+    wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = [name for (_, name), part in wet.items() if part.elevation is not None]
     for (group, name), part in wet.items():
         by_head = isinstance(part, Reservoir) and part.head is not None
         if stated and name not in stated and not by_head:
             yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
-    heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in link.owns}
+    heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in chambers_of(link)}
     for name, link in links.items():
         length = getattr(link, "length", None)
         heights = [heights_of[place] for place in link.ports.values() if place in heights_of]
@@ -217,6 +251,29 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
                 ("links", name, "length"),
                 f"{length:g} m is too short: its ends lie {climb:g} m apart in height",
             )
+
+
+def _leaks(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
+    for name, link in links.items():
+        if isinstance(link, Leak) and isinstance(nodes.get(link.from_), Reservoir):
+            yield ("links", name, "from"), (f"{link.from_} is a reservoir, whose pressure no leak changes; "
+                                            "wanted a junction, a tank or another place")  # fmt: skip
+
+
+def _wants(name: str, node: Any, ambient: float) -> Found:
+    """Faults of a demand that follows the pressure."""
+    least = ambient if node.minimum_pressure is None else node.minimum_pressure
+    if node.required_pressure is None:
+        if node.minimum_pressure is not None:
+            yield ("nodes", name, "minimum_pressure"), "says nothing without required_pressure"
+        return
+    if node.required_pressure <= least:
+        yield ("nodes", name, "required_pressure"), (f"{node.required_pressure:g} Pa is not above the pressure of no "
+                                                     f"flow, {least:g} Pa")  # fmt: skip
+    if least < ambient:
+        yield ("nodes", name, "minimum_pressure"), f"{least:g} Pa is below ambient, where nothing runs out"
+    if not (node.demand.value.min() >= 0.0 and node.demand.value.max() > 0.0):
+        yield ("nodes", name, "demand"), "wanted a demand, none of it negative, beside required_pressure"
 
 
 def _mechanics(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
@@ -239,6 +296,17 @@ def _mechanics(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
             yield ("links", name, "to"), f"{link.to} lies behind {link.from_} at the start; exchange from and to"
         if isinstance(link, EndStop) and None not in (link.least, link.greatest) and link.least >= link.greatest:
             yield ("links", name, "greatest"), f"{link.greatest:g} m is not above least, {link.least:g} m"
+
+
+def _shafts(links: dict[str, Any]) -> Found:
+    """Faults of torques on shafts whose inertia is not known, or that a motor holds until it trips."""
+    for name, link in links.items():
+        pump = links.get(str(link.to).removesuffix(".shaft")) if isinstance(link, Torque) else None
+        if isinstance(pump, Pump) and pump.inertia is None:
+            yield ("links", name, "to"), f"{link.to} has no inertia, so no torque can turn it; give the pump inertia"
+        if isinstance(pump, Pump) and pump.trip is not None:
+            yield ("links", name, "to"), (f"{link.to} is held by its motor until it trips; leave trip out, and let the "
+                                          "torque fall to 0 in its place")  # fmt: skip
 
 
 def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Found:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fvsolve import units
+from fvsolve import exact, units
 from fvsolve.case import check, text
 from fvsolve.case.case import Case, default_cells
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, override, read_raw
-from fvsolve.case.sections import DEFAULT_ROWS, FluidSpec, Numerics, Output
+from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Chamber, Friction, Pipe
@@ -41,7 +42,7 @@ GROUPS = {
 }
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "numerics", "output", "expect", "compare",
+    "signals", "numerics", "output", "expect", "compare", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
@@ -90,7 +91,7 @@ class _Reader:
         numerics = self.table("numerics", Numerics)
         kinds = {group: self.kinds(group) for group in parts}
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
-                           for place in kind.owns}  # fmt: skip
+                           for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.raw.table))
@@ -100,12 +101,13 @@ class _Reader:
         if numerics is not None:
             has_cells = any(kind is Pipe for kind in kinds["links"].values())
             self.add(check.numerics(numerics, has_cells))
+            self.add(check.cavities(numerics, has_cells, properties))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
         links = self.cells(parts["links"], properties, numerics)
-        if self.faults:
-            raise CaseError(dict.fromkeys(self.faults), self.raw.file)
-        return Case(
+        named = self.table("exact", ExactSpec) if "exact" in self.raw.table else None
+        self.stop()
+        made = Case(
             name=self.raw.name,
             path=self.raw.path,
             ambient_pressure=self.setting.ambient,
@@ -118,11 +120,28 @@ class _Reader:
             output=output,
             expect=expect,
             compare=compare,
+            exact=named,
             copies=dict(self.setting.files),
             raw=self.raw.table,
             folder=self.raw.folder,
             **top,
         )
+        return made if named is None else self.exact(made)
+
+    def exact(self, made: Case) -> Case:
+        """The case, if what it names under [exact] holds; settings that leave it no exact solution take that out."""
+        found = list(exact.misfits(made))
+        settings = {keys[0] for keys in self.raw.overridden}
+        if found and settings and "exact" not in settings:
+            return replace(made, exact=None)
+        self.add(found)
+        self.stop()
+        return made
+
+    def stop(self) -> None:
+        """Raise what was found so far."""
+        if self.faults:
+            raise CaseError(dict.fromkeys(self.faults), self.raw.file)
 
     def fault(self, keys: tuple, message: str) -> None:
         if ROOT in keys:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fvsolve.case.load import GROUPS, KEYS, TOP
-from fvsolve.case.sections import FluidSpec, Numerics, Output
+from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import keys_json
@@ -18,7 +18,7 @@ def schema() -> dict[str, Any]:
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
     properties["ambient_pressure"] = Quantity("pressure").json()
-    for name, model in (("fluid", FluidSpec), ("numerics", Numerics), ("output", Output)):
+    for name, model in (("fluid", FluidSpec), ("numerics", Numerics), ("output", Output), ("exact", ExactSpec)):
         properties[name] = _hoisted(model, definitions)
     for group, kinds in KINDS.items():
         any_kind = [_typed(kind, made, definitions) for kind, made in kinds.items()]

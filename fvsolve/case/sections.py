@@ -7,10 +7,12 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
 from fvsolve.errors import did_you_mean
+from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import (
     Choice,
+    Flag,
     Misfit,
     Number,
     Quantity,
@@ -29,10 +31,11 @@ from fvsolve.units import show
 SCHEMES = ("upwind", "muscl", "upwind5", "weno5", "central", "linear-upwind", "fromm", "upwind3")
 LIMITERS = ("minmod", "van-leer", "monotonized-central")
 
-# Every default of [numerics] and [output]. Steps: Courant where there are cells, error control elsewhere.
-DEFAULT_SCHEME, DEFAULT_LIMITER = "muscl", "van-leer"
-DEFAULT_METHOD, DEFAULT_COURANT = "ssp-rk3", 0.9
-DEFAULT_METHOD_RTOL, DEFAULT_RTOL = "dormand-prince", 1e-6
+# Every default of [numerics] and [output], chosen by docs/accuracy-and-speed.md. Steps: Courant where there are cells,
+# error control elsewhere.
+DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
+DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9
+DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
 DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cells of the same travel time
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 
@@ -40,7 +43,7 @@ DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 class FluidSpec(Table):
     """`[fluid]`: which fluid, at which state, under which density law; numbers here override CoolProp's."""
 
-    name: Annotated[str, Text('a CoolProp fluid, "INCOMP::..." or "user"')]
+    name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"')]
     temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = 293.15
     pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]")] = 101325.0
     law: Annotated[str, Choice("density law", LAWS, "one for the case")] = "linear"
@@ -48,6 +51,12 @@ class FluidSpec(Table):
     bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]")] = None
     viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]")] = None
     vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
+    air_fraction: Annotated[float | None, Number(between(0, 1), "of the volume at 1 atm, law mixture")] = None
+    gas_exponent: Annotated[float | None, Number(between(1, 2), "polytropic, 1 isothermal, 1.4 adiabatic")] = None
+    saturation_pressure: Annotated[float | None, Quantity("pressure", positive, "where all gas is dissolved [Pa]")] = (
+        None
+    )
+    cavitation: Annotated[bool | None, Flag("vapour pressure adds to that of the gas, law mixture")] = None
 
 
 class MethodNames(Collection):
@@ -107,7 +116,19 @@ class OutputUnits(Value):
     """`[output] units`: a unit per quantity of a probe."""
 
     about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }'
-    quantities = ("pressure", "gauge_pressure", "head", "level", "flow", "velocity", "position", "force", "time")
+    quantities = (
+        "pressure",
+        "gauge_pressure",
+        "head",
+        "level",
+        "flow",
+        "velocity",
+        "position",
+        "force",
+        "torque",
+        "power",
+        "time",
+    )
 
     def read(self, given: Any, setting: Setting) -> dict[str, str]:
         if not isinstance(given, dict):
@@ -165,3 +186,9 @@ class Output(Table):
         """What the file would say."""
         made = {**super().table(), "probes": [probe.text for probe in self.probes]}
         return made if self.units else {key: value for key, value in made.items() if key != "units"}
+
+
+class ExactSpec(Table):
+    """`[exact]`: the exact solution that this scene has; errors of a study are measured against it."""
+
+    name: Annotated[str, Choice("exact solution", tuple(NAMES), "what the scene is exactly")]

@@ -9,7 +9,7 @@ from typing import Any
 
 def write(table: dict[str, Any]) -> str:
     """TOML text of nested dicts; tables down to the second level get a header, deeper ones stand in line."""
-    lines = [f"{_key(key)} = {_value(value)}" for key, value in table.items() if not isinstance(value, dict)]
+    lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if not isinstance(value, dict)]
     for key, value in table.items():
         if isinstance(value, dict):
             lines += _section(key, value)
@@ -31,25 +31,26 @@ def _section(key: str, table: dict[str, Any]) -> list[str]:
         for name, part in table.items():
             if isinstance(part, dict):
                 lines += ["", f"[{_key(key)}.{_key(name)}]"]
-                lines += [f"{_key(k)} = {_value(v)}" for k, v in part.items()]
-        plain = [f"{_key(k)} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict)]
+                lines += [f"{_key(k)} = {inline(v)}" for k, v in part.items()]
+        plain = [f"{_key(k)} = {inline(v)}" for k, v in table.items() if not isinstance(v, dict)]
         return (["", f"[{_key(key)}]", *plain] if plain else []) + lines
-    return ["", f"[{_key(key)}]"] + [f"{_key(k)} = {_value(v)}" for k, v in table.items()]
+    return ["", f"[{_key(key)}]"] + [f"{_key(k)} = {inline(v)}" for k, v in table.items()]
 
 
 def _key(key: str) -> str:
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
 
 
-def _value(value: Any) -> str:
+def inline(value: Any) -> str:
+    """A value as it stands behind `key =`, tables in line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }" if value else "{}"
+        return "{ " + ", ".join(f"{_key(k)} = {inline(v)}" for k, v in value.items()) + " }" if value else "{}"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_value(one) for one in value) + "]"
+        return "[" + ", ".join(inline(one) for one in value) + "]"
     return repr(value)
 
 

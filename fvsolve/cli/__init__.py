@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 
 from fvsolve.errors import FvsolveError
 
 __all__ = ["main"]
+
+COMMANDS = (  # files that add commands to the application
+    "commands",
+    "chart",
+    "energy",
+    "failure_map",
+    "linearise",
+    "order",
+    "response",
+    "stability",
+    "sweep",
+)
 
 
 def main() -> None:
@@ -15,11 +28,15 @@ def main() -> None:
     0: done. 1: a run stopped early or an expectation failed. 2: bad input. 130: interrupted.
     """
     try:
-        from fvsolve.cli.commands import app
+        for room in COMMANDS:
+            import_module(f"fvsolve.cli.{room}")
+        from fvsolve.cli.app import app
 
         app(prog_name="fvsolve")
     except FvsolveError as error:
         _leave(str(error), 2)
+    except KeyboardInterrupt:
+        _leave("interrupted", 130)
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has gone: nobody to tell
         sys.exit(0)

@@ -1,4 +1,4 @@
-"""The commands and their options. Knows what is asked; leaves the work to `run` and the words to `report`."""
+"""Commands for runs, cases and methods. Knows what is asked; leaves the work to `run` and the words to `report`."""
 
 from __future__ import annotations
 
@@ -10,21 +10,8 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.errors import CaseError, Fault, FvsolveError
-from fvsolve.output.summary import plain
-
-app = typer.Typer(
-    help="Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-
-Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-One = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override a key: links.main.cells=400")]
-Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
+from fvsolve.cli.app import Cases, Json, One, Set, app, load_case, print_json, value_of
+from fvsolve.errors import FvsolveError
 
 
 @app.command()
@@ -43,7 +30,7 @@ def run(
 
     results = []
     for name, place in _places(cases, out).items():
-        case = _load(name, set)
+        case = load_case(name, set)
         with watched(case) as progress:
             results.append(solve(case, out=place, force=force, resume=resume, progress=progress))
         if not as_json:
@@ -52,7 +39,7 @@ def run(
             break
     if as_json:
         said = [one.summary | {"directory": str(one.directory)} for one in results]
-        _json(said[0] if len(cases) == 1 else {"runs": said})
+        print_json(said[0] if len(cases) == 1 else {"runs": said})
     sys.exit(max(report.exit_code(one) for one in results))
 
 
@@ -61,12 +48,16 @@ def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B00
     """What was understood of a case, how it starts, what it will cost."""
     from fvsolve.cli import report
     from fvsolve.run import model_of
+    from fvsolve.studies.stability.warning import beyond_courant
 
-    model = model_of(_load(case, set))
+    model = model_of(load_case(case, set))
+    found, warning = model.checks, beyond_courant(model)
+    if warning is not None:
+        found = found | {"warnings": [*found["warnings"], warning]}
     if as_json:
-        _json(model.checks)
+        print_json(found)
     else:
-        report.checks(model)
+        report.checks(model.case, found)
 
 
 @app.command("list")
@@ -76,19 +67,27 @@ def list_cases(as_json: Json = False) -> None:
 
     titles = shipped.titles()
     if as_json:
-        _json(titles)
+        print_json(titles)
     else:
         report.titles(titles)
 
 
 @app.command()
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")] = None,
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="default NAME.toml")] = None,
+    source: Annotated[Path | None, typer.Option("--from", metavar="NET.inp", help="an EPANET network")] = None,
+    hour: Annotated[float | None, typer.Option(metavar="H", help="of EPANET's run (default 0)")] = None,
+    wave_speed: Annotated[str | None, typer.Option(metavar="A", help='of all pipes (default "1200 m/s")')] = None,
 ) -> None:
-    """Copy a shipped case and the files it uses."""
-    from fvsolve.cli import shipped
+    """Copy a shipped case and the files it uses; or with --from write the case NAME of an EPANET network."""
+    from fvsolve.cli import imported, shipped
 
+    if source is not None:
+        imported.write(source, name, file, hour, wave_speed)
+        return
+    if name is None or hour is not None or wave_speed is not None:
+        raise FvsolveError("fvsolve new NAME copies a shipped case, fvsolve new --from NET.inp [--hour H] imports one")
     for path in shipped.copy(name, file or Path(f"{name}.toml")):
         print(path)
 
@@ -114,7 +113,7 @@ def methods(
         raise FvsolveError("--out is for the picture of one method; give its NAME")
     said = methods.table() if name is None else methods.one(name, out)
     if as_json:
-        _json(said.plain)
+        print_json(said.plain)
     else:
         said.show()
 
@@ -132,7 +131,7 @@ def compare(
 
     found = differences(open_run(run_a), open_run(run_b))
     if as_json:
-        _json(found)
+        print_json(found)
     else:
         report.differences(found)
 
@@ -149,7 +148,7 @@ def view(
     from fvsolve.units import parse
 
     try:
-        when = None if time is None else parse(_value(time), "time")
+        when = None if time is None else parse(value_of(time), "time")
     except ValueError as error:
         raise FvsolveError(f"--time: {error}") from None
     print(open_run(directory).view(when, field, out))
@@ -169,45 +168,3 @@ def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
             raise FvsolveError(f"{twice}; run one at a time, each with an --out DIR of its own, or rename one")
         found[name] = place
     return found
-
-
-def _load(name: str, overrides: list[str]):
-    """The case, overridden; an override that is none is one more fault of it."""
-    from fvsolve.case import load
-    from fvsolve.cli import shipped
-
-    path = shipped.find(name)
-    settings, faults = _overrides(overrides)
-    try:
-        case = load(path, settings)
-    except CaseError as error:
-        raise CaseError([*error.faults, *faults], error.file) if faults else error from None
-    if faults:
-        raise CaseError(faults, path.name)
-    return case
-
-
-def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
-    found, faults = {}, []
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if equals and key.strip():
-            found[key.strip()] = _value(value)
-        else:
-            faults.append(Fault(text, "wanted KEY=VALUE, for example links.main.cells=400", override=True))
-    return found, faults
-
-
-def _value(text: str):
-    """`400`, `true`, `[1, 2]` and `{ a = 1 }` as TOML reads them; everything else is text."""
-    import tomllib
-
-    try:
-        read = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
-        return text.strip()
-    return read["value"] if read.keys() == {"value"} else text.strip()
-
-
-def _json(data) -> None:
-    print(json.dumps(plain(data), allow_nan=False))

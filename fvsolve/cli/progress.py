@@ -29,6 +29,19 @@ def watched(case) -> Iterator[Callable[[float, float, int], None]]:
 
 
 @contextmanager
+def stoppable() -> Iterator[Callable[[float, float, int], None]]:
+    """A `progress` function for runs one after another that shows nothing and ends the run at Ctrl-C, likewise."""
+    stop = threading.Event()
+
+    def progress(t: float, seconds: float, steps: int) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+
+    with _caught(stop):
+        yield progress
+
+
+@contextmanager
 def _caught(stop: threading.Event) -> Iterator[None]:
     def handle(number, frame) -> None:
         stop.set()

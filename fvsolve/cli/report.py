@@ -18,6 +18,8 @@ PIPE = {
     "to_head": "head at to [m]",
 }
 
+EVENTS_SHOWN = 12
+
 
 def result(one) -> None:
     """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps, files."""
@@ -28,6 +30,12 @@ def result(one) -> None:
     _extremes(console, one)
     for mark in said["marks"]:
         _line(console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow")
+    for cavity in said["cavities"]:
+        _line(console, cavity["text"])
+    for event in said["events"][:EVENTS_SHOWN]:
+        _line(console, f"{event['name']} {event['what']} at t = {event['time']:.6g} s")
+    if len(said["events"]) > EVENTS_SHOWN:
+        _line(console, f"and {len(said['events']) - EVENTS_SHOWN} more events; all stand in summary.json")
     for name, ledger in said["ledgers"].items():
         _line(console, f"{name} ledger: {_ledger(ledger)}")
     for claim in said["expectations"]:
@@ -36,7 +44,8 @@ def result(one) -> None:
         _line(console, _comparison(measured))
     for warning in said["warnings"]:
         _line(console, f"note: {warning}")
-    _line(console, f"{said['reason']} at t = {said['t']:.6g} s; {_cost(said)}", None if one.ok else "bold red")
+    when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
+    _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
     if one.directory:
         _line(console, f"{one.directory}: {', '.join(said['files'])}")
     if said["reason"].startswith("interrupted"):
@@ -50,10 +59,10 @@ def exit_code(one) -> int:
     return 0 if one.ok and all(claim.ok for claim in one.expectations) else 1
 
 
-def checks(model) -> None:
+def checks(case, found: dict) -> None:
     """Nodes and pipes at the start, the step and its cost, what will move."""
-    found, console = model.checks, _console()
-    _line(console, model.case.title or model.case.name, "bold")
+    console = _console()
+    _line(console, case.title or case.name, "bold")
     rows = [[name, *map(_number, one.values())] for name, one in found["nodes"].items()]
     _table(["node", "elevation [m]", "pressure [Pa]", "head [m]"], rows, console)
     _line(console, "")
@@ -65,11 +74,19 @@ def checks(model) -> None:
     if rows:
         _table(["pipe", *PIPE.values()], rows, console)
         _line(console, "")
+    for name, one in found["pipes"].items():
+        if "unsteady" in one:
+            _line(console, f"friction of {name} remembers: {_memory(one['unsteady'])}")
     for text in found["moving"]:
         _line(console, f"moves from the start: {text}")
     for text in found["warnings"]:
         _line(console, f"note: {text}")
     _line(console, _step(found))
+
+
+def _memory(one: dict) -> str:
+    return (f"{one['weighting']}, {one['terms']} terms a cell, within {one['accuracy']:g} up to "
+            f"{one['frequency']:.3g} Hz")  # fmt: skip
 
 
 def titles(found: dict[str, str]) -> None:

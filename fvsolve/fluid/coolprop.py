@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
+from fvsolve.fluid.oils import OILS
 from fvsolve.fluid.table import isentrope, known
 
 
@@ -62,7 +63,7 @@ def _suggestion(name: str) -> str:
     if name.startswith("INCOMP::"):
         return did_you_mean(name, [f"INCOMP::{oil}" for oil in oils])
     aliases = ",".join(CoolProp.get_fluid_param_string(fluid, "aliases") for fluid in pure).split(",")
-    return did_you_mean(name, ["user", *filter(None, aliases), *pure])
+    return did_you_mean(name, ["user", *OILS, *filter(None, aliases), *pure])
 
 
 def _incompressible_names() -> list[str]:

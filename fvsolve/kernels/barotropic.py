@@ -23,8 +23,7 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import greatest_rate, net_flows, stored_rates
-from fvsolve.kernels.observer import record_all
+from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
@@ -49,6 +48,7 @@ from fvsolve.kernels.records import (
     VALVE_FLOW,
     WHERE,
 )
+from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.tanks import tank_level
 
 
@@ -127,10 +127,9 @@ def rhs_barotropic(t, y, dydt, out, handle):
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     waves_inside(y, out, tables)
-    net = layout["net"]
-    for i in range(tables[I_NODES].size):
-        out[net + i] = 0.0
+    clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
     column_inflows(t, y, out, tables)
     close_nodes_barotropic(t, y, out, tables)
@@ -213,10 +212,3 @@ def observe_barotropic(t, y, out, handle, values):
         elif kind == COLUMN_FLOW:
             value = out[layout["column"] + i] / st["rho"]
         values[k] = value
-
-
-@njit
-def record_barotropic(t, y, out, handle, values):
-    """Extremes, envelopes and marks after every accepted step."""
-    observe_barotropic(t, y, out, handle, values)
-    record_all(t, y, out, open_tables(handle), values)

@@ -10,7 +10,6 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.clusters import (
-    LEAST,
     finish,
     move,
     prepare,
@@ -31,11 +30,14 @@ from fvsolve.kernels.density import (
     pressure_of_mass,
     velocity_change,
 )
+from fvsolve.kernels.emitters import emitter_flow, emitter_step
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.isolated import find_held, inner_row
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import (
     CHAMBER,
+    CLUSTER,
+    CURVE,
     FIXED,
     I_CLUSTERS,
     I_COLUMNS,
@@ -49,14 +51,18 @@ from fvsolve.kernels.records import (
     I_SETTINGS,
     I_VALVES,
     JUNCTION,
+    LIFT,
     NO_SOLUTION,
+    POWER,
     STATUS,
     TANK,
+    TWO_WAY,
     WHERE,
 )
+from fvsolve.kernels.restrictions import conductance, head_drop, is_lifting, lifting_slope, lifting_step, pump_step
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
-from fvsolve.kernels.valves import flow_at_drop, valve_conductance
+from fvsolve.kernels.valves import LEAST, flow_at_drop
 
 
 @njit
@@ -174,15 +180,28 @@ def drive(st, floats, p_i, z_i, p_j, z_j):
 
 
 @njit
-def valve_target(tables, out, k, g):
-    """(M |M| that a valve asks for, or the flow where its law has a laminar part; its conductance G now)."""
+def valve_drive(tables, out, k):
+    """(pressure that drives valve k [Pa], density upstream over that of reference)."""
     st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
     valve = tables[I_VALVES][k]
     i, j = valve["from_node"], valve["to_node"]
     p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
     p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
     drop, rho = drive(st, floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])
-    dense = g * rho / st["rho"]
+    return drop, rho / st["rho"]
+
+
+@njit
+def valve_target(tables, out, k, g):
+    """(M |M| that a valve asks for, or the flow where its law has a laminar part or is a power; its G now)."""
+    valve = tables[I_VALVES][k]
+    drop, denser = valve_drive(tables, out, k)
+    dense = g * denser
+    if valve["law"] == POWER:
+        dense *= denser  # it is its volume that follows the drop
+        return emitter_flow(tables[I_FLOATS], valve["data"], dense, drop), dense
+    if valve["law"] == TWO_WAY and drop < 0.0:
+        dense *= valve["back"]
     if valve["transition"] > 0.0:
         return flow_at_drop(dense, valve["transition"], drop), dense
     return dense * drop, dense
@@ -191,8 +210,17 @@ def valve_target(tables, out, k, g):
 @njit
 def valve_move(tables, out, k, g, m):
     """a, s with dM = a + s d(p_i - p_j) for the next Newton step of valve k, which carries m [kg/s]."""
-    transition = tables[I_VALVES][k]["transition"]
+    valve = tables[I_VALVES][k]
+    if valve["law"] == CURVE:
+        rho, drop = head_drop(tables, out, k)
+        return pump_step(tables, out, k, rho, g, m, drop)
+    transition = valve["transition"]
+    if valve["law"] == POWER:
+        drop, denser = valve_drive(tables, out, k)
+        return emitter_step(tables[I_FLOATS], valve["data"], g * denser * denser, m, drop)
     target, slope = valve_target(tables, out, k, g)
+    if valve["law"] == LIFT and is_lifting(tables, k):
+        return lifting_step(tables, out, k, full_flow(target, transition), slope, m)
     if transition > 0.0:
         steepest = 45.0 / 32.0 * slope / transition
         return target - m, min(steepest, slope / max(abs(target) + abs(m), 1e-300))
@@ -201,12 +229,30 @@ def valve_move(tables, out, k, g, m):
 
 
 @njit
+def full_flow(target, transition):
+    """The flow that a valve asks for, from what `valve_target` says."""
+    if transition > 0.0:
+        return target
+    return sqrt(target) if target >= 0.0 else -sqrt(-target)
+
+
+@njit
+def valve_lift(tables, out, k, g):
+    """`restriction_lift` at the density upstream."""
+    valve = tables[I_VALVES][k]
+    if valve["law"] != LIFT or not is_lifting(tables, k):
+        return 0.0
+    return lifting_slope(tables, k, full_flow(valve_target(tables, out, k, g)[0], valve["transition"]))
+
+
+@njit
 def newton_step(cluster, out, tables, g, m, c, held, slope, work):
     """One Newton step of a cluster; returns its greatest change, relative."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     integers, n, k = tables[I_INTEGERS], c.size, g.size
     matrix, right = work[: n * n], work[n * n : n * n + n]
-    a, s = work[n * n + n : n * n + n + k], work[n * n + n + k : n * n + n + 2 * k]
+    at = n * n + n
+    a, s, lift = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
     for r in range(n * n):
         matrix[r] = 0.0
     for r in range(n):
@@ -216,17 +262,18 @@ def newton_step(cluster, out, tables, g, m, c, held, slope, work):
     for e in range(k):
         which = integers[cluster["first_valve"] + e]
         i, j = inner_row(nodes, valves[which]["from_node"]), inner_row(nodes, valves[which]["to_node"])
-        a[e], s[e] = -m[e], 0.0
+        a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if g[e] > 0.0:
             a[e], s[e] = valve_move(tables, out, which, g[e], m[e])
-        put_valve(i, j, m[e], a[e], s[e], n, matrix, right)
+            lift[e] = valve_lift(tables, out, which, g[e])
+        put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for r in range(n):
         if held[r] == 0.0:
             right[r], matrix[n * r + r] = 0.0, 1.0
     if not solve_dense(matrix, right, n):
         out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
         return 0.0
-    return move(cluster, tables, out, m, a, s, right)
+    return move(cluster, tables, out, m, a, s, lift, right)
 
 
 @njit
@@ -240,8 +287,9 @@ def given_flows(t, y, out, tables):
             out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
             out[layout["pressure"] + i] = 0.0
     for k in range(valves.size):
-        if nodes[valves[k]["from_node"]]["kind"] != JUNCTION and nodes[valves[k]["to_node"]]["kind"] != JUNCTION:
-            g = valve_conductance(tables, k, t)
+        i, j = valves[k]["from_node"], valves[k]["to_node"]
+        if nodes[i]["kind"] != JUNCTION and nodes[j]["kind"] != JUNCTION and valves[k]["solve"] != CLUSTER:
+            g = conductance(tables, out, k)
             out[layout["valve"] + k] = valve_target(tables, out, k, g)[0] if g > 0.0 else 0.0
 
 
@@ -256,46 +304,73 @@ def is_quiet(cluster, tables, out):
 
 
 @njit
-def close_nodes_barotropic(t, y, out, tables):
-    """Pressure deviation of every node, flow of every valve and both waves at every pipe end, by Newton.
+def node_space(tables):
+    """Scratch of all clusters: (slope, c, held, group, quiet of nodes, conductance and flow of valves, the rest)."""
+    n, v, work = tables[I_NODES].size, tables[I_VALVES].size, tables[I_SCRATCH]
+    g, m, rest = work[5 * n : 5 * n + v], work[5 * n + v : 5 * n + 2 * v], work[5 * n + 2 * v :]
+    return work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n], work[4 * n : 5 * n], g, m, rest
 
-    All clusters take a step, then all pipe ends are evaluated again. A cluster that nothing reaches stays as it is.
-    """
-    clusters, work = tables[I_CLUSTERS], tables[I_SCRATCH]
-    n, v = tables[I_NODES].size, tables[I_VALVES].size
-    slope, c, held = work[:n], work[n : 2 * n], work[2 * n : 3 * n]
-    group, quiet = work[3 * n : 4 * n], work[4 * n : 5 * n]
-    g, m, work = work[5 * n : 5 * n + v], work[5 * n + v : 5 * n + 2 * v], work[5 * n + 2 * v :]
-    given_flows(t, y, out, tables)
-    moved, before = 1e300, 1e300
-    for sweep in range(101):
-        if sweep > 0:
-            ends_into_nodes(out, tables, slope, False)
-            before, moved = moved, 0.0
-        a, b = 0, 0
-        for which in range(clusters.size):
-            cluster = clusters[which]
-            i, j = a + cluster["nodes"], b + cluster["valves"]
-            if sweep == 0:
-                unchanged = prepare(t, cluster, tables, out, g[b:j], m[b:j])
-                quiet[which] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
-                find_held(cluster, tables, g[b:j], held[a:i])
-                shut_out(cluster, tables, g[b:j], m[b:j], held[a:i])
-            else:
-                if sweep == 1 and quiet[which] == 1.0 and not is_quiet(cluster, tables, out):
-                    quiet[which] = 0.0
-                if quiet[which] == 0.0:
-                    step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, work)
-                    moved = max(moved, step)
-            a, b = i, j
-        if sweep > 0 and settled(moved, before):
-            break
+
+@njit
+def begin_clusters(out, tables, space):
+    """Flows and openings of all clusters before Newton's first step."""
+    clusters, (_, c, held, _, quiet, g, m, _) = tables[I_CLUSTERS], space
+    a, b = 0, 0
+    for which in range(clusters.size):
+        cluster = clusters[which]
+        i, j = a + cluster["nodes"], b + cluster["valves"]
+        unchanged = prepare(cluster, tables, out, g[b:j], m[b:j])
+        quiet[which] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+        find_held(cluster, tables, g[b:j], held[a:i])
+        shut_out(cluster, tables, g[b:j], m[b:j], held[a:i])
+        a, b = i, j
+
+
+@njit
+def step_clusters(sweep, out, tables, space):
+    """A Newton step of all clusters that something reaches; returns the greatest change, relative."""
+    clusters, (slope, c, held, _, quiet, g, m, rest) = tables[I_CLUSTERS], space
+    a, b, moved = 0, 0, 0.0
+    for which in range(clusters.size):
+        cluster = clusters[which]
+        i, j = a + cluster["nodes"], b + cluster["valves"]
+        if sweep == 1 and quiet[which] == 1.0 and not is_quiet(cluster, tables, out):
+            quiet[which] = 0.0
+        if quiet[which] == 0.0:
+            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, rest)
+            moved = max(moved, step)
+        a, b = i, j
+    return moved
+
+
+@njit
+def finish_clusters(out, tables, space, moved):
+    """Write the flows of all clusters' valves; `moved` is Newton's last change."""
+    clusters, (_, c, held, group, _, g, m, _) = tables[I_CLUSTERS], space
     a, b = 0, 0
     for which in range(clusters.size):
         i, j = a + clusters[which]["nodes"], b + clusters[which]["valves"]
         finish(clusters[which], tables, out, g[b:j], m[b:j], c[a:i], held[a:i], group[a:i], moved)
         a, b = i, j
-    ends_into_nodes(out, tables, slope, True)
+
+
+@njit
+def close_nodes_barotropic(t, y, out, tables):
+    """Pressure deviation of every node, flow of every valve and both waves at every pipe end, by Newton.
+
+    All clusters take a step, then all pipe ends are evaluated again. A cluster that nothing reaches stays as it is.
+    """
+    space = node_space(tables)
+    given_flows(t, y, out, tables)
+    begin_clusters(out, tables, space)
+    moved, before = 1e300, 1e300
+    for sweep in range(1, 101):
+        ends_into_nodes(out, tables, space[0], False)
+        before, moved = moved, step_clusters(sweep, out, tables, space)
+        if settled(moved, before):
+            break
+    finish_clusters(out, tables, space, moved)
+    ends_into_nodes(out, tables, space[0], True)
 
 
 @njit
@@ -304,9 +379,9 @@ def hold_columns_barotropic(t, out, tables):
     st, nodes, floats = tables[I_SETTINGS][0], tables[I_NODES], tables[I_FLOATS]
     pressure = tables[I_LAYOUT][0]["pressure"]
     for k in range(tables[I_COLUMNS].size):
-        column, end = tables[I_COLUMNS][k], led_end(t, tables, k)
+        column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
         x = column["to_node"] if end == 1 else column["from_node"]
-        if end != 0 and gate_area(t, tables, x)[0] == 0.0:
+        if end != 0 and gate_area(tables, out, x)[0] == 0.0:
             i, j = column["from_node"], column["to_node"]
             if end == -1:
                 i, j = j, i

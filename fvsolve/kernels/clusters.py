@@ -22,10 +22,10 @@ from fvsolve.kernels.records import (
     STATUS,
     WHERE,
 )
-from fvsolve.kernels.valves import flow_at_drop, valve_conductance
+from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step
 
-LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
 BAR = 1e5
+ROUNDING = 1e-15  # of pressures, relative
 UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has not only met rounding
 
 
@@ -57,21 +57,6 @@ def solve_dense(a, b, n):
             b[i] -= a[n * i + k] * b[k]
         b[i] /= a[n * i + i]
     return True
-
-
-@njit(forceinline=True)
-def valve_step(g, transition, m, drop):
-    """a, s with dM = a + s d(drop) for the next Newton step of a valve that carries m [kg/s] at a drop [Pa].
-
-    The chord of the square root stands for its slope: between the flow now and the flow the drop asks for, it is
-    finite and never too steep.
-    """
-    if transition > 0.0:
-        target = flow_at_drop(g, transition, drop)
-        steepest = 45.0 / 32.0 * g / transition
-        return target - m, min(steepest, g / max(abs(target) + abs(m), 1e-300))
-    chord = max(abs(m) + sqrt(g * abs(drop)), LEAST * sqrt(g))
-    return (g * drop - abs(m) * m) / chord, g / chord
 
 
 @njit(forceinline=True)
@@ -118,21 +103,21 @@ def inner_of(cluster, tables, i):
 
 
 @njit
-def put_valve(i, j, m, a, s, n, matrix, right):
-    """Add a valve from row i to row j (-1: a known pressure) to the balances."""
+def put_valve(i, j, m, a, s, lift, n, matrix, right):
+    """Add a valve from row i to row j (-1: a known pressure) to the balances; lift: dM / dp_i beside the drop's."""
     if i >= 0:
         right[i] -= m + a
-        matrix[n * i + i] += s
+        matrix[n * i + i] += s + lift
     if j >= 0:
         right[j] += m + a
         matrix[n * j + j] += s
     if i >= 0 and j >= 0:
         matrix[n * i + j] -= s
-        matrix[n * j + i] -= s
+        matrix[n * j + i] -= s + lift
 
 
 @njit
-def assemble(cluster, tables, out, g, m, c, held, a, s, matrix, right):
+def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right):
     """Linear system for the change of the cluster's pressures, with the valves' changes put in."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     integers, n = tables[I_INTEGERS], c.size
@@ -145,21 +130,26 @@ def assemble(cluster, tables, out, g, m, c, held, a, s, matrix, right):
     for e in range(m.size):
         valve = valves[integers[cluster["first_valve"] + e]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-        a[e], s[e] = -m[e], 0.0
+        a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if g[e] > 0.0:
             drop = out[layout["pressure"] + valve["from_node"]] - out[layout["pressure"] + valve["to_node"]]
-            a[e], s[e] = valve_step(g[e], valve["transition"], m[e], valve["drop"] + drop)
-        put_valve(i, j, m[e], a[e], s[e], n, matrix, right)
+            k = integers[cluster["first_valve"] + e]
+            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop)
+            lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop)
+        put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for i in range(n):
         if held[i] == 0.0:
             right[i], matrix[n * i + i] = 0.0, 1.0
 
 
 @njit
-def move(cluster, tables, out, m, a, s, right):
-    """Put a Newton step in; returns its greatest change, relative, of flows and of pressures together."""
+def move(cluster, tables, out, m, a, s, lift, right):
+    """Put a Newton step in; returns its greatest change, relative, of flows and of pressures together.
+
+    What the rounding of pressures does to a flow is no change, and no flow counts as less than that at 1 Pa.
+    """
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, scale, moved, most = tables[I_INTEGERS], 1e-300, 0.0, 0.0
+    integers, scale, vague, moved, most = tables[I_INTEGERS], 1e-300, 0.0, 0.0, 0.0
     for i in range(right.size):
         node = integers[cluster["first_node"] + i]
         out[layout["pressure"] + node] += right[i]
@@ -167,15 +157,21 @@ def move(cluster, tables, out, m, a, s, right):
     for e in range(m.size):
         valve = valves[integers[cluster["first_valve"] + e]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-        step = a[e] + s[e] * ((right[i] if i >= 0 else 0.0) - (right[j] if j >= 0 else 0.0))
+        before = right[i] if i >= 0 else 0.0
+        step = a[e] + s[e] * (before - (right[j] if j >= 0 else 0.0)) + lift[e] * before
         m[e] += step
-        scale = max(scale, abs(m[e]))
-        moved = max(moved, abs(step), abs(a[e]))
-    return max(moved / scale, most)
+        scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
+        p = nodes[valve["from_node"]]["pressure"] + out[layout["pressure"] + valve["from_node"]]
+        rounding = s[e] * ROUNDING * (BAR + abs(p))
+        moved, vague = max(moved, max(abs(step), abs(a[e])) - rounding), max(vague, rounding)
+    relative = moved / scale
+    if relative > UNSETTLED and moved <= vague:  # it may be rounding, so no failure; but it goes on
+        relative = UNSETTLED
+    return max(relative, most)
 
 
 @njit
-def prepare(t, cluster, tables, out, g, m):
+def prepare(cluster, tables, out, g, m):
     """Conductances and first flows of a cluster's valves; True where none has changed and no pressure beside it."""
     layout, valves = tables[I_LAYOUT][0], tables[I_VALVES]
     integers, quiet = tables[I_INTEGERS], True
@@ -184,15 +180,15 @@ def prepare(t, cluster, tables, out, g, m):
     for e in range(g.size):
         k = integers[cluster["first_valve"] + e]
         valve = valves[k]
-        g[e], m[e] = valve_conductance(tables, k, t), valve["flow"]
-        quiet = quiet and g[e] == valve["open"]
+        g[e], m[e] = conductance(tables, out, k), valve["flow"]
+        quiet = quiet and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
             quiet = quiet and out[layout["pressure"] + i] == 0.0
     return quiet
 
 
 @njit
-def close_cluster(t, out, tables, which):
+def close_cluster(out, tables, which):
     """Pressures of one cluster's nodes and flows of its valves; it starts from the profile, so the rhs stays pure."""
     integers, cluster = tables[I_INTEGERS], tables[I_CLUSTERS][which]
     n, k, work = cluster["nodes"], cluster["valves"], tables[I_SCRATCH]
@@ -200,8 +196,8 @@ def close_cluster(t, out, tables, which):
     matrix, right, c = work[: n * n], work[n * n : n * n + n], work[n * n + n : n * n + 2 * n]
     held, group = work[n * n + 2 * n : n * n + 3 * n], work[n * n + 3 * n : at]
     g, m = work[at : at + k], work[at + k : at + 2 * k]
-    a, s = work[at + 2 * k : at + 3 * k], work[at + 3 * k : at + 4 * k]
-    unchanged = prepare(t, cluster, tables, out, g, m)
+    a, s, lift = work[at + 2 * k : at + 3 * k], work[at + 3 * k : at + 4 * k], work[at + 4 * k : at + 5 * k]
+    unchanged = prepare(cluster, tables, out, g, m)
     quiet = whole_inflows(cluster, tables, out, c) and unchanged
     find_held(cluster, tables, g, held)
     shut_out(cluster, tables, g, m, held)
@@ -210,11 +206,11 @@ def close_cluster(t, out, tables, which):
         if quiet:
             moved = 0.0
             break
-        assemble(cluster, tables, out, g, m, c, held, a, s, matrix, right)
+        assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right)
         if not solve_dense(matrix, right, n):
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
             return
-        before, moved = moved, move(cluster, tables, out, m, a, s, right)
+        before, moved = moved, move(cluster, tables, out, m, a, s, lift, right)
         if settled(moved, before):
             break
     finish(cluster, tables, out, g, m, c, held, group, moved)

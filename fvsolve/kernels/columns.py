@@ -11,39 +11,49 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_SETTINGS, I_VALVES, JUNCTION
-from fvsolve.kernels.valves import flow_slope, valve_conductance
+from fvsolve.kernels.restrictions import conductance, conductance_at, restriction_slope
 
 NEARLY = 1e-3  # share of their full area below which valves lead their column
 INSTANT = 1e-7  # over which the rate of an area is measured [s]
 
 
 @njit
-def gate_area(t, tables, i):
+def gate_area(tables, out, i):
     """(sum of the roots of the conductances of a node's valves, the same at full opening)."""
     node, area, full = tables[I_NODES][i], 0.0, 0.0
     for e in range(node["gate_count"]):
         k = tables[I_INTEGERS][node["gates"] + e]
-        area += sqrt(valve_conductance(tables, k, t))
+        area += sqrt(conductance(tables, out, k))
         full += sqrt(tables[I_VALVES][k]["conductance"])
     return area, full
 
 
 @njit
-def led_at(t, tables, i):
+def led_at(tables, out, i):
     """Whether node i is the end of one column whose every valve is all but shut, and asks for nothing."""
     if tables[I_NODES][i]["gates"] < 0:
         return False
-    area, full = gate_area(t, tables, i)
-    return area < NEARLY * full
+    area, full = gate_area(tables, out, i)
+    return area == 0.0 or (area < NEARLY * full and foreseen(tables, i))
 
 
 @njit
-def led_end(t, tables, k):
+def foreseen(tables, i):
+    """Whether schedules alone open and shut the valves of node i, so that the rate of their area is known."""
+    node = tables[I_NODES][i]
+    for e in range(node["gate_count"]):
+        if tables[I_VALVES][tables[I_INTEGERS][node["gates"] + e]]["device"] >= 0:
+            return False
+    return True
+
+
+@njit
+def led_end(tables, out, k):
     """1 or -1 where valves lead column k at its `to` or `from` end, else 0."""
     column = tables[I_COLUMNS][k]
-    if led_at(t, tables, column["to_node"]):
+    if led_at(tables, out, column["to_node"]):
         return 1
-    return -1 if led_at(t, tables, column["from_node"]) else 0
+    return -1 if led_at(tables, out, column["from_node"]) else 0
 
 
 @njit
@@ -82,9 +92,9 @@ def led_flow(t, tables, out, k, end, solved):
             other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
             drop = side * valve["drop"] + p - other
             root = sqrt(abs(drop)) if drop >= 0.0 else -sqrt(abs(drop))
-            later = sqrt(valve_conductance(tables, which, early + INSTANT))
-            rate += (later - sqrt(valve_conductance(tables, which, early))) / INSTANT * root
-            flow += sqrt(valve_conductance(tables, which, t)) * root
+            later = sqrt(conductance_at(early + INSTANT, tables, out, which))
+            rate += (later - sqrt(conductance_at(early, tables, out, which))) / INSTANT * root
+            flow += sqrt(conductance(tables, out, which)) * root
         new = 0.5 * (p + standing - column["length"] / column["area"] * rate)
         if abs(new - p) <= 1e-12 * (1e5 + abs(new)):
             break
@@ -97,7 +107,7 @@ def column_inflows(t, y, out, tables):
     """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
     layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
     for k in range(columns.size):
-        column, end = columns[k], led_end(t, tables, k)
+        column, end = columns[k], led_end(tables, out, k)
         change = y[column["y"]]
         if end != 0:
             change = end * led_flow(t, tables, out, k, end, False)[0] - column["flow"]
@@ -111,10 +121,10 @@ def hold_columns(t, out, tables):
     """Give the node at the shut end of a standing column the pressure that drives no flow through it."""
     pressure = tables[I_LAYOUT][0]["pressure"]
     for k in range(tables[I_COLUMNS].size):
-        end = led_end(t, tables, k)
+        end = led_end(tables, out, k)
         if end != 0:
             x = tables[I_COLUMNS][k]["to_node"] if end == 1 else tables[I_COLUMNS][k]["from_node"]
-            if gate_area(t, tables, x)[0] == 0.0:
+            if gate_area(tables, out, x)[0] == 0.0:
                 out[pressure + x] = led_flow(t, tables, out, k, end, True)[2]
 
 
@@ -131,7 +141,7 @@ def column_rates(t, dydt, out, tables):
 @njit
 def column_rate(t, tables, out, k, change):
     """d/dt of one column's flow, (A / L) (change of what drives it) - drag'; a led one follows its valves."""
-    column, end = tables[I_COLUMNS][k], led_end(t, tables, k)
+    column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
     if end != 0:
         return end * led_flow(t, tables, out, k, end, True)[1]
     pull = column_drag(column, out[tables[I_LAYOUT][0]["column"] + k])
@@ -159,7 +169,7 @@ def quickest_column(t, out, tables):
                 which = tables[I_INTEGERS][nodes[i]["gates"] + e]
                 drop = valves[which]["drop"] + out[layout["pressure"] + valves[which]["from_node"]]
                 drop -= out[layout["pressure"] + valves[which]["to_node"]]
-                slope += flow_slope(valve_conductance(tables, which, t), valves[which]["transition"], drop)
-            if slope > 0.0 and led_end(t, tables, k) == 0:
+                slope += restriction_slope(tables, out, which, drop)
+            if slope > 0.0 and led_end(tables, out, k) == 0:
                 rate = max(rate, column["area"] / column["length"] / slope)
     return rate

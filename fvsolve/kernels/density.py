@@ -1,13 +1,24 @@
 """Density laws and what follows from them: enthalpy, mass per length, the momentum that pressure carries.
 
 log: p = p_ref + beta ln(rho / rho_ref), the integral of (80). table: ln rho by cubic Hermite over pressure,
-straight beyond its ends. The wall swells by d ln(area) = compliance dp. Knows one place; knows no cells.
+straight beyond its ends. The wall swells by d ln(area) = compliance dp. mixture: see there, its wall too. Knows one
+place; knows no cells.
 """
 
 from math import exp, expm1, log, log1p, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import LAW_LOG
+from fvsolve.kernels.mixture import (
+    mixture_enthalpy,
+    mixture_impedance,
+    mixture_mass,
+    mixture_pressure,
+    mixture_pressure_of_enthalpy,
+    mixture_velocity_change,
+    mixture_volume,
+    wall_stretch,
+)
+from fvsolve.kernels.records import LAW_LOG, LAW_MIXTURE
 
 
 @njit(forceinline=True)
@@ -24,6 +35,9 @@ def log_density(st, floats, p):
     """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
     if st["law"] == LAW_LOG:
         return (p - st["reference"]) / st["beta"], 1.0 / st["beta"]
+    if st["law"] == LAW_MIXTURE:
+        size, fall = mixture_volume(st, p)
+        return -log(size), fall / size
     n, o, step = st["table_size"], st["table"], st["table_step"]
     x = (p - st["table_start"]) / step
     if x <= 0.0:
@@ -41,6 +55,8 @@ def log_density(st, floats, p):
 @njit
 def density(st, floats, p):
     """rho [kg/m3] at a pressure."""
+    if st["law"] == LAW_MIXTURE:
+        return st["rho"] / mixture_volume(st, p)[0]
     return st["rho"] * exp(log_density(st, floats, p)[0])
 
 
@@ -49,6 +65,8 @@ def enthalpy(st, floats, p):
     """h = integral of dp / rho from the reference pressure [J/kg]."""
     if st["law"] == LAW_LOG:
         return -st["beta"] / st["rho"] * expm1(-(p - st["reference"]) / st["beta"])
+    if st["law"] == LAW_MIXTURE:
+        return mixture_enthalpy(st, p)
     n, o, step = st["table_size"], st["table"], st["table_step"]
     x = (p - st["table_start"]) / step
     k = 0 if x <= 0.0 else (n - 1 if x >= n - 1.0 else -1)
@@ -64,6 +82,8 @@ def pressure_of_enthalpy(st, floats, h):
     """Pressure [Pa] at which `enthalpy` is h."""
     if st["law"] == LAW_LOG:
         return st["reference"] - st["beta"] * log1p(-h * st["rho"] / st["beta"])
+    if st["law"] == LAW_MIXTURE:
+        return mixture_pressure_of_enthalpy(st, h)
     p = st["reference"] + st["rho"] * h
     for _ in range(30):
         step = (enthalpy(st, floats, p) - h) * density(st, floats, p)
@@ -76,6 +96,8 @@ def pressure_of_enthalpy(st, floats, h):
 @njit
 def pressure_of_log(st, floats, compliance, q):
     """Pressure [Pa] at which ln(rho / rho_ref) + compliance (p - p_ref) is q."""
+    if st["law"] == LAW_MIXTURE:
+        return mixture_pressure(st, compliance, exp(q))
     p = st["reference"] + q / (1.0 / st["beta"] + compliance)
     if st["law"] == LAW_LOG:
         return p
@@ -91,21 +113,35 @@ def pressure_of_log(st, floats, compliance, q):
 @njit
 def pressure_of_mass(st, floats, pipe, m):
     """Pressure [Pa] of a pipe that holds m [kg/m]."""
+    if st["law"] == LAW_MIXTURE:
+        return mixture_pressure(st, pipe["compliance"], m / (st["rho"] * pipe["area"]))
     return pressure_of_log(st, floats, pipe["compliance"], log(m / (st["rho"] * pipe["area"])))
 
 
 @njit
 def mass_of_pressure(st, floats, pipe, p):
     """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    if st["law"] == LAW_MIXTURE:
+        return mixture_mass(st, pipe, p)
     value, slope = log_density(st, floats, p)
     m = st["rho"] * pipe["area"] * exp(value + pipe["compliance"] * (p - st["reference"]))
     return m, m * (slope + pipe["compliance"])
 
 
 @njit
+def wall_area(st, pipe, p):
+    """Area of a pipe at a pressure [m2]."""
+    if st["law"] == LAW_MIXTURE:
+        return pipe["area"] * wall_stretch(st, pipe["compliance"], p)
+    return pipe["area"] * exp(pipe["compliance"] * (p - st["reference"]))
+
+
+@njit
 def thrust(st, pipe, p):
     """Integral of A dp from the reference pressure [N]."""
     x = pipe["compliance"] * (p - st["reference"])
+    if st["law"] == LAW_MIXTURE:
+        return pipe["area"] * (p - st["reference"]) * (1.0 + 0.5 * x)
     if abs(x) < 1e-14:
         return pipe["area"] * (p - st["reference"])
     return pipe["area"] * expm1(x) / pipe["compliance"]
@@ -114,13 +150,17 @@ def thrust(st, pipe, p):
 @njit
 def impedance(st, floats, pipe, p):
     """rho c = sqrt(K rho) of a pipe at a pressure [kg/m2/s]."""
+    if st["law"] == LAW_MIXTURE:
+        return mixture_impedance(st, pipe["compliance"], p)
     value, slope = log_density(st, floats, p)
     return sqrt(st["rho"] * exp(value) / (slope + pipe["compliance"]))
 
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s]: what a simple wave takes off the velocity, by three Gauss points."""
+    """Integral of dp / (rho c) [m/s]: what a simple wave takes off the velocity; by three Gauss points."""
+    if st["law"] == LAW_MIXTURE:
+        return mixture_velocity_change(st, pipe["compliance"], p_from, p_to)
     middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
     far = 0.7745966692414834 * half  # sqrt(3/5)
     total = 8.0 / impedance(st, floats, pipe, middle)
@@ -131,6 +171,8 @@ def velocity_change(st, floats, pipe, p_from, p_to):
 @njit
 def local_speed(st, floats, pipe, p):
     """Wave speed sqrt(K / rho), 1/K = d ln rho / dp + compliance [m/s]."""
+    if st["law"] == LAW_MIXTURE:
+        return mixture_impedance(st, pipe["compliance"], p) * mixture_volume(st, p)[0] / st["rho"]
     value, slope = log_density(st, floats, p)
     return sqrt(1.0 / ((slope + pipe["compliance"]) * st["rho"] * exp(value)))
 

@@ -3,46 +3,48 @@
 import functools
 
 from fvsolve.jit import beside, njit
-from fvsolve.kernels.network import rhs_linear
-from fvsolve.kernels.observer import events, observe_linear, record_linear
+from fvsolve.kernels import compose
 
 
 @functools.cache
-def functions(law: str, bodies: bool = False) -> tuple:
-    """(rhs, observe, record, events) of a law, linear, log or table, in scenes with or without bodies."""
-    found = law_functions(law, bodies)
-    code = f"from fvsolve.kernels.functions import watchers; watchers({law!r}, {bodies}); "
+def functions(law: str, pipes: bool = True, rooms: tuple[str, ...] = (), kinds: tuple[int, ...] = ()) -> tuple:
+    """(rhs, observe, record, events) of a density law, in scenes with or without pipes and with these rooms.
+
+    rooms : of "bodies", "devices", "memory", "cavities", in this order; "cavities" wants pipes
+    kinds : codes of the devices that there are
+    """
+    made = module_of(law, pipes, rooms, kinds)
+    watching = "devices" not in rooms  # whose events close the nodes: they wait for the rhs
+    code = f"from fvsolve.kernels.functions import watch; watch({law!r}, {pipes}, {rooms!r}); " * watching
     with beside(code + "from fvsolve.steppers.march import compiled; compiled()", "march.march-*.nbi"):
-        compile_as(law_functions(law)[0], "tvvvh")
-        compile_as(found[0], "tvvvh")
-    watchers(law, bodies)
-    return found
+        compile_as(made.rhs, "tvvvh")
+    watch(law, pipes, rooms, kinds)
+    return made.rhs, made.observe, made.record, made.events
 
 
-def law_functions(law: str, bodies: bool = False) -> tuple:
-    """The same, not yet compiled."""
-    if law == "linear" and not bodies:
-        return rhs_linear, observe_linear, record_linear, events
-    if law == "linear":
-        from fvsolve.kernels import mechanics as own
-
-        return own.rhs_linear_bodies, own.observe_linear_bodies, own.record_linear_bodies, own.events_bodies
-    if bodies:
-        from fvsolve.kernels import barotropic_mechanics as own
-        from fvsolve.kernels.mechanics import events_bodies
-
-        return own.rhs_barotropic_bodies, own.observe_barotropic_bodies, own.record_barotropic_bodies, events_bodies
-    from fvsolve.kernels.barotropic import observe_barotropic, record_barotropic, rhs_barotropic
-
-    return rhs_barotropic, observe_barotropic, record_barotropic, events
+def module_of(law: str, pipes: bool, rooms: tuple[str, ...], kinds: tuple[int, ...]):
+    """Where these functions stand, not yet compiled; modules that a scene does not need are not even loaded."""
+    family = "cavitating" if "cavities" in rooms else kind_of(law)
+    return compose.functions(family, pipes, rooms_of(law, rooms), kinds)
 
 
-def watchers(law: str, bodies: bool = False) -> None:
-    """Compile what reads a state: observe, record and events."""
-    _, observe, record, watch = law_functions(law, bodies)
-    compile_as(record, "tvvhv")
-    compile_as(observe, "tvvhv")
-    compile_as(watch, "tvhv")
+def kind_of(law: str) -> str:
+    """The family of a density law."""
+    return "linear" if law == "linear" else "barotropic"
+
+
+def rooms_of(law: str, rooms: tuple[str, ...]) -> tuple[str, ...]:
+    """Rooms as `compose` names them: some differ from law to law."""
+    named = {room: f"{room}, {kind_of(law)}" for room in rooms}
+    return tuple(other if other in compose.ROOMS else room for room, other in named.items())
+
+
+def watch(law: str, pipes: bool, rooms: tuple[str, ...], kinds: tuple[int, ...] = ()) -> None:
+    """Compile what reads a state."""
+    made = module_of(law, pipes, rooms, kinds)
+    compile_as(made.record, "tvvhv")
+    compile_as(made.observe, "tvvhv")
+    compile_as(made.events, "tvhv")
 
 
 @functools.cache

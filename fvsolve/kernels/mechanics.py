@@ -10,19 +10,17 @@ from math import log, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density, log_density, pressure_of_log
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import rhs_linear
-from fvsolve.kernels.observer import events as tank_events
-from fvsolve.kernels.observer import observe_linear, record_all
 from fvsolve.kernels.records import (
     FORCE,
     I_ARMED,
     I_BODIES,
     I_BRACES,
+    I_COLUMNS,
     I_FLOATS,
     I_LAYOUT,
     I_MARKS,
     I_NODES,
+    I_PIPES,
     I_PISTONS,
     I_PROBES,
     I_SCRATCH,
@@ -215,14 +213,6 @@ def finish_bodies(t, y, dydt, out, tables):
 
 
 @njit
-def rhs_linear_bodies(t, y, dydt, out, handle):
-    """`rhs_linear` of a scene with bodies."""
-    chambers(y, out, open_tables(handle))
-    rhs_linear(t, y, dydt, out, handle)
-    finish_bodies(t, y, dydt, out, open_tables(handle))
-
-
-@njit
 def observe_bodies(y, out, tables, values):
     """Values of the probes that read bodies and what pushes them."""
     layout, bodies, pistons, probes = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_PISTONS], tables[I_PROBES]
@@ -241,38 +231,22 @@ def observe_bodies(y, out, tables, values):
 
 
 @njit
-def observe_linear_bodies(t, y, out, handle, values):
-    """`observe_linear` of a scene with bodies."""
-    observe_linear(t, y, out, handle, values)
-    observe_bodies(y, out, open_tables(handle), values)
-
-
-@njit
-def record_bodies(t, y, out, tables, values):
-    """`record_all`, and the first time that a piston is beyond its stroke."""
+def record_bodies(t, y, tables):
+    """The first time that a piston is beyond its stroke."""
     marks, pistons = tables[I_MARKS], tables[I_PISTONS]
+    first = tables[I_PIPES].size + 3 * tables[I_NODES].size + tables[I_COLUMNS].size
     for k in range(pistons.size):
-        piston, at = pistons[k], marks.size - pistons.size + k
+        piston, at = pistons[k], first + k
         x = piston["position"] + between(tables, y, piston["case"], piston["rod"])[0]
         if not 0.0 <= x <= piston["stroke"] and marks[at] != marks[at]:
             marks[at] = t
-    record_all(t, y, out, tables, values)
 
 
 @njit
-def record_linear_bodies(t, y, out, handle, values):
-    """`record_linear` of a scene with bodies."""
-    observe_linear_bodies(t, y, out, handle, values)
-    record_bodies(t, y, out, open_tables(handle), values)
-
-
-@njit
-def events_bodies(t, y, handle, g):
-    """`events`, and the room that is left before each side of a stop."""
-    tables = open_tables(handle)
+def body_events(y, tables, g):
+    """The room that is left before each side of a stop."""
     stops = tables[I_STOPS]
     first = g.size - 2 * stops.size
-    tank_events(t, y, handle, g[:first])
     for k in range(stops.size):
         x, _ = between(tables, y, stops[k]["from_body"], stops[k]["to_body"])
         g[first + 2 * k], g[first + 2 * k + 1] = stops[k]["below"] + x, stops[k]["above"] - x

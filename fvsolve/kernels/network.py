@@ -14,6 +14,7 @@ from fvsolve.kernels.records import (
     FIXED,
     I_ARMED,
     I_COLUMNS,
+    I_DEVICES,
     I_LAYOUT,
     I_NODES,
     I_PIPES,
@@ -29,16 +30,23 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
-from fvsolve.kernels.valves import flow_slope, valve_conductance
+from fvsolve.kernels.restrictions import conductance, open_scheduled, restriction_slope
+
+
+@njit(forceinline=True)
+def clear_net(out, tables):
+    """Zero in out[net], to which links then add what they carry into their nodes."""
+    net = tables[I_LAYOUT][0]["net"]
+    for i in range(tables[I_NODES].size):
+        out[net + i] = 0.0
 
 
 @njit(forceinline=True)
 def waves_out(y, out, tables):
     """Outgoing waves of all pipes into out[ends], and what they carry into their nodes into out[net]."""
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
-    nodes, scratch = tables[I_NODES], tables[I_SCRATCH]
-    for i in range(nodes.size):
-        out[layout["net"] + i] = 0.0
+    scratch = tables[I_SCRATCH]
+    clear_net(out, tables)
     for i in range(pipes.size):
         pipe = pipes[i]
         n, at = pipe["cells"], layout["ends"] + 4 * i
@@ -93,7 +101,7 @@ def net_flows(out, tables):
 @njit(forceinline=True)
 def stiffness_of(nodes, layout, out, i):
     """Pressure per stored mass [Pa/kg] of node i now, 0 where it stores none."""
-    if nodes[i]["kind"] == MOVING:
+    if nodes[i]["kind"] >= MOVING:
         return out[layout["stiffness"] + nodes[i]["row"]]
     return nodes[i]["stiffness"]
 
@@ -131,10 +139,12 @@ def greatest_rate(t, out, tables):
         i, j = valve["from_node"], valve["to_node"]
         stiff_i, stiff_j = stiffness_of(nodes, layout, out, i), stiffness_of(nodes, layout, out, j)
         stiff = stiff_i + stiff_j
+        if valve["device"] >= 0 and tables[I_DEVICES][valve["device"]]["row"] >= 0:
+            continue  # the gate of a vessel, which says itself how quick it is
         if stiff > 0.0:
-            g = valve_conductance(tables, k, t)
+            g = conductance(tables, out, k)
             drop = valve["drop"] + (out[layout["pressure"] + i] - out[layout["pressure"] + j])
-            slope = flow_slope(g, valve["transition"], drop)
+            slope = restriction_slope(tables, out, k, drop)
             soft = 0.0
             if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
                 soft += 1.0 / nodes[i]["admittance"]
@@ -156,6 +166,7 @@ def rhs_linear(t, y, dydt, out, handle):
     tables = open_tables(handle)
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     waves_out(y, out, tables)
     close_nodes(t, y, out, tables)
     waves_in(out, tables)

@@ -21,13 +21,13 @@ from fvsolve.kernels.records import (
     JUNCTION,
     TANK,
 )
+from fvsolve.kernels.restrictions import conductance
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
 from fvsolve.kernels.valves import (
     flow_at_drop,
     flow_change,
     flow_change_laminar,
-    valve_conductance,
 )
 
 
@@ -77,7 +77,7 @@ def side_of(out, layout, nodes, i):
 
 
 @njit(forceinline=True)
-def close_single(t, out, tables):
+def close_single(out, tables):
     """Valves with at most one node without storage at each end, that no other valve touches: closed roots."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     for k in range(valves.size):
@@ -87,7 +87,7 @@ def close_single(t, out, tables):
         i, j = valve["from_node"], valve["to_node"]
         pi, zi = side_of(out, layout, nodes, i)
         pj, zj = side_of(out, layout, nodes, j)
-        g = valve_conductance(tables, k, t)
+        g = conductance(tables, out, k)
         if valve["transition"] > 0.0:
             base = flow_at_drop(valve["open"], valve["transition"], valve["drop"]) - valve["flow"]
             x = flow_change_laminar(g, valve["transition"], zi + zj, valve["flow"], base, valve["drop"] + (pi - pj))
@@ -107,7 +107,7 @@ def close_nodes(t, y, out, tables):
     stored_pressures(t, y, out, tables)
     junction_flows(t, y, out, tables)
     close_alone(out, tables)
-    close_single(t, out, tables)
+    close_single(out, tables)
     for which in range(tables[I_CLUSTERS].size):
-        close_cluster(t, out, tables, which)
+        close_cluster(out, tables, which)
     hold_columns(t, out, tables)

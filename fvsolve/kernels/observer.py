@@ -196,16 +196,9 @@ def record_nodes(t, out, tables, values):
 
 
 @njit
-def record_linear(t, y, out, handle, values):
-    """Extremes, envelopes and marks after every accepted step."""
-    observe_linear(t, y, out, handle, values)
-    record_all(t, y, out, open_tables(handle), values)
-
-
-@njit
-def events(t, y, handle, g):
+def tank_events(y, tables, g):
     """Functions that are located where they fall through zero: a tank's content, and its room below the rim."""
-    nodes, k = open_tables(handle)[I_NODES], 0
+    nodes, k = tables[I_NODES], 0
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK:
             stored = nodes[i]["mass"] + y[nodes[i]["y"]]

@@ -6,7 +6,7 @@ length m = rho A and mass flow M from the profile. r_t + c r_x = -drag'/2, l_t -
 
 from fvsolve.jit import njit
 from fvsolve.kernels.ends import edge_cells, entering_cells, leaving_cells
-from fvsolve.kernels.friction import drag
+from fvsolve.kernels.friction import drag, drag_hazen
 from fvsolve.kernels.reconstruction import faces
 from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH, LINEAR, MUSCL, SHORT, UPWIND, WENO5
 
@@ -119,15 +119,28 @@ def rub(k, flow, loss, base, r, l, dr, dl):
 
 
 @njit
-def rub_any(k, pipe, base, r, l, dr, dl):
-    """`rub` with a friction law that follows the flow."""
-    kind, loss, rough = pipe["friction"], pipe["loss"], pipe["rough"]
+def rub_rough(k, pipe, base, r, l, dr, dl):
+    """`rub` with a friction law that follows the flow by roughness."""
+    loss, rough = pipe["loss"], pipe["rough"]
     e, reynolds, flow, lean = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
     for i in range(r.size):
         m = flow + (r[i] - l[i])
         d = lean * (dr[i] + dl[i])
-        both = drag(kind, loss, rough, e, reynolds, m + d) + drag(kind, loss, rough, e, reynolds, m - d)
+        high = drag(FRICTION_ROUGH, loss, rough, e, reynolds, m + d)
+        both = high + drag(FRICTION_ROUGH, loss, rough, e, reynolds, m - d)
         s = 0.25 * both - base
+        dr[i] -= s
+        dl[i] += s
+
+
+@njit
+def rub_hazen(k, flow, loss, rough, base, r, l, dr, dl):
+    """`rub` with Hazen-Williams."""
+    lean = GAUSS / k
+    for i in range(r.size):
+        m = flow + (r[i] - l[i])
+        d = lean * (dr[i] + dl[i])
+        s = 0.25 * (drag_hazen(loss, rough, m + d) + drag_hazen(loss, rough, m - d)) - base
         dr[i] -= s
         dl[i] += s
 
@@ -171,7 +184,9 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
         fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
         both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)
         rates_from_faces(k, fr, fl, dr, dl)
-    if not plain:
-        rub_any(k, pipe, base, r, l, dr, dl)
+    if pipe["friction"] == FRICTION_ROUGH:
+        rub_rough(k, pipe, base, r, l, dr, dl)
+    elif pipe["friction"] == FRICTION_HAZEN:
+        rub_hazen(k, pipe["flow"], pipe["loss"], pipe["rough"], base, r, l, dr, dl)
     elif pipe["loss"] != 0.0 or base != 0.0:
         rub(k, pipe["flow"], pipe["loss"], base, r, l, dr, dl)

@@ -10,7 +10,7 @@ import numpy as np
 
 # Codes of kinds, as the kernels see them.
 FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
-MOVING = 4  # a chamber whose volume a piston changes: its pressure is there before the nodes are closed
+MOVING, VESSEL = 4, 5  # stores whose pressure is there before nodes are closed: of a piston, of a device
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
 UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
     0,
@@ -21,7 +21,8 @@ UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
 )  # scheme families; LINEAR ones are six weights, SHORT upwind3
 MINMOD, VAN_LEER, MONOTONIZED_CENTRAL = 0, 1, 2
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
-LAW_LINEAR, LAW_LOG, LAW_TABLE = 0, 1, 2
+ROOT, TWO_WAY, CURVE, POWER, LIFT = 0, 1, 2, 3, 4  # laws of restrictions; all but ROOT are solved in a cluster
+LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
 # Status codes that travel up; the message is made in Python.
 OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME = 0, 1, 2, 3, 4
@@ -52,6 +53,7 @@ SETTINGS = np.dtype(
         ("viscosity", "f8"),  # dynamic [Pa s]
         ("ambient", "f8"),  # ambient pressure [Pa]
         ("gravity", "f8"),
+        ("datum", "f8"),  # elevation from which energy studies count heights [m]
         ("vapor", "f8"),  # vapour pressure [Pa]
         ("rate", "f8"),  # greatest wave rate that does not change, speed / dx [1/s]
         ("stop_below", "i8"),  # 1: a pressure below vapour pressure ends the run
@@ -63,6 +65,10 @@ SETTINGS = np.dtype(
         ("table_size", "i8"),
         ("table_start", "f8"),
         ("table_step", "f8"),
+        ("floor", "f8"),  # mixture: what the pressure of the gas adds to, vapour pressure or 0 [Pa]
+        ("gas", "f8"),  # its volume over the liquid's, times pressure to the power below [Pa^gas_power]
+        ("gas_power", "f8"),  # 1 / (gas exponent)
+        ("saturation", "f8"),  # gas pressure at which all of it is dissolved; infinite for none [Pa]
     ],
     align=True,
 )
@@ -90,6 +96,9 @@ PIPE = np.dtype(
         ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
         ("slope", "f8"),  # rise per length
+        ("terms", "i8"),  # exponentials of its unsteady friction; 0 for none
+        ("term", "i8"),  # offset in `floats` of pairs: drag per flow that is yet to follow [1/s], rate of following
+        ("memory", "i8"),  # offset in y of the flows that follow, a row of cells for each term [kg/s]
         (
             "face",
             "i8",
@@ -146,6 +155,11 @@ VALVE = np.dtype(
         ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
         ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
         ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 where pipes soften the root
+        ("law", "i8"),
+        ("device", "i8"),  # which device sets its conductance; -1: its schedule does
+        ("data", "i8"),  # offset of a law's own numbers in `floats`
+        ("back", "f8"),  # TWO_WAY: share of the conductance that holds for flow from `to` to `from`
+        ("drive", "f8"),  # CURVE: relative speed of the profile
         ("open", "f8"),  # conductance of the profile; 0 where its flow does not obey it
         ("flow", "f8"),  # of the profile [kg/s]
         ("drop", "f8"),  # of the profile [Pa]
@@ -232,6 +246,21 @@ PISTON = np.dtype(
     align=True,
 )
 
+DEVICE = np.dtype(
+    [
+        ("kind", "i8"),  # which law of kernels.devices
+        ("y", "i8"),  # offset of its own states; -1 for none
+        ("states", "i8"),
+        ("valve", "i8"),  # the restriction that it opens and shuts; -1 for none
+        ("node", "i8"),  # the vessel whose pressure it computes, or the place that it senses; -1 for none
+        ("event", "i8"),  # its first event function
+        ("data", "i8"),  # offset of its numbers in `floats`
+        ("schedule", "i8"),  # -1 for none
+        ("row", "i8"),  # of the vessel that it fills: its number among all whose stiffness changes; -1 for none
+    ],
+    align=True,
+)
+
 SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
 # Piece: start, kind (0 polynomial in t - origin, 1 power), origin, then a, b, c, d or v0, v1, duration, exponent
 PIECE_COLUMNS = 7
@@ -250,6 +279,8 @@ LAYOUT = np.dtype(
         ("swept", "i8"),  # mass flow that the piston and its leak take from moving chambers [kg/s]
         ("net_force", "i8"),  # on bodies [N]
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
+        ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
+        ("drive", "i8"),  # relative speeds of pumps now, one a valve
         ("size", "i8"),
     ],
     align=True,
@@ -273,7 +304,7 @@ PROBE = np.dtype(
     align=True,
 )
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
-POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY = 7, 8, 9, 10, 11
+POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 
 RECORDS = {
     "settings": SETTINGS,
@@ -289,8 +320,9 @@ RECORDS = {
     "braces": BRACE,
     "stops": STOP,
     "pistons": PISTON,
+    "devices": DEVICE,
 }
-ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed")  # int64[:], then float64[:]
+ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
 TABLES = (*RECORDS, *ARRAYS, *MATRICES)
 (
@@ -307,12 +339,14 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_BRACES,
     I_STOPS,
     I_PISTONS,
+    I_DEVICES,
     I_INTEGERS,
     I_FLOATS,
     I_PROFILE,
     I_SCRATCH,
     I_MARKS,
     I_ARMED,
+    I_SPARE,
     I_PIECES,
     I_ENVELOPE,
     I_EXTREMES,

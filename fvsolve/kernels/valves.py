@@ -9,6 +9,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.records import I_FLOATS, I_VALVES
 from fvsolve.kernels.schedules import schedule_value
 
+LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+
 
 @njit(forceinline=True)
 def relative_area(kind, floats, table, size, opening):
@@ -63,6 +65,21 @@ def flow_slope(conductance, transition, drop):
 
 
 @njit(forceinline=True)
+def valve_step(g, transition, m, drop):
+    """a, s with dM = a + s d(drop) for the next Newton step of a valve that carries m [kg/s] at a drop [Pa].
+
+    The chord of the square root stands for its slope: between the flow now and the flow the drop asks for, it is
+    finite and never too steep.
+    """
+    if transition > 0.0:
+        target = flow_at_drop(g, transition, drop)
+        steepest = 45.0 / 32.0 * g / transition
+        return target - m, min(steepest, g / max(abs(target) + abs(m), 1e-300))
+    chord = max(abs(m) + sqrt(g * abs(drop)), LEAST * sqrt(g))
+    return (g * drop - abs(m) * m) / chord, g / chord
+
+
+@njit(forceinline=True)
 def flow_change(conductance, impedance, flow, surplus, asked):
     """Exact root x of |M + x| (M + x) = G (dp0 + dp' - Z x): what a valve between pipe ends adds to M.
 
@@ -87,12 +104,12 @@ def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
 
     base is law(dp0) of the profile less M, so that nothing moves while nothing changes.
     """
+    if conductance <= 0.0:
+        return -flow
     x = flow_at_drop(conductance, transition, drop) - flow - base
     if impedance == 0.0 or x == 0.0:
         return x
     low, high = min(x, 0.0), max(x, 0.0)
-    if conductance <= 0.0:
-        return x
     for _ in range(100):
         rest = drop - impedance * x
         g = flow + x + base - flow_at_drop(conductance, transition, rest)

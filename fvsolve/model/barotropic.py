@@ -8,6 +8,7 @@ from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, valve_target
 from fvsolve.kernels.schedules import schedule_value
+from fvsolve.model.density import cavity_pressure
 from fvsolve.model.start import PRESSURE_SCALE, STORED, Start
 
 
@@ -18,13 +19,19 @@ class BarotropicStart(Start):
         super().__init__(scene)
         self.st, self.floats = scene.tables[rec.I_SETTINGS][0], scene.tables[rec.I_FLOATS]
         self.rho, self.g = scene.fluid.density, self.case.gravity
+        self.end_flow = end_flow
+        if self.st["floor"] > 0.0:
+            from fvsolve.kernels.cavitating_nodes import end_flow_cavitating
+
+            self.end_flow = end_flow_cavitating
 
     def solve(self) -> None:
         before = None
         for _ in range(80):
             super().solve()
             now = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
-            if before is not None and np.max(np.abs(now - before), initial=0.0) <= 1e-14 * (1 + np.max(np.abs(now))):
+            scale = 1 + np.max(np.abs(now), initial=0.0)  # bodies alone have no unknowns here
+            if before is not None and np.max(np.abs(now - before), initial=0.0) <= 1e-14 * scale:
                 break
             before = now
             self.correct()
@@ -63,17 +70,26 @@ class BarotropicStart(Start):
             self.extra[names[k]] = (potential[i] - self.rho * b_to) - plain if flow != 0.0 else 0.0
         for k, row in enumerate(self.valves):
             i, j = int(row["from_node"]), int(row["to_node"])
-            self.factor[k] = self.dense(i, j)
+            denser, wider = self.denser(i, j)
+            self.dense_of[k], self.factor[k], self.ratio[k] = (denser, wider), denser * wider, wider
         for k, row in enumerate(self.pistons):
             self.factor[len(self.valves) + k] = self.dense(int(row["a"]), int(row["b"]))
 
     def dense(self, i: int, j: int) -> float:
         """(upstream density / rho)(driving pressure / change of potential)."""
+        denser, wider = self.denser(i, j)
+        return denser * wider
+
+    def denser(self, i: int, j: int) -> tuple[float, float]:
+        """Upstream density / rho, driving pressure / change of potential."""
         z, p = self.nodes["elevation"], [self.pressure(i), self.pressure(j)]
         drop, rho = drive(self.st, self.floats, p[0], z[i], p[1], z[j])
         change = self.answer.potential[i] - self.answer.potential[j]
         ratio = drop / change if abs(change) > 1e-3 else rho / self.rho
-        return rho / self.rho * ratio
+        return rho / self.rho, ratio
+
+    def density_at(self, i: int) -> float:
+        return law.density(self.st, self.floats, float(self.pressure(i))) if hasattr(self, "answer") else self.rho
 
     def pressure(self, i: int) -> float:
         return self.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
@@ -126,12 +142,12 @@ class BarotropicStart(Start):
             profile[row["center"] : row["center"] + n] = centers
             for m0, name, sign in ((faces[0], "from", -1.0), (faces[-1], "to", 1.0)):
                 i = int(row[f"{name}_node"])
-                into, _, mass = end_flow(self.st, self.floats, row, m0, sign * flow,
+                into, _, mass = self.end_flow(self.st, self.floats, row, m0, sign * flow,
                                          float(self.nodes["pressure"][i]), bool(self.still(i)))  # fmt: skip
                 near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
                 row[f"{name}_base"] = into if near else sign * flow
                 row[f"{name}_mass"] = mass if near else m0
-            boiling, _ = law.mass_of_pressure(self.st, self.floats, row, self.scene.fluid.vapor_pressure)
+            boiling, _ = law.mass_of_pressure(self.st, self.floats, row, cavity_pressure(self.scene.fluid))
             profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
             self.scene.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
             self.flux(row, faces, profile)
@@ -174,13 +190,20 @@ class BarotropicStart(Start):
             small = 1e-10 * (PRESSURE_SCALE + abs(change)) + abs(row["base"] - change)
             row["offset"] = offset if abs(offset) > small else 0.0
 
+    def law_of(self, k: int) -> tuple[float, float]:
+        i, j = int(self.valves[k]["from_node"]), int(self.valves[k]["to_node"])
+        p, z = self.nodes["pressure"], self.nodes["elevation"]
+        drop, rho = drive(self.st, self.floats, p[i], z[i], p[j], z[j])
+        return float(self.valves[k]["conductance"]) * rho / self.rho, drop
+
     def fill_valves(self) -> None:
         out = np.zeros(int(self.scene.tables[rec.I_LAYOUT][0]["size"]))
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
-            if row["open"] > 0.0:
+            if row["open"] > 0.0 and row["law"] < rec.CURVE:
                 target = valve_target(self.scene.tables, out, k, float(row["open"]))[0]
-                asked = target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
+                follows = row["transition"] > 0.0 or row["law"] == rec.POWER
+                asked = target if follows else np.sign(target) * np.sqrt(abs(target))
                 if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                     row["open"] = 0.0

@@ -10,16 +10,21 @@ from fvsolve.errors import CaseError, Fault
 from fvsolve.kernels import records as rec
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.density import add_density_table
+from fvsolve.model.density import add_law, cavity_pressure
+from fvsolve.model.devices import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import quicker, scheme_settings
 from fvsolve.model.start import start_profile
+from fvsolve.model.unsteady import reserve
 from fvsolve.parts import EDGES
+from fvsolve.parts.schedule import constant
 
-KINDS = ("pipe", "rigid-column", "valve", "spool-valve")  # of links that carry the fluid
+KINDS = ("pipe", "rigid-column", "valve", "spool-valve", "device")  # of links that carry the fluid
+
+ALIKE = dict.fromkeys(("orifice", "connection", "outlet"), "valve")
 
 
 def build(case) -> Model:
@@ -43,10 +48,12 @@ class Scene:
         self.law = Hydraulics(case)
         self.schedules = Schedules()
         self.floats: list[float] = []
+        cylinders = [name for name, link in case.links.items() if link.kind == "cylinder"]
+        self.moving_names = {f"{name}.{place}" for name in cylinders for place in "AB"}
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.faults: list[Fault] = []
         self.warnings: list[str] = []
-        self.size = self.tanks = 0
+        self.size = self.tanks = self.cells = 0
         self.state_names: list[str] = []
         self.scale: list[float] = []
 
@@ -64,6 +71,15 @@ class Scene:
         self.size += len(names)
         return self.size - len(names)
 
+    @property
+    def device_names(self) -> list[str]:
+        """Parts that are devices, as their table has them."""
+        return [name for name, _, _ in self.devices]
+
+    def device_of(self, name: str) -> Device:
+        """What a device is lowered by."""
+        return self.devices[self.device_names.index(name)][2]
+
     # nodes ------------------------------------------------------------------------------------------------
 
     def nodes(self) -> None:
@@ -74,11 +90,15 @@ class Scene:
         for i, (name, node) in enumerate(self.case.places.items()):
             row = table[i]
             row["elevation"] = self.case.elevation(name)
-            getattr(self, "node_" + node.kind)(name, node, row)
-            if name not in self.case.nodes:
-                row["kind"], row["row"] = rec.MOVING, moving
+            device = Device.kinds.get(node.kind)
+            if device is None:
+                getattr(self, "node_" + node.kind)(name, node, row)
+            if name in self.moving_names or (device is not None and device.vessel):
+                row["kind"], row["row"] = rec.MOVING if device is None else rec.VESSEL, moving
                 moving += 1
-        self.node_table = table
+            if device is not None:
+                device.place(self, name, node, row)
+        self.node_table, self.moving = table, moving
 
     def node_reservoir(self, name, node, row) -> None:
         row["kind"] = rec.FIXED
@@ -86,6 +106,9 @@ class Scene:
             row["schedule"] = self.law.add_head(self.schedules, node.head, row)
         else:
             row["schedule"] = self.schedules.add(node.pressure)
+
+    def node_outside(self, name, node, row) -> None:
+        row["kind"], row["schedule"] = rec.FIXED, self.schedules.add(constant(self.case.ambient_pressure))
 
     def node_junction(self, name, node, row) -> None:
         row["kind"] = rec.JUNCTION
@@ -124,22 +147,25 @@ class Scene:
     def node_chamber(self, name, node, row) -> None:
         row["kind"], row["volume"] = rec.CHAMBER, node.volume
         row["stiffness"] = self.fluid.bulk_modulus / (self.fluid.density * node.volume)
-        stored = "mass" if name in self.case.nodes else "excess"
+        stored = "excess" if name in self.moving_names else "mass"
         row["y"] = self.states([f"{name}.{stored}"], 1e5 / row["stiffness"])
 
     # links ------------------------------------------------------------------------------------------------
 
     def links(self) -> None:
         by_kind: dict[str, list] = {}
-        for name, link in self.case.links.items():
-            by_kind.setdefault("valve" if link.kind == "orifice" else link.kind, []).append((name, link))
-        pipes, columns, valves, spools = (by_kind.get(kind, []) for kind in KINDS)
+        for name, link in self.case.conduits.items():
+            kind = "device" if link.kind in Device.kinds else ALIKE.get(link.kind, link.kind)
+            by_kind.setdefault(kind, []).append((name, link))
+        pipes, columns, valves, spools, devices = (by_kind.get(kind, []) for kind in KINDS)
         self.pipe_names = [name for name, _ in pipes]
         self.column_names = [name for name, _ in columns]
         self.valve_names = [name for name, _ in valves] + [name for name, _ in spools for _ in EDGES]
+        self.valve_names += [name for name, _ in devices]
         self.pipe_table = np.zeros(len(self.pipe_names), rec.PIPE)
         self.column_table = np.zeros(len(self.column_names), rec.COLUMN)
         self.valve_table = np.zeros(len(self.valve_names), rec.VALVE)
+        self.valve_table["device"], self.valve_table["back"] = -1, 1.0
         self.meshes: list[PipeMesh] = []
         for k, (name, link) in enumerate(pipes):
             self.pipe(name, link, self.pipe_table[k])
@@ -149,6 +175,11 @@ class Scene:
             self.valve(name, link, self.valve_table[k])
         for k, (name, link) in enumerate(spools):
             self.spool(name, link, self.valve_table[len(valves) + len(EDGES) * k :])
+        for (name, link), row in zip(devices, self.valve_table[len(self.valve_table) - len(devices) :], strict=True):
+            self.ends(link, row)
+            row["schedule"] = -1
+            Device.kinds[link.kind].restriction(self, name, link, row)
+        lower_devices(self)
         for row in self.pipe_table:
             self.node_table["admittance"][row["from_node"]] += row["admittance"]
             self.node_table["admittance"][row["to_node"]] += row["admittance"]
@@ -164,12 +195,14 @@ class Scene:
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
         row["quicker"] = quicker(self.case.numerics.scheme, n)
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
-        row["cell"] = sum(mesh.cells for mesh in self.meshes)
+        row["cell"], self.cells = self.cells, self.cells + n
         z = self.node_table["elevation"][[row["from_node"], row["to_node"]]]
         row["slope"] = (z[1] - z[0]) / link.length
         row["noise"] = (1e-9 * self.fluid.density * area * speed) ** 2
         row["compliance"] = self.law.compliance(name, speed, self.fault)
         self.law.friction(name, link, row, self.fault)
+        if link.friction.model == "unsteady":
+            reserve(self, row)
         names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
         row["y"] = self.states(names, 0.5e5 * row["admittance"])
         x = (np.arange(n) + 0.5) * (link.length / n)
@@ -188,6 +221,8 @@ class Scene:
 
     def valve(self, name, link, row) -> None:
         self.ends(link, row)
+        if link.kind in ("connection", "outlet"):
+            return getattr(self, link.kind)(name, link, row)
         row["schedule"] = self.schedules.add(link.opening)
         self.restriction(name, link, row)
         if link.characteristic == "equal-percentage":
@@ -196,6 +231,21 @@ class Scene:
             row["characteristic"], row["table"] = 2, len(self.floats)
             row["table_size"] = len(link.characteristic.opening)
             self.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
+
+    def connection(self, name, link, row) -> None:
+        """A throat with a loss each way."""
+        row["schedule"], row["back"] = self.schedules.add(constant(1.0)), link.back
+        row["law"] = rec.ROOT if link.back == 1.0 else rec.TWO_WAY
+        self.restriction(name, link, row)
+
+    def outlet(self, name, link, row) -> None:
+        """A way out to ambient, its flow a power of the drop."""
+        row["schedule"], row["law"] = self.schedules.add(link.opening, 1.0 / link.full), rec.POWER
+        row["data"] = len(self.floats)
+        least = 0.0 if link.least is None else link.least - self.case.ambient_pressure
+        span = 1e5 if link.upper is None else link.upper - self.case.ambient_pressure - least
+        row["conductance"] = (self.fluid.density * link.flow) ** 2 / span
+        self.floats += [link.exponent, least, span, link.most]
 
     def spool(self, name, link, rows) -> None:
         """Four valves; those of one side of zero share a schedule of their opening."""
@@ -222,7 +272,7 @@ class Scene:
 
     def profile_size(self) -> int:
         """Place of every pipe's profile: a threshold a cell; under `log` and `table` masses and fluxes behind it."""
-        at = sum(mesh.cells for mesh in self.meshes)
+        at = self.cells
         if self.case.fluid.law == "linear":
             return at
         for row in self.pipe_table:
@@ -237,40 +287,44 @@ class Scene:
         settings = np.zeros(1, rec.SETTINGS)
         s = settings[0]
         scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
-        s["rho"], s["beta"], s["reference"] = self.fluid.density, self.fluid.bulk_modulus, self.fluid.pressure
         s["viscosity"] = self.fluid.viscosity or 0.0
         s["ambient"], s["gravity"], s["limit"] = case.ambient_pressure, case.gravity, np.inf
         s["vapor"] = self.fluid.vapor_pressure
         s["stop_below"] = case.numerics.below_vapor == "stop"
-        s["law"] = {"linear": rec.LAW_LINEAR, "log": rec.LAW_LOG, "table": rec.LAW_TABLE}[case.fluid.law]
-        if self.fluid.table is not None:
-            add_density_table(self.fluid, s, self.floats)
+        add_law(self.fluid, s, self.floats)
         s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
-        most, cells = max(pipes["cells"], default=0), sum(mesh.cells for mesh in self.meshes)
-        system = max((c["nodes"] * (c["nodes"] + 4) + 4 * c["valves"] for c in self.cluster_table), default=0)
-        system += 5 * len(self.node_table) + 2 * len(self.valve_table)
+        most, cells = max(pipes["cells"], default=0), self.cells
+        system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in self.cluster_table), default=0)
+        system += 7 * len(self.node_table) + 2 * len(self.valve_table)
         layout = np.zeros(1, rec.LAYOUT)
         at = rec.OUT_HEAD
         for name, size in (
             ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("net", len(self.node_table)),
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
-            ("stiffness", 2 * len(self.piston_table)), ("swept", 2 * len(self.piston_table)),
+            ("stiffness", self.moving), ("swept", self.moving),
             ("net_force", len(self.body_table)), ("push", len(self.push_names)),
+            ("conductance", len(self.valve_table)), ("drive", len(self.valve_table)),
         ):  # fmt: skip
             layout[name], at = at, at + size
         layout["size"] = at
-        marks = np.full(len(pipes) + 3 * len(self.node_table) + len(self.column_table) + len(self.piston_table), np.nan)
+        parts = len(pipes) + 3 * len(self.node_table) + len(self.column_table)
+        marks = np.full(parts + len(self.device_table) + len(self.piston_table), np.nan)
+        if s["floor"] > 0.0:  # first place, greatest volume and its time of the cavities of each pipe
+            marks = np.append(marks, np.full(3 * len(pipes), np.nan))
+            s["vapor"] = cavity_pressure(self.fluid)
         envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
         for array in (envelope, extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         self.tables = (
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,
+            self.device_table,
             np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
-            np.zeros(max(2 * most + 64, system, 2 * len(self.body_table))), marks,
-            np.zeros(2 * (self.tanks + len(self.stop_table))), pieces, envelope, extremes,
+            np.zeros(max(4 * most + 64, system, 2 * len(self.body_table))), marks,
+            np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at),
+            pieces, envelope, extremes,
         )  # fmt: skip
 
     def column_rates(self):
@@ -288,7 +342,7 @@ class Scene:
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
             self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
-            self.steady, self.profiles,
+            self.steady, self.profiles, self.devices, self.events,
         )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from fvsolve.steppers.tableau import method_named
 
 SECONDS_PER_CELL_STEP = 5e-9  # of a method with three stages; benchmarks/kernels.py
 SECONDS_PER_STEP = 1.5e-6
+STIFF = 3.0  # times as many steps as waves ask for: from there on an implicit method is worth a try
 
 
 def checks(model) -> dict[str, Any]:
@@ -27,7 +28,7 @@ def checks(model) -> dict[str, Any]:
         name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
         for name, row in zip(model.body_names, model.tables[rec.I_BODIES], strict=False)
     }
-    pipes = {}
+    pipes, remembered = {}, model.steady["unsteady"]
     for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
@@ -39,6 +40,7 @@ def checks(model) -> dict[str, Any]:
             "reynolds": float(rho * abs(velocity) * mesh.diameter / viscosity) if viscosity else None,
             "friction_factor": float(abs(loss) / dynamic) if dynamic > 0 else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
+            **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}),
         }  # fmt: skip
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
@@ -61,6 +63,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
         return None, f"error control, rtol = {numerics.rtol:g}"
     if method_named(numerics.method).explicit:
         own = model.wave_rates * model.tables[rec.I_PIPES]["quicker"]
+        own = np.maximum(own, [model.steady["unsteady"].get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
         rate = float(model.evaluate(numerics.start, np.zeros(model.y_size), numerics.start)[1][rec.RATE])
     else:  # waves alone: implicit steps cope with the rest
         own, rate = model.wave_rates, float(model.wave_rates.max(initial=0.0))
@@ -69,4 +72,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
-    return numerics.courant / rate, "a chamber, tank, rigid column or mass, quicker than every pipe cell"
+    part = "a chamber, tank, rigid column or mass, quicker than every pipe cell"
+    if len(own) and rate > STIFF * own.max():
+        part += f', {rate / own.max():.3g} times; rtol with method = "rodas-5p" does not follow it'
+    return numerics.courant / rate, part

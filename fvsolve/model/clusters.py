@@ -21,13 +21,15 @@ def sort_nodes(scene) -> None:
                 touched.setdefault(group[i], [])
                 if k not in touched[group[i]]:
                     touched[group[i]].append(k)
+    known = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
     integers = scene.integers = []
     clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
     nodes["solve"] = rec.ALONE
     for root, ks in touched.items():
         soft = np.all(nodes["admittance"][members[root]] > 0.0)
-        single = len(ks) == 1 and soft and scene.case.fluid.law == "linear"
+        plain = np.all(valves["law"][ks] == rec.ROOT)
+        single = len(ks) == 1 and soft and plain and scene.case.fluid.law == "linear"
         nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
         valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
         if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(scene, members[root], ks):
@@ -37,14 +39,17 @@ def sort_nodes(scene) -> None:
         nodes["row"][members[root]] = np.arange(len(members[root]))
         clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
         integers += members[root] + ks
+    for k in np.flatnonzero(known & (valves["law"] != rec.ROOT)):  # a cluster without nodes
+        valves["solve"][k] = rec.CLUSTER
+        clusters.append((len(integers), 0, len(integers), 1))
+        integers.append(int(k))
     if scene.case.fluid.law != "linear":
         for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
             nodes["row"][i] = 0
             clusters.append((len(integers), 1, len(integers) + 1, 0))
             integers.append(int(i))
     gates(scene)
-    stiff = [k for k, v in enumerate(valves) if not inner[v["from_node"]] and not inner[v["to_node"]]]
-    soften(scene, stiff)
+    soften(scene, np.flatnonzero(known))
     scene.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
         if nodes["solve"][i] == rec.ALONE:
@@ -60,6 +65,8 @@ def gates(scene) -> None:
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
     for i in np.flatnonzero(bare):
         held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
+        if any(valves["device"][k] >= 0 and scene.device_table["node"][valves["device"][k]] >= 0 for k in held):
+            continue  # a vessel opens before the column can be stopped
         if sum(i in (c["from_node"], c["to_node"]) for c in columns) == 1 and held and asks_nothing(scene, i):
             nodes["gates"][i], nodes["gate_count"][i] = len(scene.integers), len(held)
             scene.integers += held
@@ -74,13 +81,14 @@ def asks_nothing(scene, i: int) -> bool:
 def carries_its_column(scene, members, ks) -> bool:
     """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
     ends = np.concatenate((scene.column_table["from_node"], scene.column_table["to_node"]))
-    return len(ks) == 1 and len(members) == 1 and members[0] in ends
+    plain = scene.valve_table["law"][ks[0]] == rec.ROOT
+    return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
 
 
 def soften(scene, ks) -> None:
     """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10."""
     for k in ks:
-        if scene.valve_table["transition"][k] == 0.0:
+        if scene.valve_table["transition"][k] == 0.0 and scene.valve_table["law"][k] <= rec.TWO_WAY:
             name = scene.valve_names[k]
-            flow = scene.law.transition_flow(name, scene.case.links[name], 10.0, scene.fault)
+            flow = scene.law.transition_flow(name, scene.case.conduits[name], 10.0, scene.fault)
             scene.valve_table["transition"][k] = flow

@@ -1,8 +1,51 @@
-"""The density table of law `table` as kernels read it. Knows a fluid; knows no pipe."""
+"""The laws `table` and `mixture` as kernels read them. Knows a fluid; knows no pipe."""
 
 from __future__ import annotations
 
 import numpy as np
+
+from fvsolve.fluid import ATMOSPHERE
+from fvsolve.kernels import records as rec
+
+LAWS = {"linear": rec.LAW_LINEAR, "log": rec.LAW_LOG, "table": rec.LAW_TABLE, "mixture": rec.LAW_MIXTURE}
+
+
+def add_law(fluid, s, floats: list[float]) -> None:
+    """A fluid's density law and what it needs; a mixture with nothing mixed in is `log`."""
+    s["rho"], s["beta"], s["reference"] = fluid.density, fluid.bulk_modulus, fluid.pressure
+    s["law"] = LAWS[fluid.law]
+    if fluid.table is not None:
+        add_density_table(fluid, s, floats)
+    if fluid.law == "mixture":
+        add_mixture(fluid, s)
+
+
+def density_of(fluid, pressure: float) -> float:
+    """Density [kg/m3] of a fluid at a pressure, under any law but `linear`."""
+    from fvsolve.kernels.density import density
+
+    settings, floats = np.zeros(1, rec.SETTINGS), []
+    add_law(fluid, settings[0], floats)
+    return density(settings[0], np.array(floats), float(pressure))
+
+
+def cavity_pressure(fluid) -> float:
+    """Pressure [Pa] below which a place is a cavity: more vapour than gas; without cavitation, the vapour pressure."""
+    return fluid.vapor_pressure * (2.0 if fluid.air is not None and fluid.air.cavitation else 1.0)
+
+
+def add_mixture(fluid, s) -> None:
+    """The gas: `air_fraction` of the volume at 1 atm, over the liquid's volume at the reference pressure."""
+    air = fluid.air
+    if air is None or air.fraction == 0.0:
+        s["law"] = rec.LAW_LOG
+        return
+    s["floor"] = fluid.vapor_pressure if air.cavitation else 0.0
+    s["gas_power"], s["saturation"] = 1.0 / air.exponent, air.saturation_pressure - s["floor"]
+    x = ATMOSPHERE - s["floor"]
+    liquid = 1.0 - (ATMOSPHERE - fluid.pressure) / fluid.bulk_modulus
+    free = air.fraction / (1.0 - air.fraction) * liquid
+    s["gas"] = free * x ** s["gas_power"] / (1.0 - x / s["saturation"])
 
 
 def add_density_table(fluid, s, floats: list[float]) -> None:

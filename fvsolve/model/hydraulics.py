@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 
-from fvsolve.kernels import records as rec
+import numpy as np
 
-HAZEN_WILLIAMS = 10.67  # h / L = 10.67 q^1.852 / (C^1.852 D^4.8704), SI
+from fvsolve.kernels import records as rec
+from fvsolve.model.density import density_of
+
+HAZEN_WILLIAMS = 4.727 * 0.3048**-0.685  # h / L = 10.667 q^1.852 / (C^1.852 D^4.871), EPANET's 4.727 in feet, as SI
+MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3), SI
 
 
 class Hydraulics:
@@ -18,15 +22,15 @@ class Hydraulics:
 
     @property
     def tank_density(self) -> float:
-        """Density of what tanks hold [kg/m3]: the reference density, or under `log` and `table` that at ambient."""
+        """Density of what tanks hold [kg/m3]: the reference density, or under the other laws that at ambient."""
         if self.fluid.law == "linear":
             return self.rho
+        if self.fluid.air is not None:
+            return density_of(self.fluid, self.ambient)
         change = self.ambient - self.fluid.pressure
         if self.fluid.table is not None:
-            from numpy import interp
-
             table = self.fluid.table
-            low, here = interp([self.fluid.pressure, self.ambient], table.pressure, table.log_density)
+            low, here = np.interp([self.fluid.pressure, self.ambient], table.pressure, table.log_density)
             return self.rho * math.exp(here - low)
         return self.rho * math.exp(change / self.fluid.bulk_modulus)
 
@@ -47,12 +51,20 @@ class Hydraulics:
         row["friction"] = rec.FRICTION_NONE if row["loss"] == 0.0 else rec.FRICTION_FACTOR
         if law.model == "none":
             return
+        if law.model == "unsteady" and not self.fluid.viscosity:
+            fault(f"links.{name}.friction", '"unsteady" needs the fluid\'s viscosity; give fluid.viscosity')
+            return
         if law.model == "hazen-williams":
             row["friction"] = rec.FRICTION_HAZEN
             row["rough"] = (
                 area * self.rho * self.gravity * HAZEN_WILLIAMS
-                / (self.rho**1.852 * law.coefficient**1.852 * link.diameter**4.8704)
+                / (self.rho**1.852 * law.coefficient**1.852 * link.diameter**4.871)
             )  # fmt: skip
+        elif law.model == "chezy-manning":
+            row["friction"] = rec.FRICTION_FACTOR
+            row["loss"] += (
+                area * self.gravity * MANNING * law.coefficient**2 / (self.rho * link.diameter ** (16.0 / 3.0))
+            )
         elif law.factor is not None:
             row["friction"] = rec.FRICTION_FACTOR
             row["loss"] += per_factor * law.factor

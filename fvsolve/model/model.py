@@ -66,6 +66,8 @@ class Model:
     warnings: list[str]
     steady: dict[str, Any]  # what the start looks like, for `check`
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
+    devices: list[tuple]  # (name, part, what it is lowered by), as their table has them
+    events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
 
     @property
     def y_size(self) -> int:
@@ -82,6 +84,23 @@ class Model:
         """Cells that a wave crosses in a second, for every pipe [1/s]."""
         pipes = self.tables[rec.I_PIPES]
         return pipes["speed"] / pipes["dx"]
+
+    @property
+    def unsteady(self) -> bool:
+        """Whether the friction of a pipe remembers the past of its flow."""
+        return bool(self.tables[rec.I_PIPES]["terms"].any())
+
+    @property
+    def rooms(self) -> tuple[str, ...]:
+        """What the scene has beside the fluid's places and links."""
+        there = {"bodies": len(self.tables[rec.I_BODIES]), "devices": len(self.tables[rec.I_DEVICES])}
+        there |= {"memory": self.unsteady, "cavities": self.cavitates and self.cells}
+        return tuple(room for room, count in there.items() if count)
+
+    @property
+    def device_kinds(self) -> tuple[int, ...]:
+        """Codes of the devices that there are."""
+        return tuple(int(kind) for kind in np.unique(self.tables[rec.I_DEVICES]["kind"]))
 
     @property
     def layout(self):
@@ -104,10 +123,10 @@ class Model:
         return Structure(sparsity(self), self.case.numerics.linear_algebra)
 
     def functions(self) -> tuple:
-        """(rhs, observe, record, events) for the density law of the case, with bodies where it has some, compiled."""
+        """(rhs, observe, record, events), compiled: of the case's law, with what the scene has."""
         from fvsolve.kernels.functions import functions
 
-        return functions(self.case.fluid.law, len(self.tables[rec.I_BODIES]) > 0)
+        return functions(self.case.fluid.law, self.cells > 0, self.rooms, self.device_kinds)
 
     def new_out(self) -> np.ndarray:
         """An array for what the rhs writes beside dydt."""
@@ -121,11 +140,20 @@ class Model:
         """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
         self.tables[rec.I_SETTINGS][0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
-        armed = self.tables[rec.I_ARMED]
-        self.functions()[3](float(t), np.ascontiguousarray(y, dtype=np.float64), self.handle, armed)
-        armed[:] = armed <= 0.0
-        self.functions()[0](float(t), np.ascontiguousarray(y, dtype=np.float64), dydt, out, self.handle)
+        y = np.ascontiguousarray(y, dtype=np.float64)
+        self.arm(float(t), y)
+        self.functions()[0](float(t), y, dydt, out, self.handle)
         return dydt, out
+
+    def arm(self, t: float, y: np.ndarray) -> None:
+        """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
+        armed, g = self.tables[rec.I_ARMED], np.zeros(self.tables[rec.I_ARMED].size)
+        for _ in range(1 + 2 * len(self.events)):
+            self.functions()[3](t, y, self.handle, g)
+            changed = np.any((g <= 0.0) != (armed > 0.0))
+            armed[:] = g <= 0.0
+            if not changed:
+                return
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
@@ -172,16 +200,27 @@ class Model:
         return h.reshape(np.shape(pressure)) / gravity + elevation
 
     @property
+    def cavitates(self) -> bool:
+        """Whether the density law knows cavities: it has a floor."""
+        return bool(self.tables[rec.I_SETTINGS][0]["floor"] > 0.0)
+
+    @property
     def reference(self) -> float:
         """Pressure at which density and areas are the stated ones [Pa]."""
         return self.case.properties.pressure
 
     def density(self, pressure: np.ndarray) -> np.ndarray:
-        """Density [kg/m3] at pressures, under the laws log and table."""
+        """Density [kg/m3] at pressures, under all laws but linear."""
         from fvsolve.kernels.density import density
 
         st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
         return np.array([density(st, floats, float(p)) for p in pressure])
+
+    def swollen(self, row, pressure: np.ndarray) -> np.ndarray:
+        """Area [m2] of a pipe at pressures, under all laws but linear."""
+        from fvsolve.kernels.density import wall_area
+
+        return np.array([wall_area(self.tables[rec.I_SETTINGS][0], row, float(p)) for p in pressure])
 
     def frame(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI."""
@@ -193,7 +232,7 @@ class Model:
             cells = row["cell"] + np.arange(n)
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
-            swollen = row["area"] if linear else row["area"] * np.exp(row["compliance"] * (pressure - self.reference))
+            swollen = row["area"] if linear else self.swollen(row, pressure)
             flow = mass_flow / (rho if linear else self.density(pressure))
             low, high = (self.cell_pressure(k, self.tables[rec.I_ENVELOPE][i, cells]) for i in (0, 2))
             found[pipe.name] = {

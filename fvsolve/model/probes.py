@@ -17,11 +17,15 @@ def lower_probes(scene) -> np.ndarray:
     """The probe table of a scene; pressures of the profile are filled in later by `probe_offsets`."""
     table = np.zeros(len(scene.case.probes), rec.PROBE)
     for row, probe in zip(table, scene.case.probes, strict=True):
-        if probe.part == "nodes" and probe.name in scene.body_index:
+        name = inside(scene, probe)
+        if name in scene.device_names and probe.quantity in scene.device_of(name).quantities:
+            row["index"], row["kind"] = scene.device_names.index(name), rec.DEVICE_VALUE
+            row["side"] = scene.device_of(name).quantities.index(probe.quantity)
+        elif probe.part == "nodes" and probe.name in scene.body_index:
             row["index"] = scene.body_index[probe.name]
             row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
         elif probe.part == "nodes":
-            row["index"] = scene.node_index[probe.name]
+            row["index"] = scene.node_index[name if probe.quantity == "level" else probe.name]
             row["kind"] = rec.LEVEL if probe.quantity == "level" else rec.PRESSURE
         elif probe.quantity == "force":
             row["index"], row["kind"] = scene.push_names.index(probe.name), rec.FORCE
@@ -41,6 +45,12 @@ def lower_probes(scene) -> np.ndarray:
             row["kind"] = rec.PIPE_FLOW if probe.quantity in ("flow", "velocity") else rec.PIPE_PRESSURE
             place(scene, row, probe.fraction)
     return table
+
+
+def inside(scene, probe) -> str:
+    """What lies behind the connection of a part, or the part itself."""
+    name = f"{probe.name}.inside"
+    return name if probe.part == "nodes" and name in scene.node_index else probe.name
 
 
 def place(scene, row, fraction: float) -> None:
@@ -95,6 +105,8 @@ def linear_offsets(scene, start, row, probe) -> None:
 
 def barotropic_offsets(scene, start, row, probe) -> None:
     """What turns a pressure into gauge pressure or head, and the profile's mass per length at the place."""
+    if row["kind"] == rec.DEVICE_VALUE:
+        return
     if row["kind"] in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):
         row["mass"] = start.mass_at(int(row["index"]), probe.fraction)
     if probe.quantity == "gauge_pressure":

@@ -40,6 +40,8 @@ class Reach(NamedTuple):
 def reach_of(settings) -> Reach:
     """Reach of a model's scheme; pipes too short for it reach no further."""
     family, degree = settings["scheme"], int(settings["degree"])
+    if settings["floor"] > 0.0:  # both waves from both sides
+        return Reach(1, 1, 1, 3) if family == rec.UPWIND else Reach(2, 2, 3, 3)
     if family == rec.UPWIND:
         return Reach(1, 0, 0, 1)
     if family == rec.MUSCL:
@@ -65,6 +67,7 @@ class Couplings:
         self.inner = self.nodes["kind"] == rec.JUNCTION
         self.bodies, self.pistons = tables[rec.I_BODIES]["y"], tables[rec.I_PISTONS]
         self.braces = [*tables[rec.I_BRACES], *tables[rec.I_STOPS]]
+        self.devices = tables[rec.I_DEVICES]
         self.sets = self.pressures()  # of each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
@@ -72,9 +75,11 @@ class Couplings:
         for pipe in self.pipes:
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
+            yield from self.remembered(pipe)
         yield from self.stored()
         yield from self.rigid()
         yield from self.moving()
+        yield from self.driven()
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -93,7 +98,19 @@ class Couplings:
 
     def held(self, i: int) -> np.ndarray:
         """The states that set the pressure of a node that stores: its mass, and where its piston is."""
-        return states(self.own(i), *(self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"])))
+        filled = (self.held_by(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
+        moved = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
+        return states(self.own(i), *moved, *filled)
+
+    def held_by(self, device) -> np.ndarray:
+        """The states of a device."""
+        return device["y"] + np.arange(device["states"] if device["y"] >= 0 else 0)
+
+    def opens(self, link) -> np.ndarray:
+        """The states that open and shut a link."""
+        if "device" not in link.dtype.names or link["device"] < 0:
+            return states()
+        return self.held_by(self.devices[link["device"]])
 
     def places(self, row, what: int) -> np.ndarray:
         """Positions (`what` 0) or velocities (1) of the two bodies that a row joins, where they are states."""
@@ -113,8 +130,8 @@ class Couplings:
                 enter[group[i]].append(column["y"])
         for link in self.joints():
             i, j = ends_of(link)
-            enter[group[i]].append(self.held(j))
-            enter[group[j]].append(self.held(i))
+            enter[group[i]] += [self.held(j), self.opens(link)]
+            enter[group[j]] += [self.held(i), self.opens(link)]
         joined = [states(*some) for some in enter]
         return [joined[group[i]] if self.inner[i] else self.held(i) for i in range(len(group))]
 
@@ -126,8 +143,8 @@ class Couplings:
                 into[i].append(self.offered(pipe, right))
         for link in self.joints():
             i, j = ends_of(link)
-            into[i].append(self.sets[j])
-            into[j].append(self.sets[i])
+            into[i] += [self.sets[j], self.opens(link)]
+            into[j] += [self.sets[i], self.opens(link)]
         for column in self.columns:
             for i in ends_of(column):
                 into[i].append(column["y"])
@@ -152,6 +169,13 @@ class Couplings:
                 felt += [self.own(row["a"]), self.own(row["b"])]
             yield every(self.places(row, 1), states(*felt))
 
+    def driven(self) -> Iterator[Pairs]:
+        """What devices hold, on itself and on the pressures at their ends and at the place they sense."""
+        for row in self.devices:
+            ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
+            felt = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
+            yield every(self.held_by(row), states(self.held_by(row), *felt))
+
     # pipes ------------------------------------------------------------------------------------------------------
 
     def coupled(self, pipe) -> bool:
@@ -171,6 +195,24 @@ class Couplings:
                     here = cells[(cells + offset >= 0) & (cells + offset < cells.size)]
                     first = pipe["y"] + source * cells.size
                     yield pipe["y"] + wave * cells.size + here, first + here + offset
+
+    def remembered(self, pipe) -> Iterator[Pairs]:
+        """Unsteady friction: waves on the flows that follow theirs, and these on the waves of their cell.
+
+        Where the density changes what follows is the velocity, by two points of a cell that lean on its neighbours.
+        """
+        n = int(pipe["cells"])
+        cells = np.arange(n)
+        offsets = [0] if self.linear else [-1, 0, 1]
+        for wave in (pipe["y"], pipe["y"] + n) if pipe["terms"] > 0 else ():
+            for k in range(pipe["terms"]):
+                yield wave + cells, pipe["memory"] + k * n + cells
+            for offset in offsets:
+                here = cells[(cells + offset >= 0) & (cells + offset < n)]
+                for other in (pipe["y"], pipe["y"] + n):
+                    yield wave + here, other + here + offset
+                for k in range(pipe["terms"]):
+                    yield pipe["memory"] + k * n + here, wave + here + offset
 
     def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
         """(cells of the wave that enters by an end, cells of the one that leaves), nearest first."""

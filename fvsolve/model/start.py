@@ -7,15 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.emitters import LEAST_DROP, emitter_drop, emitter_flow, emitter_step
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
 from fvsolve.model.bodies import start_bodies
 from fvsolve.model.probes import probe_offsets
+from fvsolve.model.unsteady import add_terms
 from fvsolve.steady import Edge, solve_steady
 
-STORED = (rec.CHAMBER, rec.MOVING)
+STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
+REVISIONS = 50  # of what devices do, at most
+AT_ONCE = 10  # of these, all of them together
 PRESSURE_SCALE = 1e5
 SNAP = 1e-12  # flows below this share of the scene's are zero
 
@@ -34,8 +39,9 @@ def start_profile(scene) -> dict[str, Any]:
     start.fill_pipes()
     start.fill_columns()
     start.fill_valves()
+    start.begin_devices()
     probe_offsets(scene, start)
-    return start.report()
+    return {**start.report(), "unsteady": add_terms(scene)}
 
 
 class Start:
@@ -57,7 +63,12 @@ class Start:
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         self.extra: dict[str, float] = {}  # drop beside the law's [Pa], of laws with a changing density
+        self.dense_of: dict[int, tuple[float, float]] = {}  # of valves: density over reference, drive over potential
         self.factor: dict[int, float] = {}  # on the conductance of valves, likewise
+        self.ratio: dict[int, float] = {}  # of what drives valves to the change of potential, likewise
+        self.moving: list[str] = []
+        self.shut: set[int] = set()  # valves that a device holds shut
+        self.modes: dict[int, str] = {}  # as what those stand that regulate
 
     def potential_of(self, pressure: float, elevation: float) -> float:
         """Potential [Pa] of a pressure at an elevation."""
@@ -67,6 +78,10 @@ class Start:
         """Pressure [Pa] of a potential at an elevation."""
         return potential - self.weight * elevation
 
+    def density_at(self, i: int) -> float:
+        """Density [kg/m3] at node i."""
+        return self.scene.fluid.density
+
     def given_pressure(self, row, node) -> float:
         """Pressure [Pa] of a reservoir or tank at the start."""
         if row["kind"] == rec.TANK:
@@ -74,7 +89,36 @@ class Start:
         return schedule_value(self.scene.tables, int(row["schedule"]), self.t)
 
     def solve(self) -> None:
-        held, self.demand = self.givens()
+        """The steady state in which every device is as its pressures and flows ask for."""
+        for turn in range(REVISIONS):
+            self.balance()
+            devices = list(zip(self.scene.devices, self.scene.device_table, strict=True))
+            revised = (device.revise(self, part, row) for (_, part, device), row in devices[turn:] + devices[:turn])
+            if not (any(revised) if turn > AT_ONCE else sum(revised)):  # later one by one, lest they go in rounds
+                return self.report_faults(self.held)
+        self.report_faults(self.held)
+        names = listing([name for name, _, device in self.scene.devices])
+        self.scene.fault("numerics.initial", f"no steady state was found in which {names} stay as they are; "
+                         'try initial = "rest"')  # fmt: skip
+        self.scene.check()
+
+    def across(self, k: int) -> tuple[float, float]:
+        """Potentials just found at both ends of valve k [Pa]; where demands go unserved there is none left."""
+        found = []
+        for i in (int(self.valves[k][end]) for end in ("from_node", "to_node")):
+            unserved = i in self.answer.no_solution
+            drawn = sum(self.demand[self.answer.no_solution]) if unserved else 0.0
+            found.append(-math.copysign(math.inf, drawn) if unserved else float(self.answer.potential[i]))
+        return found[0], found[1]
+
+    def valve_flows(self) -> np.ndarray:
+        """Flows of valves as they were just found [kg/s]."""
+        return self.answer.flow[len(self.pipes) + len(self.columns) :][: len(self.valves)]
+
+    def balance(self) -> None:
+        """The steady state with devices as they are now."""
+        self.held, self.demand = self.givens()
+        held = self.held
         pipes = [self.wall_edge(name, row, row["dx"] * row["cells"]) for name, row in
                  zip(self.scene.pipe_names, self.pipes, strict=True)]  # fmt: skip
         columns = [self.wall_edge(name, row, row["length"]) for name, row in
@@ -83,7 +127,6 @@ class Start:
         leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
         self.edges = [*pipes, *columns, *valves, *leaks]
         self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, self.flow_scale))
-        self.report_faults(held)
         flow = self.answer.flow
         flow[np.abs(flow) <= SNAP * self.flow_scale] = 0.0
         self.tolerance = SNAP * (self.flow_scale + np.max(np.abs(flow), initial=0.0))
@@ -101,6 +144,8 @@ class Start:
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] in (rec.FIXED, rec.TANK):
                 held[i] = self.potential_of(self.given_pressure(row, node), row["elevation"])
+            elif getattr(node, "at_ambient", False):
+                held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
             elif row["kind"] in STORED and node.initial_pressure is not None:
                 held[i] = self.potential_of(node.initial_pressure, row["elevation"])
             elif row["kind"] == rec.MOVING and not self.touched(i):
@@ -118,7 +163,7 @@ class Start:
         """A pipe or column: drop = (L / A) drag(M)."""
         law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
         per = length / row["area"]
-        least = drag_slope(*law, 1e-6 * self.flow_scale)
+        least = drag_slope(*law, 1e-6 * self.scene.fluid.density * float(row["area"]))
         link = self.case.links[name]
 
         extra = self.extra.get(name, 0.0)
@@ -141,8 +186,15 @@ class Start:
     def valve_edge(self, k: int) -> Edge:
         """A valve: M |M| = G dP, with the chord of the root as slope."""
         row = self.valves[k]
-        g = valve_conductance(self.scene.tables, k, self.t)
-        transition = float(row["transition"])
+        if row["device"] >= 0:
+            own = self.scene.devices[row["device"]][2].edge(self, k)
+            if own is not None:
+                return own
+        g = self.conductance(k)
+        if row["law"] == rec.POWER:
+            row["open"] = g
+            return self.outlet_edge(k, g)
+        transition, back = float(row["transition"]), float(row["back"])
         row["open"] = g
         g *= self.factor.get(k, 1.0)
         i, j = int(row["from_node"]), int(row["to_node"])
@@ -152,14 +204,37 @@ class Start:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
 
         def newton(flow, present):
-            target = flow_at_drop(g, transition, present)
+            here = g * back if present < 0.0 else g
+            target = flow_at_drop(here, transition, present)
             if transition > 0.0 and abs(target) < transition:
-                slope = flow_slope(g, transition, present)
+                slope = flow_slope(here, transition, present)
                 return 1.0 / slope, 1.0, (target - flow) / slope
             chord = max(abs(target) + abs(flow), 1e-6 * math.sqrt(g))
-            return chord / g, 1.0, present - abs(flow) * flow / g
+            return chord / here, 1.0, present - abs(flow) * flow / here
 
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
+
+    def outlet_edge(self, k: int, g: float) -> Edge:
+        """A way out, M = f(drop), with its own chord as slope."""
+        row, floats, denser, wider = self.valves[k], self.scene.tables[rec.I_FLOATS], *self.dense_of.get(k, (1.0, 1.0))
+        i, j, at = int(row["from_node"]), int(row["to_node"]), int(row["data"])
+        if g <= 0.0:
+            return Edge(i, j, None, 0.0, shut=True)
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        g, per = g * denser**2, math.sqrt(PRESSURE_SCALE / g)
+
+        def newton(flow, present):
+            a, s = emitter_step(floats, at, g, flow, present * wider)
+            return per, per * s * wider, per * a
+
+        return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
+
+    def conductance(self, k: int) -> float:
+        """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""
+        if self.valves[k]["device"] < 0:
+            return valve_conductance(self.scene.tables, k, self.t)
+        return 0.0 if k in self.shut else float(self.valves[k]["conductance"])
 
     def leak_edge(self, k: int) -> Edge:
         """What leaks past a piston: M = rho leakage dP."""
@@ -279,18 +354,46 @@ class Start:
                 PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
             ):
                 row["drop"] = 0.0
-            law = flow_at_drop(row["open"], row["transition"], row["drop"])
+            if row["law"] == rec.POWER:
+                self.fill_outlet(row, flow)
+            if row["law"] >= rec.CURVE:
+                continue
+            here = row["open"] * (row["back"] if row["drop"] < 0.0 else 1.0)
+            law = flow_at_drop(here, row["transition"], row["drop"])
             if abs(law - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                 row["open"] = 0.0
             elif row["transition"] == 0.0 and row["open"] > 0.0:
-                row["drop"] = abs(flow) * flow / row["open"]
+                row["drop"] = abs(flow) * flow / here
+
+    def fill_outlet(self, row, flow: float) -> None:
+        """The drop at which a way out carries its flow exactly; none where its flow does not obey its law."""
+        floats, at, g = self.scene.tables[rec.I_FLOATS], int(row["data"]), float(row["open"])
+        asked = emitter_flow(floats, at, g, float(row["drop"]))
+        if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
+            row["open"] = 0.0
+        elif row["drop"] - floats[at + 1] >= LEAST_DROP and asked < math.sqrt(g * floats[at + 2]) * floats[at + 3]:
+            row["drop"] = emitter_drop(floats, at, g, flow)
+
+    def begin_devices(self) -> None:
+        """Let every device fill in what depends on the profile."""
+        for (_, part, device), row in zip(self.scene.devices, self.scene.device_table, strict=True):
+            self.moving += device.begin(self, part, row)
+
+    def slack(self, end: str) -> float:
+        """Error of what a device keeps as set that is rounding: of a pressure [Pa] at an end, else of a flow [kg/s]."""
+        return 1e-6 * PRESSURE_SCALE if end else 1e-6 * self.flow_scale
+
+    def law_of(self, k: int) -> tuple[float, float]:
+        """(conductance of valve k, whole, at the density that it meets, the drop that drives it) in the profile."""
+        return float(self.valves[k]["conductance"]), float(self.valves[k]["drop"])
 
     def report(self) -> dict[str, Any]:
-        moving = start_bodies(self.scene, self)
+        moving = start_bodies(self.scene, self) + self.moving
         fluid, net = self.scene.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
-        for name, row, inflow in zip(self.case.places, self.nodes, net, strict=True):
+        for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
+            name = name.removesuffix(".inside")
             if inflow == 0.0 or row["kind"] == rec.FIXED:
                 continue
             flow = inflow / fluid.density
@@ -298,7 +401,7 @@ class Start:
                 what = "rises" if flow > 0 else "falls"
                 moving.append(f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s")
             elif row["kind"] in STORED:
-                moving.append(f"chamber {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s")
+                moving.append(f"{node.kind} {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s")
             else:
                 moving.append(f"junction {name}: {flow:.4g} m3/s more flow in than out")
         for name, pressure in self.driven.items():
@@ -308,8 +411,7 @@ class Start:
                 moving.append(f"rigid column {name}: {row['offset']:.4g} Pa drive it unbalanced")
         for k, (name, row) in enumerate(zip(self.scene.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
-                g = valve_conductance(self.scene.tables, k, self.t)
-                if g > 0.0:
+                if self.conductance(k) > 0.0:
                     moving.append(f"valve {name}: open with {row['drop']:.4g} Pa across it and no flow")
         if self.case.numerics.initial == "equilibrium":
             for text in moving:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 from fvsolve.errors import RunError
@@ -24,6 +25,8 @@ def described(summary, model) -> dict:
             {"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
             for mark in summary.marks
         ],
+        "cavities": [asdict(cavity) for cavity in summary.cavities],
+        "events": [{"time": float(one.time), "name": one.name, "what": one.what} for one in summary.events],
         "probes": {one.name: {"dimension": one.dimension, "unit": one.unit} for one in probe_columns(model)},
         "time_unit": time_column(model.case).unit,
         "envelope_units": {one.name: one.unit for one in envelope_columns(model.case)},

@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from fvsolve.parts.node import Node
+from fvsolve.parts.outlet import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.value import Number, Quantity, between
 
 
 class Junction(Node, kind="junction"):
     """A place without volume: the flows into its links and its demand sum to zero.
 
     Ports: any number. Stored energy: none. Dissipated energy: none; the demand leaves with p demand [W].
+
+    With a `required_pressure` it gets what its pressure allows, demand ((p - minimum) / (required - minimum))^exponent
+    from none at `minimum_pressure` to all at `required_pressure` and above (Wagner, Shamir and Marks 1988); what it
+    gets runs out to ambient, and (p - ambient) q is dissipated [W].
     """
 
     demand: Annotated[Schedule, Scheduled("flow", about="positive outward [m3/s]")] = Field(
         default_factory=lambda: constant(0.0)
     )
+    required_pressure: Annotated[float | None, Quantity("pressure", about="at which it gets all it wants [Pa]")] = None
+    minimum_pressure: Annotated[float | None, Quantity("pressure", about="below which none; ambient [Pa]")] = None
+    demand_exponent: Annotated[float, Number(between(0, 3, open=True), "of the pressure between the two")] = 0.5
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+        if self.required_pressure is None:
+            return {name: self}, {}
+        full = float(self.demand.value.max())
+        law = {"flow": full, "exponent": self.demand_exponent, "opening": self.demand, "full": full, "most": 1.0}
+        law |= {"least": self.minimum_pressure, "upper": self.required_pressure}
+        places, links = out_of(f"{name}.demand", name, **law)
+        return {name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}), **places}, links

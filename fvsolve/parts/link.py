@@ -16,7 +16,7 @@ class Link(Table):
     """A part whose ports join places; flow is positive into it at each port.
 
     Potential times flow, summed over the ports, is the power [W] it takes up: pressure and volume flow where the
-    domain is hydraulic, velocity and force where it is translational.
+    domain is hydraulic, velocity and force where it is translational, angular velocity and torque where rotational.
     """
 
     kind: ClassVar[str] = ""
@@ -26,6 +26,10 @@ class Link(Table):
     joins: ClassVar[dict[str, str]] = {}  # port -> domain of the place it wants
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # place of its own, `LINK.PLACE` to others -> domain
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
+        """(places, links) that it stands for, by name: itself, and what it owns as `NAME.PLACE`."""
+        return {}, {name: self}
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)

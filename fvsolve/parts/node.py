@@ -25,7 +25,12 @@ class Node(Table):
     elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = None
     position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None
 
+    def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
+        """(places, links) of the fluid that it stands for, by name: itself, and what it owns as `NAME.PLACE`."""
+        return {name: self}, {}
+
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
-        cls.kind = kind
-        Node.kinds[kind] = cls
+        if kind:
+            cls.kind = kind
+            Node.kinds[kind] = cls

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from fvsolve.parts.friction import NONE, Friction
-from fvsolve.parts.link import TwoPort
+from fvsolve.parts.conduit import Conduit
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Number, Quantity, Setting, Value, Whole, between, nonnegative, positive
+from fvsolve.parts.value import Quantity, Setting, Value, Whole, between, positive
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
@@ -36,7 +35,7 @@ class WallOrStiff(Value):
         return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
 
 
-class Pipe(TwoPort, kind="pipe"):
+class Pipe(Conduit, kind="pipe"):
     """A pipe of constant slope: mass and momentum along it, wave speed sqrt(K / rho).
 
     Ports: from, to; each end offers its outgoing characteristic. Stored energy, p from ambient: rho A
@@ -44,17 +43,12 @@ class Pipe(TwoPort, kind="pipe"):
     drop times flow [W].
     """
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("wave_speed", "wall"),)
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.alternatives, ("wave_speed", "wall"))
     along: ClassVar[dict[str, str]] = {
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head", "velocity": "velocity",
         "flow": "flow",
     }  # fmt: skip
 
-    length: Annotated[float, Quantity("length", positive, "along its axis [m]")]
-    diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]")]
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]")] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
-    friction: Friction = NONE
     cells: Annotated[int | None, Whole(between(1, MOST_CELLS), "finite volumes along it")] = None
-    minor_loss: Annotated[float, Number(nonnegative, "loss coefficient on its velocity, spread along it")] = 0.0
-    initial_flow: Annotated[float | None, Quantity("flow", about="at the start [m3/s]")] = None

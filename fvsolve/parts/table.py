@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.value import NEEDED, Misfit, Setting, Value
+from fvsolve.parts.value import NEEDED, Misfit, Setting, Value, setting_of
 from fvsolve.units import show
 
 
@@ -56,14 +56,23 @@ class Table(BaseModel):
         """Faults of keys that do not go together, as pairs of keys and message."""
         return [fault for keys in cls.alternatives for fault in at_most_one(given, keys)]
 
+    @classmethod
+    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+        """The same table, keys that stand for others replaced by those; Misfit where one means nothing."""
+        return given
+
     @model_validator(mode="wrap")
     @classmethod
-    def _all_at_once(cls, given: Any, handler: Any) -> Any:
+    def _all_at_once(cls, given: Any, handler: Any, info: Any) -> Any:
         if isinstance(given, cls):
             return given
         if not isinstance(given, dict):
             raise Misfit([((), f"{show(given)} is no table; wanted keys of {listing(cls.keys())}")])
         faults = cls.key_faults(given)
+        try:
+            given = cls.in_numbers(given, setting_of(info))
+        except Misfit as error:
+            faults += error.faults
         try:
             made = handler(given)
         except ValidationError as error:

@@ -7,7 +7,10 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from fvsolve.parts.connection import Connection, Joined, joined
+from fvsolve.parts.junction import Junction
 from fvsolve.parts.node import Node
+from fvsolve.parts.schedule import constant
 from fvsolve.parts.table import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
@@ -76,8 +79,9 @@ class Surface(Value):
 class Tank(Node, kind="tank"):
     """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at its bottom.
 
-    Ports: any number, all at the bottom. Stored energy: rho g times the integral of (elevation + level) area
-    over the level [J]. Dissipated energy: what spills over `height` leaves with its potential energy.
+    Ports: any number, all at the bottom, before its `connection` if it has one (the throttle of a surge tank). Stored
+    energy: rho g times the integral of (elevation + level) area over the level [J]. Dissipated energy: what spills over
+    `height` leaves with its potential energy.
     """
 
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "level": "level"}
@@ -86,3 +90,7 @@ class Tank(Node, kind="tank"):
     area: Annotated[Any, Surface()]
     level: Annotated[float, Quantity("level", nonnegative, "level at the start, above its bottom [m]")]
     height: Annotated[float | None, Quantity("level", positive, "level above which it spills [m]")] = None
+    connection: Annotated[Connection | None, Joined()] = None
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+        return joined(name, self, Junction.model_construct(elevation=self.elevation, demand=constant(0.0)))

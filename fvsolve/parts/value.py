@@ -161,6 +161,21 @@ class Choice(Value):
 
 
 @dataclass(frozen=True)
+class Flag(Value):
+    """true or false."""
+
+    about: str = ""
+
+    def read(self, given: Any, setting: Setting) -> bool:
+        if not isinstance(given, bool):
+            raise ValueError(f"{show(given)} is neither true nor false")
+        return given
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "boolean"}
+
+
+@dataclass(frozen=True)
 class Text(Value):
     """Any text."""
 

@@ -103,6 +103,8 @@ def checked(name: str, value: float, one: Input) -> float:
         raise FvsolveError(f"{name} = {found} is not finite; wanted {WANTED[one.kind]}")
     if one.kind == "opening" and not 0.0 <= found <= 1.0:
         raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
+    if one.kind == "speed" and not found >= 0.0:
+        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
     if one.kind == "position" and not -1.0 <= found <= 1.0:
         raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
     pressure = one.scale * found + one.offset
@@ -112,13 +114,25 @@ def checked(name: str, value: float, one: Input) -> float:
     return found
 
 
+def torques(model: Model, pump: str, row) -> dict[str, Input]:
+    """Torques given to the shaft of a pump."""
+    from fvsolve.kernels.devices.pump import OWN_NUMBERS
+
+    names = [name for name, link in model.case.links.items() if link.kind == "torque" and link.to == f"{pump}.shaft"]
+    schedules = model.tables[rec.I_FLOATS][row["data"] + OWN_NUMBERS :: 2]
+    return {f"{name}.torque": Input("torque", int(k)) for name, k in zip(names, schedules, strict=False)}
+
+
 WANTED = {
     "opening": "a number from 0, shut, to 1, open",
     "pressure": "an absolute pressure above 0 [Pa]",
     "head": "a head whose pressure is above 0 Pa absolute [m]",
     "flow": "a finite number [m3/s]",
+    "speed": "a relative speed of at least 0",
+    "set pressure": "an absolute pressure [Pa]",
     "position": "a number from -1 to 1",
     "force": "a finite number [N]",
+    "torque": "a finite number [N m]",
 }
 
 
@@ -138,12 +152,23 @@ def input_schedules(model: Model) -> dict[str, Input]:
         elif node.kind == "inflow":
             found[f"{name}.flow"] = Input("flow", index, -rho)
     for name, row in zip(model.valve_names, model.tables[rec.I_VALVES], strict=True):
-        if model.case.links[name].kind != "spool-valve":
+        if row["schedule"] < 0:
+            continue
+        if model.case.conduits[name].kind != "spool-valve":
             found[f"{name}.opening"] = Input("opening", int(row["schedule"]))
         elif f"{name}.position" not in found:
             found[f"{name}.position"] = Input("position", int(row["schedule"]))
         elif found[f"{name}.position"].other < 0:
             found[f"{name}.position"] = found[f"{name}.position"]._replace(other=int(row["schedule"]))
+    for (name, *_), row in zip(model.devices, model.tables[rec.I_DEVICES], strict=True):
+        link = model.case.conduits.get(name)
+        if link is not None and link.kind == "pump":
+            found[f"{name}.speed"] = Input("speed", int(row["schedule"]))
+            found |= torques(model, name, row)
+        elif row["schedule"] >= 0 and hasattr(link, "set_pressure"):
+            found[f"{name}.set_pressure"] = Input("set pressure", int(row["schedule"]))
+        elif row["schedule"] >= 0 and hasattr(link, "set_flow"):
+            found[f"{name}.set_flow"] = Input("flow", int(row["schedule"]), rho)
     pushed = zip((name for name, link in model.case.links.items() if link.kind == "force"),
                  (row for row in model.tables[rec.I_BRACES] if row["schedule"] >= 0), strict=True)  # fmt: skip
     for name, row in pushed:

@@ -17,6 +17,7 @@ from fvsolve.steppers.tableau import Method, method_named
 
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
+MOST_AT_ONCE = 20  # events at one time: more is chatter
 
 
 class Loop:
@@ -25,6 +26,8 @@ class Loop:
     def __init__(self, model: Model, structure: Callable[[], Structure] | None = None) -> None:
         numerics = model.case.numerics
         self.model, method = model, method_named(automatic.first_method(numerics.method))
+        self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
+        self.at_once, self.last_switch = 0, np.nan
         self.rhs, self.observe, self.record, self.events = arguments(model.functions())
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
@@ -73,10 +76,32 @@ class Loop:
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
         self.orders[told.BUDGET] = budget
-        return self.stepper.call(
-            self.leap, self.observe, self.record, self.events, self.rhs, self.model.handle,
-            int(self.model.layout["supply"]), self.model.tables[rec.I_ARMED],
-        )  # fmt: skip
+        code = told.SWITCHED
+        while code == told.SWITCHED:
+            before = self.armed.copy()
+            code = self.stepper.call(
+                self.leap, self.observe, self.record, self.events, self.rhs, self.model.handle,
+                int(self.model.layout["supply"]), self.armed,
+            )  # fmt: skip
+            if code == told.SWITCHED and not self.switch(before):
+                code = told.CHATTERS
+        return code
+
+    @property
+    def armed(self) -> np.ndarray:
+        """Which events have happened and still hold (a view)."""
+        return self.model.tables[rec.I_ARMED]
+
+    def switch(self, before: np.ndarray) -> bool:
+        """Note the events that have just happened; False where they go to and fro at one time."""
+        first, many = 2 * int(np.sum(self.model.tables[rec.I_NODES]["kind"] == rec.TANK)), len(self.model.events)
+        now = self.armed[first : first + many] > before[first : first + many]
+        self.switched += [(self.t, int(k)) for k in np.flatnonzero(now)]
+        for (_, _, device), row in zip(self.model.devices, self.model.tables[rec.I_DEVICES], strict=True):
+            device.settle(self.armed, row, self.now)
+        self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
+        self.last_switch = self.t
+        return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size
 
     def take_rows(self) -> np.ndarray:
         """Rows written since the last call, as a copy."""

@@ -6,16 +6,26 @@ import time
 
 import numpy as np
 
+from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.solve.summary import Summary, find_envelope, find_extremes, find_marks, mass_ledger
+from fvsolve.solve.summary import (
+    Event,
+    Summary,
+    find_cavities,
+    find_envelope,
+    find_extremes,
+    find_marks,
+    mass_ledger,
+)
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
-PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS)
+FAILED = (told.BAD_VALUE, told.BAD_STATUS, told.CHATTERS, told.NEWTON_STUCK, told.TINY_STEP)
+PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS, rec.I_ARMED)
 
 
 def initial_state(model: Model) -> State:
@@ -34,10 +44,12 @@ def solve(model: Model, state: State, sink, progress=None) -> Summary:
 class Run:
     """One run while it lasts."""
 
+    loop_type = Loop
+
     def __init__(self, model: Model, state: State, sink, progress) -> None:
         self.model, self.sink, self.progress = model, sink, progress
         self.began = time.perf_counter()
-        self.loop = Loop(model)
+        self.loop = self.loop_type(model)
         numerics, output = model.case.numerics, model.case.output
         self.start, self.end = numerics.start, numerics.end
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
@@ -54,7 +66,9 @@ class Run:
         for array in (model.tables[rec.I_EXTREMES], model.tables[rec.I_ENVELOPE]):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         model.tables[rec.I_MARKS][:] = np.nan
+        model.tables[rec.I_ARMED][:] = 0.0
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
+        self.processor = 0.0  # seconds of CPU time of the steps of this process
         self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
         if not self.fresh:
             self.remember(state.memory)
@@ -66,7 +80,8 @@ class Run:
         """Everything that a resumed run needs beside t and y, flat."""
         kept = [self.model.tables[at].ravel() for at in PERSISTENT]
         changes = [x for change in self.changes for x in change]
-        own = [float(self.segment), self.seconds, float(len(self.changes)), *changes]
+        switched = [x for event in self.loop.switched for x in event]
+        own = [float(self.segment), self.seconds, float(len(self.changes)), *changes, float(len(switched)), *switched]
         return np.concatenate([own, *(view.ravel() for view in self.loop.stepper.memories()), *kept])
 
     def remember(self, memory: np.ndarray) -> None:
@@ -74,7 +89,10 @@ class Run:
         self.changes = [tuple(row) for row in memory[3 : 3 + 3 * changes].reshape(-1, 3).tolist()]
         if changes % 2 == 1:
             automatic.change(self.loop.stepper)
-        memory = self.loop.stepper.remember(memory[3 + 3 * changes :])
+        memory = memory[3 + 3 * changes :]
+        events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
+        self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
+        memory = self.loop.stepper.remember(memory)
         for at in PERSISTENT:
             array = self.model.tables[at].ravel()
             array[:] = memory[: array.size]
@@ -186,8 +204,12 @@ class Run:
     def steps(self) -> str:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         while True:
-            before, steps = time.perf_counter(), self.loop.memory[told.STEPS]
+            before, steps, busy = time.perf_counter(), self.loop.memory[told.STEPS], time.thread_time()
+            seen = len(self.loop.switched)
             code = self.loop.run(self.left)
+            if len(self.loop.switched) > seen and code not in FAILED:
+                self.stop_columns(self.bounds[self.segment][0])
+            self.processor += time.thread_time() - busy
             self.left = max(1.0, self.left - (self.loop.memory[told.STEPS] - steps))
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
@@ -229,8 +251,12 @@ class Run:
         elif code == told.BAD_STATUS and loop.out[rec.WHERE] >= 0:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {loop.t:.6g} s"
+        if code == told.CHATTERS:
+            names = listing(sorted({model.events[k][0] for t, k in loop.switched if t == loop.t}))
+            return f"stopped: {names} opens and shuts without end at {when}; give it inertia, or another size"
         if code == told.STOPPED:
-            return f"stopped: pressure below vapour pressure at {when}, as below_vapor asks"
+            what = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
+            return f"stopped: {what} at {when}, as below_vapor asks"
         if code in (told.BAD_VALUE, told.BAD_STATUS):
             loop.step_back()
         if code == told.NEWTON_STUCK:
@@ -262,6 +288,7 @@ class Run:
         summary = Summary(
             reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
             find_envelope(model), loop.stepper.counts(), self.methods(), model.cells, self.seconds, self.setup,
+            [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model),
         )  # fmt: skip
         self.sink.end(summary)
         return summary

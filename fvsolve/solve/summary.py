@@ -21,6 +21,27 @@ class Mark:
     text: str
 
 
+@dataclass(frozen=True)
+class Cavity:
+    """Where and when a pipe's liquid first parted, and the greatest volume of all its cavities together [m, s, m3]."""
+
+    place: str
+    time: float
+    distance: float  # from the pipe's `from` end
+    volume: float
+    t_volume: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """What a device did, and when [s]."""
+
+    time: float
+    name: str
+    what: str
+
+
 @dataclass
 class Summary:
     """How a run ended and what it found; SI, pressures absolute."""
@@ -37,6 +58,8 @@ class Summary:
     cells: int = 0
     seconds: float = 0.0
     seconds_setup: float = 0.0
+    events: list[Event] = field(default_factory=list)
+    cavities: list[Cavity] = field(default_factory=list)  # that the law `mixture` followed
 
     @property
     def steps(self) -> int:
@@ -50,14 +73,17 @@ class Summary:
 
 
 def find_marks(model: Model) -> list[Mark]:
-    """First time and place of everything the model cannot really follow."""
+    """First time and place of everything the model cannot really follow; cavities are none where the law has them."""
     marks, pipes, nodes = model.tables[rec.I_MARKS], model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
+    kinds = [(what, place.removesuffix(".inside")) for what, place in kinds]
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
+    kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
     texts = {
         "stopped dead": "its last way out shut while it flowed; a rigid column has no surge, a pipe would",
+        "outside its curve": "the pump works backwards or beyond its curve's last flow; a suter table would say how",
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would hold it",
         "below vapor pressure": "pressure falls below vapour pressure; the liquid column would part",
         "dry": "the tank is dry but outflow is asked for; it goes on at level 0",
@@ -65,9 +91,22 @@ def find_marks(model: Model) -> list[Mark]:
     }
     return [
         Mark(what, place, float(time), f"{place.split('.', 1)[1]}: {texts[what]}")
-        for (what, place), time in zip(kinds, marks, strict=True)
-        if np.isfinite(time)
+        for (what, place), time in zip(kinds, marks[: len(kinds)], strict=True)
+        if np.isfinite(time) and not (what == "below vapor pressure" and model.cavitates)
     ]
+
+
+def find_cavities(model: Model) -> list[Cavity]:
+    """Every pipe in which pressure fell below twice the vapour pressure: more vapour than gas between the liquid."""
+    found, marks = [], model.tables[rec.I_MARKS]
+    for k, pipe in enumerate(model.pipes if model.cavitates else ()):
+        share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
+        if np.isfinite(share):
+            time, distance = float(marks[k]), share * pipe.length
+            text = (f"{pipe.name}: a cavity opened {distance:.4g} m from {pipe.from_} at {time:.6g} s; "
+                    f"at most {1e3 * volume:.4g} l at {t_volume:.6g} s")  # fmt: skip
+            found.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
+    return found
 
 
 def find_extremes(model: Model) -> dict[str, tuple[float, float, float, float]]:

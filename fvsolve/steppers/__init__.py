@@ -1,7 +1,6 @@
 """Runge-Kutta methods as data, what is known of them, the loops that step them. Knows arrays and time; no physics."""
 
-from importlib import import_module
-
+from fvsolve.names import offer
 from fvsolve.steppers import methods  # noqa: F401  (declares them)
 
 _HOMES = {
@@ -21,11 +20,4 @@ _HOMES = {
     "stability_function": "analysis.stability_function",
 }
 
-__all__ = sorted(_HOMES)  # noqa: PLE0605
-
-
-def __getattr__(name: str) -> object:
-    """Public names, imported where they are first used: a run wants none of the analysis."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+__all__ = offer(__name__, _HOMES)  # noqa: PLE0605

@@ -7,7 +7,7 @@ model (functions of declared type).
 import functools
 from math import isfinite
 
-from fvsolve.jit import argument, njit
+from fvsolve.jit import njit
 from fvsolve.steppers.coefficients import row_of, weights_of
 from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
@@ -25,11 +25,7 @@ from fvsolve.steppers.orders import (
     EMIT,
     END,
     ERROR_OLD,
-    EVERY,
     EXPLICIT,
-    FIELD,
-    FIELD_COUNT,
-    FIELD_EVERY,
     FRESH,
     FSAL,
     HAS,
@@ -43,8 +39,6 @@ from fvsolve.steppers.orders import (
     NEWTON_FAILURES,
     NEWTON_SOLVED,
     NEWTON_STUCK,
-    NEXT_FIELD,
-    NEXT_OUTPUT,
     NOT_FINITE,
     NOW,
     OLD,
@@ -52,16 +46,13 @@ from fvsolve.steppers.orders import (
     RATE,
     READY,
     REJECTIONS,
-    ROWS,
-    ROWS_FULL,
     SEEN,
-    START,
     STATUS,
     STEP,
     STEPS,
-    STOP_AT,
     STOP_HERE,
     STOPPED,
+    SWITCHED,
     T_MARK,
     TINY_STEP,
     TOLERANCE,
@@ -70,78 +61,9 @@ from fvsolve.steppers.orders import (
     WHERE,
     T,
 )
-from fvsolve.steppers.step import add_stored, all_finite, book, copy, interpolate
-
-
-@functools.cache
-def function_types():
-    """Numba types of (attempt, leap, observe, record, events, rhs, and linear algebra, real and complex).
-
-    Declared, so that the loop is compiled once and cached.
-    """
-    from numba import types
-
-    f, c, i = types.float64, types.complex128, types.int64
-    v, z, handle = types.float64[::1], types.complex128[::1], types.int64[::1]
-    rhs = types.FunctionType(types.void(f, v, v, v, handle))
-    algebra = (
-        types.FunctionType(i(handle, v, f, v)), types.FunctionType(types.void(handle, v, v)),
-        types.FunctionType(i(handle, v, c, z)), types.FunctionType(types.void(handle, z, z)),
-    )  # fmt: skip
-    attempt = types.FunctionType(f(*attempt_arguments(rhs, *algebra)))
-    leap = types.FunctionType(types.void(f, f, v, v, v, handle, v))
-    observe = types.FunctionType(types.void(f, v, v, handle, v))
-    events = types.FunctionType(types.void(f, v, handle, v))
-    return attempt, leap, observe, observe, events, rhs, *algebra
-
-
-def attempt_arguments(*functions):
-    """Numba types of what a step takes, after rhs and linear algebra; see `erk.attempt`."""
-    from numba import types
-
-    f, i, v, w = types.float64, types.int64, types.float64[::1], types.float64[:, ::1]
-    ints = types.int64[::1]
-    return (*functions, ints, v, ints, f, f, w, i, i, w, w, i, v, v, v, v, v, w, v, types.complex128[::1])
-
-
-def no_factor(shape, jacobian, shift, store):
-    """In place of a factorisation, where nothing is solved."""
-    return 0
-
-
-def no_solve(shape, store, x):
-    """In place of a solution, where nothing is solved."""
-
-
-@functools.cache
-def no_algebra():
-    """(factor, solve, factor_complex, solve_complex) for steps that solve nothing."""
-    types = [kind.signature.args for kind in function_types()[6:]]
-    return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, types, strict=True))
-
-
-@njit(forceinline=True)
-def output_due(orders, memory, count_at, every, limit):
-    """Time of the next row or field: START + count * every, or infinity."""
-    if every <= 0.0 or memory[count_at] > limit:
-        return 1e308
-    return orders[START] + memory[count_at] * every
-
-
-@njit(forceinline=True)
-def row_due(orders, memory, times):
-    """Time of the next row: the next of `times` where there are any [s]."""
-    if times.size == 0:
-        return output_due(orders, memory, NEXT_OUTPUT, orders[EVERY], 1e300)
-    count = int(memory[NEXT_OUTPUT])
-    return times[count] if count < times.size else 1e308
-
-
-@njit(forceinline=True)
-def next_due(orders, memory, times):
-    """Time of whatever is to be written next [s]."""
-    row = row_due(orders, memory, times)
-    return min(row, output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT]))
+from fvsolve.steppers.rows import emit, next_due
+from fvsolve.steppers.signatures import function_types
+from fvsolve.steppers.step import add_stored, all_finite, book, copy
 
 
 @njit(forceinline=True)
@@ -150,32 +72,6 @@ def may_leap(orders, memory, times, h):
     if orders[LEAPS] == 0.0 or too_short(orders, memory, h) or h >= (orders[END] - memory[T]) * (1.0 - 1e-9):
         return False
     return next_due(orders, memory, times) > memory[T_MARK] + (memory[N_MARK] + 1.0) * h
-
-
-@njit
-def emit(
-    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
-):  # fmt: skip
-    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
-    t, h = memory[T], memory[T] - t_old
-    while True:
-        row = row_due(orders, memory, times)
-        field = output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT])
-        due = min(row, field)
-        if due > t or (due >= orders[STOP_AT]):
-            return DONE
-        if row <= due and flags[ROWS] == rows.shape[0]:
-            return ROWS_FULL
-        interpolate((due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
-        rhs(due, y_out, y_out[:0], out, handle)
-        if row <= due:
-            rows[flags[ROWS], 0] = due
-            observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
-            flags[ROWS] += 1
-            memory[NEXT_OUTPUT] += 1.0
-        if field <= due:
-            memory[NEXT_FIELD] += 1.0
-            return FIELD
 
 
 @njit
@@ -208,6 +104,7 @@ def march(
                 flags[BENT] = flags[BEHIND]  # what is due before its end goes by the rule of the step behind
                 if flags[BENT] == 0:
                     arm(g, armed)
+                    return SWITCHED
             if reuse:
                 copy(k[s - 1], k[0])
             else:
@@ -243,7 +140,7 @@ def march(
                     memory[STEP] = 0.0
                 if orders[KIND] != EXPLICIT:
                     work[HAS], work[SEEN] = 0.0, -1.0
-                continue
+                return SWITCHED
             flags[PHASE] = READY
         if memory[T] >= orders[END]:
             return DONE
@@ -322,22 +219,6 @@ def march(
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
-
-
-@functools.cache
-def compiled_as(function, kinds: tuple):
-    """A function compiled for arguments of these types alone, as the loop takes it."""
-    if hasattr(function, "compile"):
-        if not function.overloads:
-            function.compile(kinds)
-            function.disable_compile()
-        function = argument(function)
-    return function
-
-
-def compiled_step(attempt):
-    """A step compiled for the one signature that the loop calls."""
-    return compiled_as(attempt, attempt_arguments(*function_types()[5:]))
 
 
 @functools.cache

@@ -32,7 +32,8 @@ from fvsolve.steppers.orders import (
 from fvsolve.steppers.step import copy
 
 # Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
-# what a stage starts from; then, for fully implicit methods, transformed increments, f and residuals of all stages.
+# what a stage starts from (Rosenbrock: df/dt); then, for fully implicit methods, transformed increments, f and
+# residuals of all stages.
 FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, STAGES = range(7)
 
 MOST = 10  # iterations

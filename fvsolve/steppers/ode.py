@@ -6,7 +6,6 @@ import functools
 import inspect
 from collections.abc import Callable
 from numbers import Real
-from weakref import WeakKeyDictionary
 
 import numba
 import numpy as np
@@ -15,8 +14,9 @@ from numba import objmode, types
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
-from fvsolve.steppers.march import compiled, compiled_as
+from fvsolve.steppers.march import compiled
 from fvsolve.steppers.methods import AUTO
+from fvsolve.steppers.signatures import compiled_as
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, Method, method_named
@@ -36,7 +36,8 @@ def integrate(
     rtol : relative tolerance of methods with an error estimate (default 1e-6); atol : absolute one, a number or
     float64[n], default rtol; step : fixed step [s], for every method
     counts : a dict to be filled with the numbers of steps, rejections, rhs, jacobians, factorisations, newton, ...
-    Times are met by dense output; a method whose order exceeds that of its dense output by three steps onto them.
+    Times are met by dense output; where its order lies far below that of the error estimate (at a fixed step: of the
+    method), by stepping onto them.
     Raises FvsolveError for two step settings, a method without an error estimate and no step, times out of order,
     and where the solution does not stay finite or Newton fails.
     """
@@ -46,49 +47,64 @@ def integrate(
     method = method_named(automatic.first_method(method)) if isinstance(method, str) else method
     t, y0 = _numbers("t", t), np.atleast_1d(_numbers("y0", y0))
     _check(method, t, rtol, step)
-    n = y0.size
-    if atol is not None:
-        atol = _numbers("atol", atol)
-        if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
-            raise FvsolveError(f"atol must be a positive number, or {n} of them, one a state")
     size = step if step is not None else (1e-6 if rtol is None else rtol)
-    scale = np.full(n, 1.0) if atol is None or step is not None else np.broadcast_to(atol / np.float64(size), n).copy()
-    stepper = Stepper(method, n, 0, lambda: _full(n), scale)
-    orders, memory, flags, y = stepper.orders, stepper.memory, stepper.flags, stepper.y
-    y[0], memory[told.T] = y0, t[0]
+    scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
+    stepper = Stepper(method, y0.size, 0, lambda: _full(y0.size), scale)
+    orders, memory = stepper.orders, stepper.memory
+    stepper.y[0], memory[told.T] = y0, t[0]
     orders[told.CONTROL] = told.FIXED_STEP if step is not None else told.TOLERANCE
     orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
     if watched:
-        automatic.watch(stepper, _full(n))
-    lands = stepper.dense_order < (method.error_order - 1 if step is None else method.order - 2)
-    stops = t[1:] if lands else t[-1:]
-    stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, n + 1))
-    if f not in _COMPILED:
-        _try_out(f, t[0], y0)
-        _COMPILED[f] = _functions(f, t[0], y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
-    functions, _PYTHON[id(f)] = _COMPILED[f]
-    handle = np.array([id(f)])
-    _RAISED.pop(id(f), None)
-    found = np.empty((t.size, n))
-    found[0] = y0
-    for i, stop in enumerate(stops, t.size - len(stops)):
-        orders[told.END], orders[told.BUDGET] = stop, NO_LIMIT
-        flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
-        kept = memory[told.STEP]
-        code = stepper.call(*functions, handle, WHERE, stepper.none)
-        while code == told.CHUNK and automatic.wants_change(stepper):
-            automatic.change(stepper)
-            orders[told.BUDGET] = NO_LIMIT
-            code = stepper.call(*functions, handle, WHERE, stepper.none)
-        if code != told.DONE:
-            raise FvsolveError(_failure(method, code, memory)) from _RAISED.pop(id(f), None)
-        found[i] = y[flags[told.NOW]]
-        memory[told.STEP] = 0.0 if step is not None else memory[told.STEP] or kept
-    if not lands:
-        found[1:-1] = stepper.rows[: t.size - 2, 1:]
+        automatic.watch(stepper, _full(y0.size))
+    functions, _PYTHON[id(f)] = _prepared(f, t[0], y0)
+    try:
+        found = _stepped(stepper, functions, id(f), t, y0)
+    finally:
+        _PYTHON.pop(id(f)), _RAISED.pop(id(f), None)
     if counts is not None:
         counts |= stepper.counts()
     return found
+
+
+def _stepped(stepper: Stepper, functions: tuple, key: int, t, y0) -> np.ndarray:
+    """States at t : float64[len(t), n], by dense output, or by stepping onto them where that is much less accurate."""
+    orders, memory, flags = stepper.orders, stepper.memory, stepper.flags
+    method, fixed, handle = stepper.method, orders[told.CONTROL] != told.TOLERANCE, np.array([key])
+    lands = stepper.dense_order < (method.order - 2 if fixed else method.error_order - 1)
+    stops = t[1:] if lands else t[-1:]
+    stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, y0.size + 1))
+    found = np.empty((t.size, y0.size))
+    found[0] = y0
+    for i, stop in enumerate(stops, t.size - len(stops)):
+        orders[told.END], kept = stop, memory[told.STEP]
+        flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
+        code = told.CHUNK
+        while code == told.CHUNK:
+            if automatic.wants_change(stepper):
+                automatic.change(stepper)
+            orders[told.BUDGET] = NO_LIMIT
+            code = stepper.call(*functions, handle, WHERE, stepper.none)
+        if code != told.DONE:
+            raise FvsolveError(_failure(stepper.method, code, memory)) from _RAISED.get(key)
+        found[i] = stepper.y[flags[told.NOW]]
+        memory[told.STEP] = 0.0 if fixed else memory[told.STEP] or kept
+    if not lands:
+        found[1:-1] = stepper.rows[: t.size - 2, 1:]
+    return found
+
+
+def _prepared(f, t0, y0) -> tuple:
+    """(the loop's functions around f, f(t, y, dydt) as Python), kept where f is compiled already.
+
+    What a plain function reads from outside may change between two calls, and compiled code would not see it.
+    """
+    if f not in _COMPILED:
+        _try_out(f, t0, y0)
+        made = _functions(f, t0, y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
+        if not hasattr(f, "py_func"):
+            return made
+        _COMPILED[f] = made
+    return _COMPILED[f]
 
 
 @functools.cache
@@ -108,6 +124,14 @@ def _numbers(name, given) -> np.ndarray:
         return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
         raise FvsolveError(f"{name} = {given!r} is not made of numbers") from None
+
+
+def _scale(atol, rtol: float, n: int) -> np.ndarray:
+    """What a deviation of each state is measured against, beside its own size."""
+    atol = _numbers("atol", atol)
+    if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
+        raise FvsolveError(f"atol must be a positive number, or {n} of them, one a state")
+    return np.broadcast_to(atol / rtol, n).copy()
 
 
 def _try_out(f, t, y0) -> None:
@@ -139,7 +163,7 @@ def _check(method, t, rtol, step) -> None:
         raise FvsolveError(f"rtol = {rtol:g} is below rounding; wanted {LEAST_TOLERANCE:g} or more")
 
 
-_COMPILED: WeakKeyDictionary = WeakKeyDictionary()  # the user's function -> the loop's, and f(t, y, dydt)
+_COMPILED: dict[Callable, tuple] = {}  # what was prepared for functions that are compiled already
 _PYTHON: dict[int, Callable] = {}  # functions that numba cannot compile, by the number in their handle
 _RAISED: dict[int, BaseException] = {}  # what they raised
 WHERE = 3  # no ledger behind it in `out`
@@ -194,12 +218,18 @@ def _functions(f, t0, y0):
 
         return _no_leap, _row, _nothing, _no_events, plain
     v, handle = types.float64[::1], types.int64[::1]
+    return *watchers(), compiled_as(numba.njit(_rhs(f, t0, y0)), (types.float64, v, v, v, handle))
+
+
+@functools.cache
+def watchers() -> tuple:
+    """(leap, observe, record, events) of a system that has none of them but its states."""
+    v, handle = types.float64[::1], types.int64[::1]
     functions = (
         (_no_leap, (types.float64, types.float64, v, v, v, handle, v)),
         (_row, (types.float64, v, v, handle, v)),
         (_nothing, (types.float64, v, v, handle, v)),
         (_no_events, (types.float64, v, handle, v)),
-        (_rhs(f, t0, y0), (types.float64, v, v, v, handle)),
     )
     return tuple(compiled_as(numba.njit(function), signature) for function, signature in functions)
 

@@ -17,7 +17,7 @@ ORDERS = 16
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
 # Why a call came back.
-DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK = range(9)
+DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK, SWITCHED, CHATTERS = range(11)
 # What passes between calls while rows are still to be written: phase, whether a step lies behind, buffers, rows, and
 # whether the rule of the rhs changes at its end.
 PHASE, BEHIND, NOW, OLD, ROWS, BENT = range(6)

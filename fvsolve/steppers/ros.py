@@ -11,7 +11,7 @@ from math import sqrt
 from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
-from fvsolve.steppers.newton import INCREMENT, RATE, renew
+from fvsolve.steppers.newton import BASE, INCREMENT, RATE, renew
 from fvsolve.steppers.orders import (
     CALLS,
     CONTROL,
@@ -32,7 +32,7 @@ from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
-SLOPE = 5  # the row of `vectors`, behind the stages, that keeps df/dt
+SLOPE = BASE  # the row of `vectors`, behind the stages, that keeps df/dt: no stage here starts from a base of its own
 
 
 @inner
@@ -66,6 +66,21 @@ def spectral_radius(shape, work, nnz, scale, v):
         for e in range(n):
             v[e] = product[e] / now if now > 0.0 else 0.0
     return sqrt(before * now)  # of a pair, whose single quotients swing
+
+
+@inner
+def book_stage(shape, nnz, i, gamma, late, row, d, supply, where, out, work):
+    """Ledger rates of stage i as of any state: g (rates + J d + late slope + sum of C_ij supply_j), d = u_i.
+
+    row : C_i, float64[s]; `out` holds the rates that came with f, the end of `work` their slopes in time.
+    """
+    n, ledgers, product = d.size, supply.shape[1], work[HEADER + nnz :]
+    multiply(shape, work[HEADER : HEADER + nnz], d, product)
+    for m in range(ledgers):
+        total = out[where + m] + product[n + m] + late * work[work.size - ledgers + m]
+        for j in range(1, i):
+            total += row[j] * supply[j, m]
+        supply[i, m] = gamma * total
 
 
 @njit
@@ -106,25 +121,18 @@ def attempt(
             f = vectors[s + RATE]
             combine(y[now], h, row_of(coefficients, s, i), i, k, y[3])
             rhs(t + c[i] * h, y[3], f, out, handle)
-        late, u = beyond[s * s + i] * h, k[i]
+        late, u, row = beyond[s * s + i] * h, k[i], beyond[i * s : (i + 1) * s]
         if late != 0.0:
             for e in range(n):
                 d[e] = f[e] + late * slope[e]
             f = d
-        combine(f, 1.0, beyond[i * s : (i + 1) * s], i, k, u)
+        combine(f, 1.0, row, i, k, u)
         solve(shape, store, u)
         if ledgers > 0:
             copy(u, d)
+            book_stage(shape, nnz, i, gamma, late, row, d, supply, where, out, work)
         for e in range(n):
             u[e] *= per
-        if ledgers > 0:
-            product = work[HEADER + nnz :]
-            multiply(shape, work[HEADER : HEADER + nnz], d, product)
-            for m in range(ledgers):
-                total = out[where + m] + product[n + m] + late * work[work.size - ledgers + m]
-                for j in range(1, i):
-                    total += beyond[i * s + j] * supply[j, m]
-                supply[i, m] = gamma * total
     memory[CALLS] += s - 2.0
     combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:

@@ -11,7 +11,8 @@ import numpy as np
 from fvsolve.jit import argument, beside
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.coefficients import coefficients
-from fvsolve.steppers.march import compiled, compiled_step, no_algebra
+from fvsolve.steppers.march import compiled
+from fvsolve.steppers.signatures import compiled_step, no_algebra
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
 

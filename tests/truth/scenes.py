@@ -116,3 +116,7 @@ def smooth_ramp(start: float, duration: float, before: float, after: float, poin
     times = [start + duration * i / (points - 1) for i in range(points)]
     values = [before + (after - before) * smooth_step(t, start, duration) for t in times]
     return {"time": times, "value": values, "kind": "smooth"}
+
+
+def pump(start: str, end: str, **more: Any) -> dict:
+    return {"type": "pump", "from": start, "to": end, **more}

@@ -1,0 +1,73 @@
+"""EPANET's Net3 left alone for 20 s: CPU time and drift of fvsolve and rthym-moc, which reads the same file.
+
+Both take 1438.656 m/s (4720 ft/s, rthym-moc's rigid pipe). rthym-moc cuts every pipe at its wave speed times its step;
+fvsolve's step follows its shortest cell, so it is met twice: at the same step, and at the same length of cells.
+"""
+
+import tomllib
+import warnings
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import rthym_moc
+import wntr
+
+import fvsolve
+from fvsolve.case import load
+from fvsolve.epanet import import_network
+from fvsolve.model.build import build
+
+NET = Path(wntr.__file__).parent / "library" / "networks" / "Net3.inp"
+SPEED, END, REPEATS = 4720 * 0.3048, 20.0, 3
+SETTINGS = [("upwind", "euler"), ("muscl", "ssp-rk2"), ("upwind5", "rk4")]
+
+
+def rthym(dt):
+    """CPU time [s], greatest drift of a head [m], steps."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        solver = rthym_moc.load_inp(str(NET), stub_length_ft=4720 * dt)
+    best = np.inf
+    for _ in range(REPEATS):
+        start = process_time()
+        found = solver.run(END, dt)
+        best = min(best, process_time() - start)
+    heads = [np.asarray(head) for name, head in found["node_head"].items() if not name.startswith("_")]
+    drift = np.array([np.max(np.abs(head - head[0])) for head in heads]) * 0.3048
+    return best, drift.max(), np.median(drift), len(found["time"])
+
+
+def ours(cell_time, scheme, method):
+    """The same, and the step [s]."""
+    table = tomllib.loads(import_network(NET, wave_speed=SPEED).text)
+    table["numerics"] |= {"end": END, "cell_time": cell_time, "scheme": scheme, "method": method}
+    names = [name for name, node in table["nodes"].items() if node["type"] == "junction"]
+    table["output"] = {"every": 0.5, "fields": 0, "probes": [f"nodes.{name}.head" for name in names]}
+    model = build(load(table))
+    best = np.inf
+    fvsolve.run(model)
+    for _ in range(REPEATS):
+        start = process_time()
+        result = fvsolve.run(model)
+        best = min(best, process_time() - start)
+    drift = np.array([np.max(np.abs(result[probe] - result[probe][0])) for probe in table["output"]["probes"]])
+    return best, drift.max(), np.median(drift), result.summary["steps"], model.cells
+
+
+def row(name, cpu, most, median, steps, cells=""):
+    print(f"{name:36} {1e3 * END / steps:9.3g} {cpu:8.3f} {1e6 * cpu / steps:9.1f} {most:10.2g} {median:10.2g} {cells}")
+
+
+def main():
+    print(f"{'':36} {'step [ms]':>9} {'CPU [s]':>8} {'us/step':>9} {'drift [m]':>10} {'median':>10} cells")
+    for cell_time in (0.01, 0.02):
+        for scheme, method in SETTINGS:
+            found = ours(cell_time, scheme, method)
+            row(f"fvsolve {scheme} {method}, {1e3 * cell_time:g} ms cells", *found)
+        row("rthym-moc at that step", *rthym(END / found[3]))
+        row("rthym-moc at that length of cells", *rthym(cell_time))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""The greatest safe step, predicted and measured, for every linear scheme with every explicit method on four scenes.
+
+    python benchmarks/stability_pairs.py [cells] [steps]
+
+A closed pipe, a pipe with inflow (ends that send nothing back), a junction of three pipes with a flowing valve, and a
+chain of chambers; Courant numbers, and by how much measurement and prediction differ. The periodic pipe is in
+`fvsolve stability --cells N`. Takes some minutes.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+
+from fvsolve.model.schemes import LINEAR
+from fvsolve.steppers import METHODS
+from fvsolve.studies.stability.stability import stability
+
+RHO, AMBIENT = 1000.0, 101325.0
+FLUID = {"name": "user", "density": RHO, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
+
+
+def pipe(start: str, end: str, length: float, diameter: float, speed: float, cells: int) -> dict:
+    return {"type": "pipe", "from": start, "to": end, "length": length, "diameter": diameter, "wave_speed": speed,
+            "cells": cells, "friction": {"model": "none"}}  # fmt: skip
+
+
+def valve(start: str, end: str, flow_area: float, opening: float = 1.0) -> dict:
+    return {"type": "valve", "from": start, "to": end, "area": flow_area, "discharge_coefficient": 1.0,
+            "opening": opening}  # fmt: skip
+
+
+def scene(nodes: dict, links: dict) -> dict:
+    return {"schema": 1, "fluid": FLUID, "nodes": nodes, "links": links,
+            "numerics": {"end": 1.0, "method": "rk4", "step": 1e-3}}  # fmt: skip
+
+
+def reservoir(pressure: float) -> dict:
+    return {"type": "reservoir", "pressure": pressure}
+
+
+JUNCTION = {"type": "junction"}
+
+
+def closed(cells: int) -> dict:
+    """A pipe between a shut valve and a blind end."""
+    return scene({"A": reservoir(1e6), "a": JUNCTION, "b": JUNCTION},
+                 {"v": valve("A", "a", 1e-3, 0.0), "p": pipe("a", "b", 100.0, 0.3, 1000.0, cells)})  # fmt: skip
+
+
+def inflow(cells: int) -> dict:
+    """A pipe whose end valves have its own slope, dM/dp = A / a: waves enter and leave, and none comes back."""
+    flow, admittance = 10.0, math.pi / 4 * 0.3**2 / 1000.0
+    conductance = 2 * flow * admittance  # M |M| = G dp
+    opened, drop = math.sqrt(conductance / (2 * RHO)), flow**2 / conductance
+    nodes = {"A": reservoir(1e6 + 2 * drop), "a": JUNCTION, "b": JUNCTION, "B": reservoir(1e6)}
+    links = {"p": pipe("a", "b", 100.0, 0.3, 1000.0, cells), "v": valve("A", "a", opened), "w": valve("b", "B", opened)}
+    return scene(nodes, links)
+
+
+def network(cells: int) -> dict:
+    """Three pipes meet; a reservoir, a flowing valve and a blind end."""
+    nodes = {"A": reservoir(1.2e6), "t": JUNCTION, "g": JUNCTION, "B": reservoir(1e6), "d": JUNCTION}
+    links = {"p": pipe("A", "t", 100.0, 0.3, 1000.0, cells), "q": pipe("t", "g", 60.0, 0.2, 1100.0, max(5, cells // 2)),
+             "r": pipe("t", "d", 80.0, 0.25, 900.0, max(5, cells // 2)), "v": valve("g", "B", 2e-3)}  # fmt: skip
+    return scene(nodes, links)
+
+
+def chain(cells: int) -> dict:
+    """Chambers and flowing valves between two pressures."""
+    inside = {f"c{k}": {"type": "chamber", "volume": 1e-3 * (1 + k % 3)} for k in range(cells)}
+    nodes = {"in": reservoir(2e6), **inside, "out": reservoir(1e6)}
+    names = list(nodes)
+    return scene(nodes, {f"v{k}": valve(names[k], names[k + 1], 1e-5) for k in range(cells + 1)})
+
+
+def main(cells: int = 16, steps: int = 1000) -> None:
+    """Print a table for each scene and the greatest difference of all."""
+    methods = [name for name, one in METHODS.items() if one.name == name and one.explicit]
+    schemes = ["upwind", *LINEAR]
+    worst: list[float] = []
+    for make in (closed, inflow, network, chain):
+        names = schemes if make is not chain else schemes[:1]
+        rows = stability(make(cells), names, methods, steps=steps).rows
+        print(f"\n{make.__name__}, {cells} cells, {steps} steps: predicted (measured less predicted, %)", flush=True)
+        print(f"{'':18}" + "".join(f"{name:>20}" for name in names))
+        for method in methods:
+            line = [row for row in rows if row.method == method]
+            unit = [row.rate or 1.0 for row in line]
+            cells_of = [
+                f"{row.predicted * u:.5g} ({100 * row.difference:+.2f})" for row, u in zip(line, unit, strict=True)
+            ]
+            print(f"{method:18}" + "".join(f"{text:>20}" for text in cells_of), flush=True)
+        worst.append(float(np.max(np.abs([row.difference for row in rows]))))
+        print(f"greatest difference {100 * worst[-1]:.3f} %", flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

@@ -1,0 +1,143 @@
+"""Unsteady friction as the step halves: `python benchmarks/unsteady_friction.py`.
+
+A valve shuts at the end of the 914 m main of cases/valve-closure.toml (Reynolds 131 000), in 50 ms and at once.
+Joukowsky and the friction head let the head at the gate rise to 326 ft; unsteady friction may add 1 %. Beside fvsolve
+rthym-moc 0.4.1 with its unsteady friction on and its defaults (usf_tau 0.5 s, Vardy-Brown coefficient; its closure is a
+demand that ends), and TSNet 0.3.1 with friction "unsteady", skipped where it is not installed. The same step in all
+three; the head of the first plateau, 1 s behind the closure, and the greatest head over 9 s from the closure on.
+"""
+
+import contextlib
+import io
+import tempfile
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import peer_moc
+
+import fvsolve
+
+FOOT = 0.3048
+BOUND = 326.0  # [ft]
+CASE = Path(__file__).parent.parent / "cases" / "valve-closure.toml"
+REACHES = (26, 50, 100, 200, 400)
+END, SHUT = 10.0, 1.0  # [s]
+
+
+@dataclass
+class Main:
+    """The main of the case, in SI, as `peer_moc` takes it."""
+
+    length: float = 914.4
+    diameter: float = 0.3048
+    wave_speed: float = 1219.2
+    head: float = 45.72
+    flow: float = 0.031555
+    factor: float = 0.02111
+    duration: float = 0.05
+
+
+def by_fvsolve(reaches, duration):
+    """(times from the closure [s], heads at the gate [ft], CPU time [s])."""
+    keys = {"links.main.cells": reaches, "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"},
+            "links.valve.opening": {"start": SHUT, "duration": duration, "value": [1.0, 0.0]}}  # fmt: skip
+    begin = process_time()
+    run = fvsolve.run(CASE, keys)
+    return run.t - SHUT, np.asarray(run["gate.head"]) / FOOT, process_time() - begin
+
+
+def by_rthym(reaches, duration):
+    """The same; the demand ends at the start."""
+    begin, step = process_time(), Main.length / Main.wave_speed / reaches
+    trace = peer_moc.uniform_pipe(
+        Main(duration=max(duration, step)), reaches, int(9.0 * 1219.2 / 914.4 * reaches), friction=(0.5, -1.0)
+    )
+    return trace.time, trace.head / FOOT, process_time() - begin
+
+
+def numbers(solve):
+    """A function of TSNet whose arrays of one are made numbers, which numpy 2 does not do by itself."""
+
+    def wrapped(*given):
+        return tuple(float(np.ravel(one)[0]) for one in solve(*given))
+
+    return wrapped
+
+
+def stepped(tm, reaches):
+    """Give a TSNet model its step; its own `set_time` leaves arrays of one."""
+    for _, pipe in tm.pipes():
+        pipe.number_of_segments = reaches // 2
+    tm.simulation_period, tm.time_step = END, Main.length / Main.wave_speed / reaches
+
+
+def by_tsnet(reaches, duration):
+    """The same; the main in two halves, for TSNet knows no end of a pipe that is alone."""
+    import tsnet
+    import wntr
+    from tsnet.simulation import single, solver
+
+    single.add_leakage = numbers(solver.add_leakage)
+    main = Main()
+    net = wntr.network.WaterNetworkModel()
+    net.add_reservoir("lake", base_head=main.head)
+    net.add_reservoir("out", base_head=0.0)
+    net.add_junction("gate", elevation=0.0)
+    loss = main.head - 45.116  # by Hazen and Williams, h = 10.67 L q^1.852 / (C^1.852 D^4.8704)
+    c = (10.67 * main.length * main.flow**1.852 / (loss * main.diameter**4.8704)) ** (1.0 / 1.852)
+    net.add_junction("middle", elevation=0.0)
+    for name, ends in (("upper", ("lake", "middle")), ("lower", ("middle", "gate"))):
+        net.add_pipe(name, *ends, main.length / 2, main.diameter, roughness=c)
+    speed = main.flow / (np.pi / 4 * main.diameter**2)
+    net.add_valve("valve", "gate", "out", main.diameter, "TCV", 0.0, 45.116 * 2 * 9.81 / speed**2)
+    net.options.time.duration = 0
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(io.StringIO()),
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")
+        path = str(Path(folder) / "main.inp")
+        wntr.network.write_inpfile(net, path)
+        begin = process_time()
+        tm = tsnet.network.TransientModel(path)
+        tm.set_wavespeed(main.wave_speed)
+        stepped(tm, reaches)
+        tm.valve_closure("valve", [max(duration, tm.time_step), SHUT, 0, 1])
+        tm = tsnet.simulation.Initializer(tm, 0, "DD")
+        tm = tsnet.simulation.MOCSimulator(tm, str(Path(folder) / "results"), "unsteady")
+        busy = process_time() - begin
+    return np.asarray(tm.simulation_timestamps) - SHUT, np.asarray(tm.get_node("gate").head) / FOOT, busy
+
+
+def table(duration):
+    """Print what all three find for a closure."""
+    print("peer       reaches  plateau  change  greatest  over 326 ft  CPU [s]")
+    for name, solve in (("fvsolve", by_fvsolve), ("rthym-moc", by_rthym), ("TSNet", by_tsnet)):
+        before = None
+        for reaches in REACHES[:4] if name == "TSNet" else REACHES:
+            try:
+                t, head, cpu = solve(reaches, duration)
+            except ImportError as error:
+                print(f"{name}: skipped, {error}")
+                break
+            plateau = float(np.interp(1.0, t, head))
+            change = "" if before is None else f"{plateau - before:+.3f}"
+            more = 100.0 * (head.max() / BOUND - 1.0)
+            print(f"{name:10s} {reaches:7d}  {plateau:7.2f} {change:>7s}  {head.max():8.1f}  {more:9.1f} %  {cpu:7.2f}")
+            before = plateau
+
+
+def main():
+    """Print both tables."""
+    for words, duration in (("in 50 ms", 0.05), ("at once (peers: within one step)", 0.0)):
+        print(f"The valve shuts {words}: head at the gate of the 914 m main [ft]; Joukowsky and friction head: 326")
+        table(duration)
+
+
+if __name__ == "__main__":
+    main()

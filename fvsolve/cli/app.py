@@ -1,0 +1,67 @@
+"""What all commands share: the application, their common options, how a case is read. Knows no command."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from fvsolve.errors import CaseError, Fault
+from fvsolve.output.summary import plain
+
+app = typer.Typer(
+    help="Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+One = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override a key: links.main.cells=400")]
+Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
+
+
+def load_case(name: str, overrides: list[str]):
+    """The case, overridden; an override that is none is one more fault of it."""
+    from fvsolve.case import load
+    from fvsolve.cli import shipped
+
+    path = shipped.find(name)
+    settings, faults = _overrides(overrides)
+    try:
+        case = load(path, settings)
+    except CaseError as error:
+        raise CaseError([*error.faults, *faults], error.file) if faults else error from None
+    if faults:
+        raise CaseError(faults, path.name)
+    return case
+
+
+def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
+    found, faults = {}, []
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if equals and key.strip():
+            found[key.strip()] = value_of(value)
+        else:
+            faults.append(Fault(text, "wanted KEY=VALUE, for example links.main.cells=400", override=True))
+    return found, faults
+
+
+def value_of(text: str):
+    """`400`, `true`, `[1, 2]` and `{ a = 1 }` as TOML reads them; everything else is text."""
+    import tomllib
+
+    try:
+        read = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+    return read["value"] if read.keys() == {"value"} else text.strip()
+
+
+def print_json(data) -> None:
+    """One object on standard output, numbers unrounded."""
+    print(json.dumps(plain(data), allow_nan=False))

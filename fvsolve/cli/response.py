@@ -1,0 +1,84 @@
+"""`fvsolve response`. Knows what is asked and how it is shown; leaves the verdict to `studies`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
+from fvsolve.cli.linearise import At, Before, time_of, write_rows
+from fvsolve.cli.studying import Out, folder_of
+
+SYMBOLS = {"admittance": "Y", "impedance": "Z"}
+
+
+@app.command()
+def response(
+    case: One,
+    port: Annotated[str, typer.Option(metavar="NODE", help="a reservoir, junction, inflow, chamber or tank")],
+    at: At = None,
+    before: Before = False,
+    scheme: Annotated[str | None, typer.Option(metavar="NAME", help="a linear scheme in place of the case's")] = None,
+    out: Out = None,
+    set: Set = [],  # noqa: B006
+    as_json: Json = False,
+) -> None:
+    """Pressure against flow at a port: state space, frequency response, and whether it is positive real."""
+    from fvsolve.studies.ports.response import response as ask
+
+    read = load_case(case, set)
+    found = ask(read, port, time_of(at), before, scheme)
+    folder = folder_of(read, "response", out)
+    name = f"{port}.response"
+    header = ["frequency [Hz]", "w [rad/s]", "real", "imaginary", f"magnitude [{unit_of(found)}]", "phase [deg]"]
+    h = found.h
+    columns = [found.w / (2.0 * np.pi), found.w, h.real, h.imag, np.abs(h), np.degrees(np.angle(h))]
+    write_rows(folder / f"{name}.csv", header, np.column_stack(columns).tolist())
+    np.savez(folder / f"{name}.npz", A=found.a, B=found.b, C=found.c, D=found.d, states=np.array(found.states))
+    draw(found, folder / name)
+    if as_json:
+        print_json(found.plain() | {"directory": str(folder)})
+    else:
+        show(found, folder, name)
+
+
+def unit_of(found) -> str:
+    """Unit of H."""
+    return "m3/s/Pa" if found.kind == "admittance" else "Pa s/m3"
+
+
+def draw(found, path: Path) -> None:
+    """PNG and SVG."""
+    from fvsolve.draw.response import response_figure
+
+    verdict = found.verdict
+    dips, poles = [(dip.low, dip.high) for dip in verdict.dips], {abs(s.imag) for s in verdict.axis} - {0.0}
+    said = f"positive real: {verdict.answer}"
+    title = f"{found.case} at {found.when}: {found.kind} at {found.port}"
+    labels = (SYMBOLS[found.kind], unit_of(found))
+    figure = response_figure(found.w, found.h, labels, dips, poles, verdict.tolerance, title, said)
+    for ending in ("png", "svg"):
+        figure.savefig(path.with_name(f"{path.name}.{ending}"))
+
+
+def show(found, folder: Path, name: str) -> None:
+    """What a person reads: what was asked, the verdict with its reasons, and the files."""
+    from fvsolve.cli import terminal
+
+    where, verdict = terminal.console(), found.verdict
+    what = {"admittance": "flow into the network over pressure", "impedance": "pressure over flow fed in"}[found.kind]
+    scheme = f", scheme {found.scheme}" if found.scheme else ""
+    states = f"{len(found.states)} state" + ("s" if len(found.states) > 1 else "")
+    terminal.line(where, f"{found.case} at {found.when}: {found.kind} at {found.port}, {what} [{unit_of(found)}]; "
+                         f"{states}{scheme}")  # fmt: skip
+    if found.moving > 1e-9:
+        terminal.line(where, "  not at rest there; schedules stand still at that time")
+    terminal.line(where, f"positive real: {verdict.answer}", "bold")
+    for reason in verdict.reasons:
+        terminal.line(where, f"  {reason}")
+    terminal.line(where, f"  searched {verdict.low:.3g} to {verdict.high:.3g} rad/s; nothing is decided within "
+                         f"{verdict.tolerance:.0e} of |H| (differences agree to {found.error:.0e})")  # fmt: skip
+    terminal.line(where, f"{folder}: {name}.csv, {name}.npz, {name}.png, {name}.svg")

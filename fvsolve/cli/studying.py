@@ -1,0 +1,67 @@
+"""What the commands that study a case share: lists, folders, progress, Ctrl-C. Knows the terminal; asks nothing."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fvsolve.errors import FvsolveError
+
+Out = Annotated[Path | None, typer.Option(metavar="DIR", help="folder of tables and pictures")]
+
+
+def listed(text: str | None, option: str = "") -> list[str] | None:
+    """`a,b,c` as its words, each once; None where nothing is said. Raises FvsolveError for a list without any."""
+    if text is None:
+        return None
+    found = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    if not found:
+        raise FvsolveError(f'{option} "{text}" lists nothing; wanted names or numbers with commas between them')
+    return found
+
+
+def folder_of(case, study: str, out: Path | None) -> Path:
+    """Where a study of a case leaves its files: runs/NAME.STUDY by default, created."""
+    return writable(out or Path("runs") / f"{case.name}.{study}")
+
+
+def writable(folder: Path) -> Path:
+    """The folder, created; raises FvsolveError where nothing can be written into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FvsolveError(f"{folder}: cannot be written: {error.strerror or error}; name another with --out") from None
+    if not os.access(folder, os.W_OK):
+        raise FvsolveError(f"{folder}: cannot be written: permission denied; name another with --out")
+    return folder
+
+
+@contextmanager
+def told(kept: bool = True) -> Iterator[Callable[[int, int, str], None]]:
+    """A `progress(done, total, next)` function: one line on a terminal, rewritten; nothing elsewhere.
+
+    Ctrl-C ends the command with exit code 130; points that are finished are on disk and the same command goes on,
+    unless `kept` is False.
+    """
+    shows, seen = sys.stderr.isatty(), [0, 0]
+
+    def progress(done: int, total: int, what: str) -> None:
+        seen[:] = done, total
+        if shows:
+            print(f"\r\033[K{done} of {total}: {what}", end="", file=sys.stderr, flush=True)
+
+    try:
+        yield progress
+    except KeyboardInterrupt:
+        rest = "the same command goes on" if kept else "none of them is kept"
+        print(f"\ninterrupted after {seen[0]} of {seen[1]} points; {rest}", file=sys.stderr)
+        sys.exit(130)
+    finally:
+        if shows:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,86 @@
+"""A frequency response: magnitude, phase and real part over frequency. Knows arrays and matplotlib; knows no case."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.draw import style
+
+
+def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=0.0, title: str = "", said: str = ""):
+    """Bode plot of h over w with Re h below; bands where Re h < 0 shaded, poles on the axis as dotted lines.
+
+    w : float64[k] [rad/s]; h : complex128[k]; labels : what h is and its unit; dips : (low, high) [rad/s]; poles :
+    frequencies [rad/s]; tolerance : of |h|, below which Re h is drawn as zero
+    """
+    name, unit = labels
+    figure = style.figure(7.4)
+    axes = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 3))
+    frequency = np.asarray(w) / (2.0 * np.pi)
+    shown = np.isfinite(h)
+    values = np.where(shown, h, np.nan)
+    phase = np.degrees(np.angle(values))
+    phase = np.where(phase < -179.999, 180.0, phase)  # a minus sign of zero is no jump
+    real = np.where(np.abs(values.real) > tolerance * np.abs(values), values.real, 0.0)
+    for one, line in zip(axes, (np.abs(values), phase, real), strict=True):
+        style.dress(one)
+        for pole in poles:
+            one.axvline(pole / (2.0 * np.pi), color=style.DOUBT, linewidth=0.9, linestyle=(0, (1, 2)))
+        one.plot(frequency, line, color=style.COLOURS[0], linewidth=1.2)
+        for low, high in dips:
+            one.axvspan(max(low / (2.0 * np.pi), frequency[0]), min(high / (2.0 * np.pi), frequency[-1]),
+                        color=style.DOUBT, alpha=0.25, linewidth=0.8)  # fmt: skip
+    axes[0].set_xscale("log")
+    _logarithmic(axes[0], np.abs(values))
+    axes[0].set_ylabel(f"|{name}|  [{unit}]", fontsize=8.5, color=style.INK)
+    _phase(axes[1], phase)
+    _real(axes[2], real)
+    axes[2].set_ylabel(f"Re {name}  [{unit}]", fontsize=8.5, color=style.INK)
+    axes[2].set_xlabel("frequency [Hz]", fontsize=8.5, color=style.INK)
+    axes[2].set_title(said, fontsize=8.5, color=style.INK, loc="left", wrap=True)
+    style.title(figure, title)
+    return figure
+
+
+def _logarithmic(axes, size) -> None:
+    """Six decades at most."""
+    top, least = np.nanmax(size), np.nanmin(size)
+    if not top > 0.0:
+        return
+    axes.set_yscale("log")
+    axes.set_ylim(max(0.8 * least, 1e-6 * top), 1.25 * top)
+    axes.tick_params(axis="y", which="minor", labelsize=6.5, colors=style.MUTED, labelcolor=style.MUTED)
+
+
+def _phase(axes, phase) -> None:
+    """Degrees, with the lines at -90 and 90 between which a passive port stays."""
+    for level in (-90.0, 90.0):
+        axes.axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+    least, greatest = np.nanmin(phase), np.nanmax(phase)
+    axes.set_ylim(min(-100.0, least - 10.0), max(100.0, greatest + 10.0))
+    axes.set_yticks([x for x in range(-180, 181, 45) if axes.get_ylim()[0] <= x <= axes.get_ylim()[1]])
+    axes.set_ylabel("phase [deg]", fontsize=8.5, color=style.INK)
+
+
+def _real(axes, real) -> None:
+    """Logarithmic, on both sides of zero where it is negative somewhere, six decades at most; linear where it is 0."""
+    from matplotlib.ticker import NullLocator
+
+    size = np.abs(real[np.isfinite(real)])
+    top = size.max(initial=0.0)
+    if top == 0.0:
+        axes.set_ylim(-1.0, 1.0)
+        axes.set_yticks([0.0])
+    elif size.min() > 0.0 and np.nanmin(real) > 0.0:
+        _logarithmic(axes, real)
+    else:
+        small = max(np.min(size[size > 0.0]), 1e-6 * top)
+        axes.set_yscale("symlog", linthresh=float(small), linscale=1.0)
+        below = np.nanmin(real) < 0.0
+        axes.set_ylim(-2.0 * top if below else 0.0, 2.0 * top)
+        first, last = int(np.ceil(np.log10(small))) + 1, int(np.floor(np.log10(top)))
+        marks = [10.0**k for k in range(last, first - 1, -2)]
+        axes.set_yticks([*(-x for x in marks if below), 0.0, *marks])
+        axes.yaxis.set_minor_locator(NullLocator())
+    if axes.get_yscale() != "log":
+        axes.axhline(0.0, color=style.INK, linewidth=0.8)

@@ -1,0 +1,35 @@
+"""The picture of a spectrum over a stability region. Knows arrays and matplotlib; knows no case and no method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fvsolve.draw import style
+from fvsolve.draw.region import region_figure
+
+
+def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = None, title: str = ""):
+    """Eigenvalues times the step over |R(s)| <= 1, and the boundary of the field of values times it where given."""
+    made = region_figure(r, title)
+    axes = made.axes[0]
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    if field is not None:
+        axes.plot(*closed(field), color=style.COLOURS[2], linewidth=1.2, label="field of values")
+    inside = (values.real >= low[0]) & (values.real <= high[0]) & (np.abs(values.imag) <= high[1])
+    axes.plot(values.real, values.imag, ".", color=style.COLOURS[1], markersize=4, label="eigenvalues")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    far = int(np.sum(~inside))
+    axes.legend(
+        loc="upper left", fontsize=8, framealpha=0.9, edgecolor=style.HAIR, labelcolor=style.INK,
+        title=f"{far} of {values.size} eigenvalues lie outside" if far else None, title_fontsize=8,
+    )  # fmt: skip
+    return made
+
+
+def closed(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A closed line."""
+    whole = np.append(points, points[:1])
+    return whole.real, whole.imag

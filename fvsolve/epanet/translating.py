@@ -1,0 +1,221 @@
+"""A network of EPANET's, part by part, as the parts of a case. Knows what stands for what; words are elsewhere."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from fvsolve.epanet import words
+from fvsolve.epanet.names import Names
+from fvsolve.epanet.reading import SHUT, Hour
+
+STALLED = 1e-7  # flow below which EPANET's pumps of constant power have stuck [m3/s]
+STEEPEST = 0.99  # climb per length where the file has more than 1
+SWITCHED_OFF, ACTIVE = 2, 4  # EPANET's codes of a link
+PSI_OF_METRE = 0.4333 / 0.3048
+US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
+REGULATES = 2  # WNTR's code of a valve that nobody holds open or shut
+
+
+class Translation:
+    """Nodes and links of a case, and notes on what is not as EPANET has it.
+
+    nodes, links : name -> what the case file says; marks : link -> a word on it; notes : (what, EPANET's names)
+    """
+
+    def __init__(self, network: Any, hour: Hour, wave_speed: float, shortest: float) -> None:
+        self.network, self.hour, self.speed, self.shortest = network, hour, wave_speed, shortest
+        self.nodes: dict[str, words.Part] = {}
+        self.links: dict[str, words.Part] = {}
+        self.marks: dict[str, str] = {}
+        self.noted: dict[str, list[str]] = {}
+        self.node_names, self.link_names = Names(), Names()
+        hydraulic = network.options.hydraulic
+        self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
+        self.clock = hour.seconds + network.options.time.pattern_start
+        self.drawn = any(any(node.coordinates) for _, node in network.nodes())
+        self.elevation = self.elevations()
+        for name, node in network.nodes():
+            self.nodes[self.node_names.add(name)] = getattr(self, node.node_type.lower())(name, node)
+        for name, link in network.links():
+            ours = self.link_names.add(name)
+            self.links[ours] = getattr(self, link.link_type.lower())(name, link)
+        self.emitters()
+        self.options(hydraulic)
+        for names in (self.node_names, self.link_names):
+            for name, ours in names.changed().items():
+                self.note("has another name here", f"{name} is {ours}")
+
+    def note(self, what: str, name: str) -> None:
+        names = self.noted.setdefault(what, [])
+        if name not in names:
+            names.append(name)
+
+    @property
+    def notes(self) -> list[tuple[str, list[str]]]:
+        """What is not as EPANET has it, and the names it is true of."""
+        return list(self.noted.items())
+
+    # nodes ------------------------------------------------------------------------------------------------
+
+    def elevations(self) -> dict[str, float]:
+        """Elevations [m] of junctions and tanks, none of which a pipe is too short to reach.
+
+        Heads and flows of a network do not depend on them; EPANET accepts a pipe of 6 m that climbs 200 m.
+        """
+        found = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
+        pipes = [pipe for _, pipe in self.network.pipes() if {pipe.start_node_name, pipe.end_node_name} <= found.keys()]
+        moved = True
+        while moved:
+            moved = False
+            for pipe in pipes:
+                low, high = sorted((pipe.start_node_name, pipe.end_node_name), key=found.get)
+                if found[high] - found[low] <= pipe.length:
+                    continue
+                if self.network.get_node(low).node_type == "Junction":
+                    name, found[low] = low, found[high] - STEEPEST * pipe.length
+                else:
+                    name, found[high] = high, found[low] + STEEPEST * pipe.length
+                moved = True
+                self.note("elevation moved, no pipe can be shorter than its climb; heads and flows stay", name)
+        return found
+
+    def position(self, node: Any) -> Any:
+        """Where a node is drawn; None in a file without coordinates, of which WNTR puts every node at the origin."""
+        return node.coordinates if self.drawn else None
+
+    def junction(self, name: str, node: Any) -> words.Part:
+        demand = node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
+        if self.network.options.hydraulic.demand_model in ("PDA", "PDD"):
+            demand = self.hour.demand[name]
+            self.note("demand that depends on pressure: taken as delivered at this hour", name)
+        return words.junction(self.elevation[name], demand, self.position(node))
+
+    def reservoir(self, name: str, node: Any) -> words.Part:
+        return words.reservoir(node.head_timeseries.at(self.clock), self.position(node))
+
+    def tank(self, name: str, node: Any) -> words.Part:
+        level = node.init_level if self.hour.seconds == 0.0 else self.hour.head[name] - node.elevation
+        area = math.pi / 4.0 * node.diameter**2
+        if node.vol_curve is not None:
+            area = curve_slope(node.vol_curve.points, level)
+            self.note("volume curve: taken as the area at its level", name)
+        return words.tank(self.elevation[name], area, round(level, 6), node.max_level, self.position(node))
+
+    # links ------------------------------------------------------------------------------------------------
+
+    def ends(self, link: Any) -> tuple[str, str]:
+        return tuple(self.node_names.given[end] for end in (link.start_node_name, link.end_node_name))
+
+    def between(self, name: str, link: Any) -> str:
+        """A new junction without demand next to the end of a pipe."""
+        end = self.network.get_node(link.end_node_name)
+        start = link.start_node_name if link.end_node_name not in self.elevation else link.end_node_name
+        place = self.node_names.new(f"{self.link_names.given[name]}-end")
+        self.nodes[place] = words.junction(self.elevation.get(start, 0.0), 0.0, self.position(end))
+        return place
+
+    def shut(self, name: str) -> bool:
+        return int(self.hour.status[name]) in SHUT
+
+    def pipe(self, name: str, link: Any) -> words.Part:
+        start, end = self.ends(link)
+        if link.check_valve or self.shut(name):
+            place = self.between(name, link)
+            ours = self.link_names.new(f"{self.link_names.given[name]}-{'check' if link.check_valve else 'shut'}")
+            last = (place, end)
+            self.links[ours] = (
+                words.check_valve(last, link.diameter)
+                if link.check_valve
+                else words.valve(last, link.diameter, 0.0, opening=0.0)
+            )
+            what = "check valve" if link.check_valve else "shut at this hour"
+            self.note(f"{what}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name)
+            end = place
+        law = words.friction(self.formula, link.roughness)
+        length = max(link.length, self.shortest)
+        if length > link.length:
+            law = self.spread(name, link, length)
+            self.note(f"{self.shortest:.4g} m long here, with the loss of its own length", name)
+        return words.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
+
+    def spread(self, name: str, link: Any, length: float) -> words.Part:
+        """Friction of a pipe made longer that takes what the pipe took."""
+        ratio = link.length / length
+        if self.formula == "H-W":
+            return words.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
+        if self.formula == "C-M":
+            return words.friction("C-M", link.roughness * math.sqrt(ratio))
+        return words.darcy(ratio * self.hour.factor[name])
+
+    def pump(self, name: str, link: Any) -> words.Part:
+        if int(self.hour.status[name]) == SWITCHED_OFF:
+            self.note("pump is off at this hour: a shut valve", name)
+            return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
+        if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALLED:
+            self.note("pump of constant power stands at no flow in EPANET, which no power allows: a shut valve", name)
+            return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
+        law = words.power(link.power) if link.pump_type == "POWER" else words.curve(link.get_pump_curve().points)
+        return words.pump(self.ends(link), law, float(self.hour.setting[name]))
+
+    def valve(self, name: str, link: Any) -> words.Part:
+        ends, kind, status = self.ends(link), link.valve_type, int(self.hour.status[name])
+        diameter = self.size(link)
+        if kind in words.REGULATING and link.initial_status == REGULATES:
+            self.note(f"{kind}: EPANET knows no time constant, here {words.TIME_CONSTANT}", name)
+            return words.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
+        if status in SHUT:
+            self.note(f"{kind} is shut at this hour: a shut valve", name)
+            return words.valve(ends, diameter, 0.0, opening=0.0)
+        flow = self.hour.flow[name]
+        drop = abs(self.hour.head[link.start_node_name] - self.hour.head[link.end_node_name])
+        if kind == "TCV" and status == ACTIVE:
+            return words.valve(ends, diameter, self.hour.setting[name])
+        if kind in ("PBV", "GPV") and flow and drop:
+            self.note(f"{kind}: a valve that stays as it stands at this hour", name)
+            return words.valve(ends, diameter, words.loss_of(drop, flow, diameter))
+        return words.valve(ends, diameter, link.minor_loss)
+
+    def bore(self, link: Any, otherwise: float = 0.1) -> float:
+        """Diameter of the widest pipe next to a link [m]."""
+        ends = (link.start_node_name, link.end_node_name)
+        near = [self.network.get_link(other) for end in ends for other in self.network.get_links_for_node(end)]
+        return max((pipe.diameter for pipe in near if pipe.link_type == "Pipe"), default=otherwise)
+
+    def size(self, link: Any) -> float:
+        """Diameter of a valve [m]; where it has no loss that could mean it, no more than a pipe next to it has."""
+        widest = self.bore(link, link.diameter)
+        if link.minor_loss or link.valve_type in ("TCV", "GPV") or widest >= link.diameter:
+            return link.diameter
+        self.note("valve wider than every pipe next to it: as wide as the widest", link.name)
+        return widest
+
+    def setting(self, name: str, link: Any) -> float:
+        """What a valve holds: a head above its end [m] or a flow [m3/s]; a moved elevation moves it along."""
+        held = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
+        if link.valve_type == "FCV" or held not in self.elevation:
+            return self.hour.setting[name]
+        return self.hour.setting[name] + self.network.get_node(held).elevation - self.elevation[held]
+
+    def emitters(self) -> None:
+        """Emitters as leaks. WNTR turns coefficients per psi into ones per metre as if every exponent were a half."""
+        hydraulic = self.network.options.hydraulic
+        exponent = hydraulic.emitter_exponent
+        unit = PSI_OF_METRE ** (exponent - 0.5) if hydraulic.inpfile_units in US_UNITS else 1.0
+        for name, node in self.network.junctions():
+            if node.emitter_coefficient:
+                place = self.node_names.given[name]
+                leak = words.leak(place, unit * node.emitter_coefficient, exponent)
+                self.links[self.link_names.new(f"{place}-emitter")] = leak
+
+    def options(self, hydraulic: Any) -> None:
+        if self.formula == "D-W":
+            self.note("Darcy factor by Colebrook, EPANET's by Swamee and Jain: within 3 % of each other", "D-W")
+
+
+def curve_slope(points: list[tuple[float, float]], at: float) -> float:
+    """Slope of a curve that is linear between its points, at one place or next to it."""
+    for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
+        if at < x1 or (x1, y1) == tuple(points[-1]):
+            return (y1 - y0) / (x1 - x0)
+    raise ValueError("a curve wants two points at least")

@@ -1,0 +1,128 @@
+"""The words of a case for what EPANET knows, all in this one place. Knows numbers and units; knows no network."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+Part = dict[str, Any]
+
+NO_LOSS = 0.01  # loss coefficient of an open valve that EPANET gives none: a case wants one that is positive
+TIME_CONSTANT = "5 s"  # of valves that regulate: EPANET knows none
+REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
+DENSITY = 999.563  # EPANET's weight of water, 550 ft lbf/s / 8.814 per hp, over gravity [kg/m3]
+GRAVITY = 9.80665
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number of ten digits and its unit: `304.8 mm`."""
+    factor = {"m": 1.0, "mm": 1e3, "l/s": 1e3, "m/s": 1.0, "m2": 1.0}[unit]
+    return f"{value * factor:.10g} {unit}".replace("-0 ", "0 ")
+
+
+def number(value: float) -> float | int:
+    """A number of ten digits, whole where it is."""
+    short = float(f"{value:.10g}")
+    return int(short) if short.is_integer() else short
+
+
+def junction(elevation: float, demand: float, position: Any) -> Part:
+    """A place with a demand [m3/s]."""
+    part = {"type": "junction", "elevation": quantity(elevation, "m")}
+    if demand:
+        part["demand"] = quantity(demand, "l/s")
+    return part | _position(position)
+
+
+def reservoir(head: float, position: Any) -> Part:
+    """A place of given head [m]."""
+    return {"type": "reservoir", "head": quantity(head, "m")} | _position(position)
+
+
+def tank(elevation: float, area: float, level: float, height: float, position: Any) -> Part:
+    """A vessel by its area [m2], its level and greatest level above its bottom [m]."""
+    part = {"type": "tank", "elevation": quantity(elevation, "m"), "area": quantity(area, "m2")}
+    part |= {"level": quantity(level, "m"), "height": quantity(height, "m")}
+    return part | _position(position)
+
+
+def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, minor: float, speed: float) -> Part:
+    """A pipe by its length [m], diameter [m], minor loss and wave speed [m/s]."""
+    part = _link("pipe", ends) | {"length": quantity(length, "m"), "diameter": quantity(diameter, "mm")}
+    part |= {"friction": friction}
+    if minor:
+        part["minor_loss"] = number(minor)
+    return part | {"wave_speed": quantity(speed, "m/s")}
+
+
+def friction(formula: str, roughness: float) -> Part:
+    """Friction by EPANET's formula; roughness: C [-], height [m], or n [s/m^(1/3)]."""
+    if formula == "H-W":
+        return {"model": "hazen-williams", "coefficient": number(roughness)}
+    if formula == "C-M":
+        return {"model": "chezy-manning", "coefficient": number(roughness)}
+    return {"model": "quasi-steady", "roughness": quantity(roughness, "mm")}
+
+
+def darcy(factor: float) -> Part:
+    """Friction by Darcy's factor."""
+    return {"model": "steady", "factor": number(factor)}
+
+
+def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 1.0) -> Part:
+    """A valve by its loss coefficient on the velocity in its diameter."""
+    part = _link("valve", ends) | {"diameter": quantity(diameter, "mm")}
+    part["loss_coefficient"] = number(loss or NO_LOSS)
+    return part if opening == 1.0 else part | {"opening": opening}
+
+
+def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
+    """A pump by its law at full speed; none of EPANET's lets flow back."""
+    return _link("pump", ends) | law | {"speed": number(speed), "check_valve": True}
+
+
+def curve(points: list[tuple[float, float]]) -> Part:
+    """A pump's law by points of flow [m3/s] and head [m]; case and EPANET read one, three and more alike."""
+    flow, head = zip(*points, strict=True)
+    return {"curve": {"flow": [quantity(q, "l/s") for q in flow], "head": [quantity(h, "m") for h in head]}}
+
+
+def power(watts: float) -> Part:
+    """A pump's law by a constant power [W]."""
+    return {"power": f"{watts * 1e-3:.10g} kW"}
+
+
+def check_valve(ends: tuple[str, str], diameter: float) -> Part:
+    """What lets nothing back."""
+    return _link("check-valve", ends) | {"diameter": quantity(diameter, "mm"), "loss_coefficient": NO_LOSS}
+
+
+def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:
+    """A valve that holds a head of water above its end ("PRV", "PSV") [m] or a flow ("FCV") [m3/s]."""
+    part = _link(REGULATING[kind], ends)
+    if kind == "FCV":
+        part["set_flow"] = quantity(setting, "l/s")
+    else:
+        part["set_pressure"] = f"{DENSITY * GRAVITY * setting * 1e-5:.10g} barg"
+    part |= {"time_constant": TIME_CONSTANT, "diameter": quantity(diameter, "mm")}
+    return part | {"loss_coefficient": number(loss or NO_LOSS)}
+
+
+def leak(place: str, coefficient: float, exponent: float) -> Part:
+    """An emitter, flow [m3/s] = coefficient times a head of water [m] to the exponent; a case counts in Pa."""
+    per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
+    return {"type": "leak", "from": place, "coefficient": number(per_pascal), "exponent": number(exponent)}
+
+
+def loss_of(drop: float, flow: float, diameter: float) -> float:
+    """Loss coefficient on the velocity in a diameter that takes a head [m] at a flow [m3/s]."""
+    velocity = flow / (math.pi / 4.0 * diameter**2)
+    return 2.0 * GRAVITY * drop / velocity**2
+
+
+def _link(kind: str, ends: tuple[str, str]) -> Part:
+    return {"type": kind, "from": ends[0], "to": ends[1]}
+
+
+def _position(position: Any) -> Part:
+    return {} if position is None else {"position": [number(x) for x in position]}

@@ -1,0 +1,131 @@
+"""One rigid column between given pressures, a valve in series or none. Knows quadratic losses alone.
+
+(L / A) dM/dt = D - K |M| M with constant D and K: tanh, coth, tan or a straight line in time, piece by piece between
+the jumps of the opening.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.exact.schedule import constant_from, value
+from fvsolve.exact.solution import Solution, Start, only_one, reservoirs
+
+NODES, LINKS = ("reservoir", "junction"), ("rigid-column", "valve", "orifice")
+
+
+def misfits(case):
+    """What makes a case none of one column between constant pressures."""
+    name, columns, valves = case.exact.name, *parts(case)
+    yield from only_one(case, columns, "rigid-column")
+    yield from only_one(case, valves, "valve") if len(valves) > 1 else ()
+    for node, part in case.nodes.items():
+        given = part.demand if part.kind == "junction" else part.pressure or part.head
+        if not constant_from(given, -math.inf) or (part.kind == "junction" and given.first != 0.0):
+            yield ("nodes", node), f'the exact solution "{name}" wants constant pressures and no demand'
+    held = {node for node, part in case.nodes.items() if part.kind == "reservoir"}
+    held |= {end for _, part in valves if {part.from_, part.to} & held for end in (part.from_, part.to)}
+    for link, part in columns:
+        for end in {part.from_, part.to} - held:
+            yield ("links", link), f'the exact solution "{name}" wants a reservoir at {end}, or a valve to one'
+        if {part.from_, part.to}.isdisjoint(node for node, one in case.nodes.items() if one.kind == "reservoir"):
+            yield ("links", link), f'the exact solution "{name}" wants a reservoir at one end at least'
+        if part.friction.model not in ("none", "steady", "quasi-steady") or part.friction.roughness is not None:
+            yield ("links", link, "friction"), f'the exact solution "{name}" knows a Darcy factor alone'
+    joined = {end for _, part in columns for end in (part.from_, part.to)}
+    for link, part in valves:
+        if len(joined & {part.from_, part.to}) != 1:
+            yield ("links", link), f'the exact solution "{name}" wants the valve in series with the column'
+        if part.opening.kind not in ("constant", "step") or min(part.opening.value) <= 0.0:
+            message = f'the exact solution "{name}" wants an opening that is constant or jumps, and never shuts'
+            yield ("links", link, "opening"), message
+        if part.characteristic != "linear":
+            yield ("links", link, "characteristic"), f'the exact solution "{name}" knows "linear" alone'
+        if part.laminar_reynolds is not None:
+            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" knows the turbulent law alone'
+
+
+def parts(case) -> tuple[list, list]:
+    """(columns, valves) by name and part."""
+    columns = [one for one in case.links.items() if one[1].kind == "rigid-column"]
+    return columns, [one for one in case.links.items() if one[1].kind in ("valve", "orifice")]
+
+
+def solution(case, start: Start) -> Solution:
+    """Flow and node pressures of a case that `misfits` finds nothing in."""
+    [(name, column)], valves = parts(case)
+    rho, t0 = case.properties.density, case.numerics.start
+    area = 0.25 * math.pi * column.diameter**2
+    potential = {node: law(t0) + rho * case.gravity * case.elevation(node) for node, law in reservoirs(case).items()}
+    wall = ((column.friction.factor or 0.0) * column.length / column.diameter + column.minor_loss) / (2 * rho * area**2)
+    valve = valves[0][1] if valves else None
+    ends = [column.from_, column.to]
+    drive = sum(sign * potential[far(case, end, valve)] for sign, end in zip((1.0, -1.0), ends, strict=True))
+
+    def resistance(t):
+        if valve is None:
+            return 0.0
+        return 1.0 / (2.0 * rho * (valve.flow_area() * float(value(valve.opening, t))) ** 2)
+
+    jumps = [] if valve is None else [float(t) for t in valve.opening.time if t > t0]
+    pieces, m = [], start.flow[name] * rho
+    for begin, end in zip([t0, *jumps], [*jumps, math.inf], strict=True):
+        pieces.append((begin, m, wall + resistance(begin), resistance(begin)))
+        m = float(rise(m, drive, pieces[-1][2], area / column.length, np.array(min(end, 1e300) - begin)))
+
+    def mass_flow(t):
+        return _by_piece(pieces, t, lambda s, piece: rise(piece[1], drive, piece[2], area / column.length, s))
+
+    def valve_drop(t):  # along the column's direction
+        m = mass_flow(t)
+        return _by_piece(pieces, t, lambda s, piece: np.full(s.shape, piece[3])) * m * np.abs(m)
+
+    made = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
+    if valve is not None:
+        made.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * orientation(column, valve)
+        node = valve.from_ if valve.from_ in ends else valve.to
+        sign = 1.0 if node == column.to else -1.0
+        base = potential[far(case, node, valve)] - rho * case.gravity * case.elevation(node)
+        made.pressure[node] = lambda t: base + sign * valve_drop(t)
+    return made
+
+
+def far(case, end: str, valve) -> str:
+    """The reservoir at an end of the column, or behind the valve there."""
+    if case.nodes[end].kind == "reservoir":
+        return end
+    return valve.to if valve.from_ == end else valve.from_
+
+
+def orientation(column, valve) -> float:
+    """1 where the valve counts its flow as the column does."""
+    return 1.0 if valve.from_ == column.to or valve.to == column.from_ else -1.0
+
+
+def _by_piece(pieces, t, law):
+    t = np.asarray(t, dtype=float)
+    found = np.empty(t.shape)
+    which = np.clip(np.searchsorted([piece[0] for piece in pieces], t, side="right") - 1, 0, None)
+    for k, piece in enumerate(pieces):
+        found[which == k] = law(t[which == k] - piece[0], piece)
+    return found
+
+
+def rise(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarray:
+    """M(t) of M' = a (drive - k |M| M), M(0) = m."""
+    if drive < 0.0 or (drive == 0.0 and m < 0.0):
+        return -rise(-m, -drive, k, a, t)
+    if k == 0.0:
+        return m + a * drive * t
+    if drive == 0.0:
+        return m / (1.0 + a * k * m * t)
+    end, rate = math.sqrt(drive / k), a * math.sqrt(drive * k)
+    if m < 0.0:  # it turns at a finite time
+        turn = math.atan(-m / end) / rate
+        back = end * np.tan(rate * (np.minimum(t, turn) - turn))
+        return np.where(t < turn, back, end * np.tanh(rate * np.maximum(t - turn, 0.0)))
+    if m < end:
+        return end * np.tanh(rate * t + math.atanh(m / end))
+    return np.full(t.shape, end) if m == end else end / np.tanh(rate * t + math.atanh(end / m))

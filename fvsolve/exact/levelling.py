@@ -1,0 +1,90 @@
+"""Tanks and chambers on one orifice. Knows the turbulent law alone: what drives the flow is a parabola in time.
+
+A drop d that drives q = Cd A sqrt(2 d / rho) and falls by k q has a square root that is linear in time, so it ends at
+the finite time 2 sqrt(d0) / s, s = k Cd A sqrt(2 / rho) (Torricelli 1644). A laminar transition near zero is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.exact.schedule import constant_from, value
+from fvsolve.exact.solution import Solution, Start, levels_hold, only_one, reservoirs
+
+NODES, LINKS = ("reservoir", "tank", "chamber"), ("valve", "orifice")
+
+
+def misfits(case):
+    """What makes a case none of this solution, from its start to its end."""
+    found = list(_misfits(case))
+    yield from found
+    if not found:
+        yield from levels_hold(solution(case, Start({}, {})))
+
+
+def _misfits(case):
+    """What makes a case none of a drop across one orifice."""
+    yield from only_one(case, list(case.links), "orifice or valve")
+    name, start = case.exact.name, case.numerics.start
+    for node, part in case.nodes.items():
+        if part.kind == "tank" and hasattr(part.area, "area"):
+            yield ("nodes", node, "area"), f'the exact solution "{name}" wants one area'
+        if getattr(part, "connection", None) is not None:
+            yield ("nodes", node, "connection"), f'the exact solution "{name}" knows no connection'
+        if part.kind == "chamber" and part.initial_pressure is None:
+            yield ("nodes", node), f'the exact solution "{name}" wants an initial_pressure'
+        if part.kind == "reservoir" and not constant_from(part.pressure or part.head, start):
+            yield ("nodes", node), f'the exact solution "{name}" wants a constant pressure or head'
+    for link, part in case.links.items():
+        if not constant_from(part.opening, start):
+            yield ("links", link, "opening"), f'the exact solution "{name}" wants a constant opening'
+        if part.characteristic != "linear":
+            yield ("links", link, "characteristic"), f'the exact solution "{name}" knows "linear" alone'
+        if part.laminar_reynolds is not None:
+            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" knows the turbulent law alone'
+
+
+def solution(case, start: Start) -> Solution:
+    """Pressures, levels and the flow of a case that `misfits` finds nothing in."""
+    (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
+    ends, weight = (part.from_, part.to), rho * case.gravity
+    area = part.flow_area() * float(value(part.opening, t0))
+    pressures = [first_pressure(case, node) for node in ends]
+    softness = [stiffness(case, node) for node in ends]  # pressure per volume that flows in
+    drop = sum(s * (p + weight * case.elevation(n)) for s, p, n in zip((1, -1), pressures, ends, strict=True))
+    slope = sum(softness) * area * np.sqrt(2.0 / rho)
+
+    def left(t):
+        return np.maximum(np.sqrt(abs(drop)) - 0.5 * slope * (np.asarray(t, dtype=float) - t0), 0.0)
+
+    def flow(t):
+        return np.sign(drop) * area * np.sqrt(2.0 / rho) * left(t)
+
+    def moved(t):  # volume that has left `from`
+        return np.sign(drop) * (abs(drop) - left(t) ** 2) / sum(softness) if sum(softness) else 0.0 * left(t)
+
+    made = Solution(case, flow={link: flow})
+    for k, (sign, node) in enumerate(zip((-1.0, 1.0), ends, strict=True)):
+        made.pressure[node] = lambda t, k=k, sign=sign: pressures[k] + sign * softness[k] * moved(t)
+        if case.nodes[node].kind == "tank":
+            tank = case.nodes[node]
+            made.level[node] = lambda t, tank=tank, sign=sign: tank.level + sign * moved(t) / tank.area
+    return made
+
+
+def first_pressure(case, node: str) -> float:
+    """Pressure of a node as the case states it [Pa]."""
+    part = case.nodes[node]
+    if part.kind == "tank":
+        return case.ambient_pressure + case.properties.density * case.gravity * part.level
+    if part.kind == "chamber":
+        return part.initial_pressure
+    return float(reservoirs(case)[node](np.float64(case.numerics.start)))
+
+
+def stiffness(case, node: str) -> float:
+    """Pressure per volume that flows in [Pa/m3]."""
+    part = case.nodes[node]
+    if part.kind == "tank":
+        return case.properties.density * case.gravity / part.area
+    return case.properties.bulk_modulus / part.volume if part.kind == "chamber" else 0.0

@@ -1,0 +1,74 @@
+"""Open tanks joined by a frictionless rigid column: a harmonic oscillation. Knows constant areas alone.
+
+D = P_from - P_to, M' = (A / L) D, D' = -g (1 / A_from + 1 / A_to) M; a reservoir counts as an area without end.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.exact.levelling import first_pressure
+from fvsolve.exact.schedule import constant_from
+from fvsolve.exact.solution import Solution, Start, levels_hold, only_one
+
+NODES, LINKS = ("reservoir", "tank"), ("rigid-column",)
+
+
+def misfits(case):
+    """What makes a case none of this solution, from its start to its end."""
+    found = list(_misfits(case))
+    yield from found
+    if not found:
+        yield from levels_hold(
+            solution(case, Start({}, {name: link.initial_flow or 0.0 for name, link in case.links.items()}))
+        )
+
+
+def _misfits(case):
+    """What makes a case none of one frictionless column between open tanks."""
+    yield from only_one(case, list(case.links), "rigid-column")
+    name = case.exact.name
+    for node, part in case.nodes.items():
+        if part.kind == "tank" and hasattr(part.area, "area"):
+            yield ("nodes", node, "area"), f'the exact solution "{name}" wants one area'
+        if getattr(part, "connection", None) is not None:
+            yield ("nodes", node, "connection"), f'the exact solution "{name}" knows no connection'
+        if part.kind == "reservoir" and not constant_from(part.pressure or part.head, -math.inf):
+            yield ("nodes", node), f'the exact solution "{name}" wants a constant pressure or head'
+    if not any(node.kind == "tank" for node in case.nodes.values()):
+        yield ("nodes",), f'the exact solution "{name}" wants a tank'
+    for link, part in case.links.items():
+        if part.friction.model != "none" or part.minor_loss != 0.0:
+            yield ("links", link, "friction"), f'the exact solution "{name}" holds without friction and losses'
+
+
+def solution(case, start: Start) -> Solution:
+    """Levels, pressures and the flow of a case that `misfits` finds nothing in."""
+    name, column = next(iter(case.links.items()))
+    rho, g, t0 = case.properties.density, case.gravity, case.numerics.start
+    slope = 0.25 * math.pi * column.diameter**2 / column.length
+    ends = (column.from_, column.to)
+    soft = [1.0 / case.nodes[n].area if case.nodes[n].kind == "tank" else 0.0 for n in ends]
+    omega = math.sqrt(slope * g * sum(soft))
+    first = [first_pressure(case, node) for node in ends]
+    drop = first[0] - first[1] + rho * g * (case.elevation(ends[0]) - case.elevation(ends[1]))
+    m0 = start.flow[name] * rho
+
+    def mass_flow(t):
+        s = omega * (np.asarray(t, dtype=float) - t0)
+        return m0 * np.cos(s) + slope * drop / omega * np.sin(s)
+
+    def moved(t):  # mass that has left `from`
+        s = omega * (np.asarray(t, dtype=float) - t0)
+        return (m0 * np.sin(s) + slope * drop / omega * (1.0 - np.cos(s))) / omega
+
+    made = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
+    for k, (sign, node) in enumerate(zip((-1.0, 1.0), ends, strict=True)):
+        made.pressure[node] = lambda t, k=k, sign=sign: first[k] + sign * g * soft[k] * moved(t)
+        if case.nodes[node].kind == "tank":
+            made.level[node] = lambda t, k=k, sign=sign, node=node: (
+                case.nodes[node].level + sign * soft[k] * moved(t) / rho
+            )
+    return made

@@ -1,0 +1,38 @@
+"""Values of schedules, written apart from the kernels so that both can be wrong only on their own. Knows no part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
+    """Values of a schedule at times t : float64[...] [SI], from the right at jumps, or from the left."""
+    t = np.asarray(t, dtype=float)
+    times, values = schedule.time, schedule.value
+    if schedule.kind == "constant":
+        return np.full(t.shape, values[0])
+    if schedule.kind == "step":
+        side = "left" if left else "right"
+        return values[np.clip(np.searchsorted(times, t, side=side) - 1, 0, len(times) - 1)]
+    inside = np.clip(t, times[0], times[-1])
+    if schedule.kind == "ramp":
+        s = (inside - times[0]) / (times[1] - times[0])
+        return values[1] + (values[0] - values[1]) * (1.0 - s) ** schedule.exponent
+    if schedule.kind == "linear":
+        return np.interp(inside, times, values)
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(times, values)(inside)
+
+
+def kinks(schedule) -> list[float]:
+    """Times at which a schedule, or its slope, jumps; points of a smooth one are none but its ends."""
+    if schedule.kind == "constant":
+        return []
+    return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
+
+
+def constant_from(schedule, t: float) -> bool:
+    """Whether a schedule holds one value from time t on."""
+    later = schedule.time > t
+    return schedule.constant or not np.any(later) or bool(np.all(schedule.value[later] == value(schedule, t)))

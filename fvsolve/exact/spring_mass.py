@@ -1,0 +1,67 @@
+"""One mass on linear springs and dampers between frames, under constant force. Knows no fluid.
+
+m u'' = F - k u - c u' with u the travel from the start and F the force there without damping.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+
+from fvsolve.exact.schedule import constant_from
+from fvsolve.exact.solution import Solution, Start, only_one
+
+NODES, LINKS = ("mass", "frame", "reservoir"), ("spring", "damper", "force")
+
+
+def misfits(case):
+    """What makes a case none of one mass on springs."""
+    yield from only_one(case, [node for node in case.nodes.values() if node.kind == "mass"], "mass")
+    if not any(link.kind == "spring" for link in case.links.values()):
+        yield ("links",), f'the exact solution "{case.exact.name}" wants a spring'
+    for name, link in case.links.items():
+        if not any(end is not None and case.nodes[end].kind == "mass" for end in (link.from_, link.to)):
+            yield ("links", name), f'the exact solution "{case.exact.name}" wants every link at the mass'
+        if link.kind == "force" and not constant_from(link.force, -math.inf):
+            yield ("links", name, "force"), f'the exact solution "{case.exact.name}" wants a constant force'
+
+
+def solution(case, start: Start) -> Solution:
+    """Position and velocity of the mass of a case that `misfits` finds nothing in."""
+    name, mass = next(one for one in case.nodes.items() if one[1].kind == "mass")
+    at = {body: part.initial_position for body, part in case.nodes.items() if part.domain == "translational"}
+    stiffness = damping = force = 0.0
+    for link in case.links.values():
+        sign = 1.0 if link.to == name else -1.0
+        if link.kind == "spring":
+            stiffness += link.stiffness
+            length = at[link.to] - at[link.from_]
+            push = link.preload if link.preload is not None else -link.stiffness * (length - link.free_length)
+            force += sign * push
+        elif link.kind == "damper":
+            damping += link.damping
+        else:
+            force += sign * link.force.first
+    decay, v0, t0 = damping / (2.0 * mass.mass), mass.initial_velocity, case.numerics.start
+    kappa = cmath.sqrt(decay**2 - stiffness / mass.mass)
+    end = force / stiffness
+
+    def parts(t):
+        """(exp(-decay t) cosh(kappa t), exp(-decay t) sinh(kappa t) / kappa) after the start."""
+        s = np.asarray(t, dtype=float) - t0
+        if abs(kappa) < 1e-12 * math.sqrt(stiffness / mass.mass):
+            return np.exp(-decay * s), np.exp(-decay * s) * s
+        up, down = np.exp((kappa - decay) * s), np.exp(-(kappa + decay) * s)
+        return (0.5 * (up + down)).real, (0.5 * (up - down) / kappa).real
+
+    def position(t):
+        c, s = parts(t)
+        return mass.initial_position + end * (1.0 - c - decay * s) + v0 * s
+
+    def velocity(t):
+        c, s = parts(t)
+        return v0 * (c - decay * s) + (force / mass.mass) * s
+
+    return Solution(case, position={name: position}, velocity={name: velocity})

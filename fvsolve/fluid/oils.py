@@ -1,0 +1,84 @@
+"""Mineral hydraulic oils by ISO viscosity grade, as printed; their sources are in docs/fluids.md. Knows no CoolProp.
+
+Viscosity: Walther's line (ASTM D341) through 40 and 100 degC. Density: ASTM D1250 for lubricating oils from 15 degC.
+Compressibility: Tait's equation of an HLP 32 for all grades, made isentropic by 1/K_s = 1/K_T - T a^2 / (rho cp).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from fvsolve.errors import FluidError
+
+ZERO, ATMOSPHERE = 273.15, 1.01325  # [K], [bar]
+COLDEST, HOTTEST, HIGHEST = 273.15, 373.15, 1e8  # what the sources span [K], [Pa]
+
+
+@dataclass(frozen=True)
+class Oil:
+    """kinematic viscosity at 40 and 100 degC [mm2/s], density at 15 degC and 1 atm [kg/m3]."""
+
+    viscosity_40: float
+    viscosity_100: float
+    density_15: float
+
+
+OILS = {  # ISO 3448 mid-point, viscosity index 100 by ASTM D2270, typical density of a data sheet
+    "ISO VG 32": Oil(32.0, 5.36, 871.0),
+    "ISO VG 46": Oil(46.0, 6.76, 876.0),
+    "ISO VG 68": Oil(68.0, 8.73, 881.0),
+}
+EXPANSION = 0.6278  # K1 of lubricating oils, ASTM D1250-80: thermal expansion at 15 degC is K1 / density [kg/m3/K]
+TAIT = (
+    0.0732965,
+    1965.02,
+    -2.96813,
+)  # C, b0 [bar], b1 [bar/K]: rho = rho(1 bar) / (1 - C ln((b + p) / b)), b = b0 + b1 T
+HEAT = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
+
+
+def oil_name(name: str) -> str | None:
+    """The grade that a name means, `ISO VG 46` for "ISO-VG46", "VG 46", "HLP 46" or "HM 46"; None for no oil."""
+    found = re.fullmatch(r"(?:ISO[\s-]*VG|VG|HLP|HM)[\s-]*(\d+)", name.strip(), re.IGNORECASE)
+    if found is None:
+        return None
+    grade = f"ISO VG {found[1]}"
+    if grade not in OILS:
+        raise FluidError(
+            "name", f'"{name}" is no oil that is known; oils are {", ".join(OILS)}, or give a "user" fluid'
+        )
+    return grade
+
+
+def ask_oil(name: str, temperature: float, pressure: float) -> dict[str, Any]:
+    """The keys of Fluid for an oil at temperature [K] and pressure [Pa]; raises FluidError outside its range."""
+    if not COLDEST <= temperature <= HOTTEST:
+        given = f"{temperature - ZERO:.6g} degC"
+        raise FluidError("temperature", f"{given} is outside the range of {name}, 0 degC to 100 degC")
+    if pressure > HIGHEST:
+        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {HIGHEST:g} Pa")
+    oil, p = OILS[name], pressure / 1e5
+    expansion, rho = density_1atm(oil, temperature)
+    c, b = TAIT[0], TAIT[1] + TAIT[2] * temperature
+    rho /= 1.0 - c * math.log((b + p) / (b + ATMOSPHERE))
+    isothermal = 1e5 * (b + p) / c * (1.0 - c * math.log((b + p) / b))
+    cp = HEAT[0] + (HEAT[1] - HEAT[0]) * (temperature - ZERO - 25.0) / 55.0
+    isentropic = 1.0 / (1.0 / isothermal - temperature * expansion**2 / (rho * cp))
+    found = dict(density=rho, bulk_modulus=isentropic, viscosity=rho * walther(oil, temperature))
+    return found | dict(vapor_pressure=0.0, table=None, source="docs/fluids.md, oils")
+
+
+def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:
+    """(thermal expansion [1/K], density [kg/m3]) at 1 atm, rho = rho_15 exp(-a dt (1 + 0.8 a dt)), ASTM D1250."""
+    a, dt = EXPANSION / oil.density_15, temperature - ZERO - 15.0
+    return a * (1.0 + 1.6 * a * dt), oil.density_15 * math.exp(-a * dt * (1.0 + 0.8 * a * dt))
+
+
+def walther(oil: Oil, temperature: float) -> float:
+    """Kinematic viscosity [m2/s] at 1 atm: lg lg (nu + 0.7) is linear in lg T, nu in mm2/s, ASTM D341."""
+    cold, hot = (math.log10(math.log10(nu + 0.7)) for nu in (oil.viscosity_40, oil.viscosity_100))
+    share = math.log(temperature / (ZERO + 40.0)) / math.log((ZERO + 100.0) / (ZERO + 40.0))
+    return 1e-6 * (10.0**10.0 ** (cold + share * (hot - cold)) - 0.7)

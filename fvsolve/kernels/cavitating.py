@@ -1,0 +1,224 @@
+"""The right-hand side under the density law mixture in pipes, where cavities open and close. Knows the tables.
+
+m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, F the integral of A dp. Pressure and velocity are
+reconstructed from both sides of a face, the flux is that of the Riemann problem there (`riemann.py`), less the
+profile's; so a front moves at its own speed, be it sound's in the liquid or a cavity's edge a thousand times slower.
+"""
+
+from math import exp
+
+from fvsolve.jit import njit
+from fvsolve.kernels.barotropic import column_rates_barotropic, wall_force
+from fvsolve.kernels.barotropic_nodes import hold_columns_barotropic, stored_pressures_barotropic
+from fvsolve.kernels.cavitating_nodes import balance_junctions, close_nodes_cavitating
+from fvsolve.kernels.columns import column_inflows
+from fvsolve.kernels.density import local_speed, log_density, pressure_of_mass, thrust
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mixture import mixture_volume
+from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.reconstruction import value_muscl
+from fvsolve.kernels.records import (
+    CHAMBER,
+    I_FLOATS,
+    I_LAYOUT,
+    I_MARKS,
+    I_NODES,
+    I_PIPES,
+    I_PROFILE,
+    I_SCRATCH,
+    I_SETTINGS,
+    OK,
+    RATE,
+    STATUS,
+    UPWIND,
+    WHERE,
+)
+from fvsolve.kernels.restrictions import open_scheduled
+from fvsolve.kernels.riemann import face_flux
+
+DRY = 1e-8  # of a pipe's content at the reference: what a cell holds below it gets no velocity of its own
+
+
+@njit
+def cell_state(st, floats, profile, pipe, i, r, l):
+    """(pressure, velocity) of cell i, and (pressure, velocity) of its profile [Pa, m/s]."""
+    m0, flow = profile[pipe["center"] + i], pipe["flow"]
+    m, dry = m0 + (r[i] + l[i]) / pipe["speed"], DRY * st["rho"] * pipe["area"]
+    p0, v0 = pressure_of_mass(st, floats, pipe, m0), flow / m0
+    v = (flow + (r[i] - l[i])) / m
+    if m < dry:
+        v, m = (flow + (r[i] - l[i])) * max(m, 0.0) / (dry * dry), dry
+    return pressure_of_mass(st, floats, pipe, m), v, p0, v0
+
+
+@njit(forceinline=True)
+def continue_beyond(a, n):
+    """A value beyond each end of n, by the difference next but one: a limiter takes the lesser of the two."""
+    near, far = min(2, n), min(3, n)
+    a[0] = a[1] - (a[far] - a[near] if n > 2 else a[near] - a[1])
+    a[n + 1] = a[n] + (a[n + 1 - near] - a[n + 1 - far] if n > 2 else a[n] - a[n + 1 - near])
+
+
+@njit
+def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
+    """Pressure and velocity of cells from `first` on, as deviations from the profile too, and one beyond each end."""
+    n = p.size - 2
+    for i in range(n):
+        p[i + 1], v[i + 1], p0, v0 = cell_state(st, floats, profile, pipe, first + i, r, l)
+        dp[i + 1], dv[i + 1] = p[i + 1] - p0, v[i + 1] - v0
+    for a in (p, v, dp, dv):
+        continue_beyond(a, n)
+
+
+@njit(forceinline=True)
+def face_value(st, a, k, ahead):
+    """Value of the array at the face after cell k (ahead 1) or before it (-1)."""
+    if st["scheme"] == UPWIND:
+        return a[k]
+    return value_muscl(st["limiter"], a[k - ahead], a[k], a[k + ahead])
+
+
+@njit
+def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
+    """(pressure, velocity, whether they are the profile's) at face i from cell k - 1 beside it.
+
+    The profile carries the deviation, but not where it would lead the gas far from its pressure in the cell.
+    """
+    found, change = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
+    still = found == 0.0 and change == 0.0
+    m0 = profile[pipe["face"] + i]
+    q = pressure_of_mass(st, floats, pipe, m0) + found
+    if q - st["floor"] < 0.5 * (p[k] - st["floor"]):
+        q = max(face_value(st, p, k, ahead), st["floor"] + 0.5 * (p[k] - st["floor"]))
+    return q, pipe["flow"] / m0 + change, still
+
+
+@njit
+def end_states(st, floats, profile, pipe, r, l, ends, scratch):
+    """What the cells of a pipe say of both ends, pressure and velocity [Pa, m/s], into ends[4]."""
+    n = r.size
+    few = min(n, 3)
+    p, v, dp, dv = scratch[: few + 2], scratch[5 : few + 7], scratch[10 : few + 12], scratch[15 : few + 17]
+    for side in range(2):
+        fill_cells(st, floats, profile, pipe, (n - few) * side, r, l, p, v, dp, dv)
+        k, ahead = (few, 1) if side == 1 else (1, -1)
+        found = face_state(st, floats, profile, pipe, n * side, k, ahead, p, v, dp, dv)
+        ends[2 * side], ends[2 * side + 1] = found[0], found[1]
+
+
+@njit
+def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
+    """d/dt of both waves of one pipe; returns its greatest |v| + c over a cell [1/s]."""
+    n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
+    p, v = scratch[: n + 2], scratch[n + 2 : 2 * n + 4]
+    dp, dv = scratch[2 * n + 4 : 3 * n + 6], scratch[3 * n + 6 : 4 * n + 8]
+    fill_cells(st, floats, profile, pipe, 0, r, l, p, v, dp, dv)
+    reference, weight = st["rho"] * pipe["area"], st["gravity"] * pipe["slope"]
+    left_flow, left_flux, highest, quickest = 0.0, 0.0, p[1], 0.0
+    for i in range(n + 1):
+        if i == 0 or i == n:
+            dflow, flux = end_flux(st, floats, profile, pipe, i, ends[0 if i == 0 else 2], ends[1 if i == 0 else 3])
+        else:
+            p_l, v_l, still_l = face_state(st, floats, profile, pipe, i, i, 1, p, v, dp, dv)
+            p_r, v_r, still_r = face_state(st, floats, profile, pipe, i, i + 1, -1, p, v, dp, dv)
+            dflow, flux = 0.0, 0.0
+            if not (still_l and still_r):
+                total, flux = face_flux(st, floats, pipe, p_l, v_l, p_r, v_r)
+                dflow, flux = total - flow, flux - profile[pipe["flux"] + i]
+        if i > 0:
+            k = i - 1
+            m0 = profile[pipe["center"] + k]
+            dm = (r[k] + l[k]) / c
+            pull = wall_force(pipe, reference, max(m0 + dm, DRY * reference), flow + (r[k] - l[k]))
+            force = -weight * dm - (pull - pipe["drag"] * (reference / m0))
+            mass_rate, flow_rate = -(dflow - left_flow) / dx, -(flux - left_flux) / dx + force
+            dr[k], dl[k] = 0.5 * (c * mass_rate + flow_rate), 0.5 * (c * mass_rate - flow_rate)
+            highest, quickest = max(highest, p[i]), max(quickest, abs(v[i]))
+        left_flow, left_flux = dflow, flux
+    return (quickest + local_speed(st, floats, pipe, highest)) / dx * pipe["quicker"]
+
+
+@njit
+def end_flux(st, floats, profile, pipe, i, r, l):
+    """Deviations of mass flow and momentum flux at the end face i from the two waves there."""
+    if r == 0.0 and l == 0.0:
+        return 0.0, 0.0
+    m, total = profile[pipe["face"] + i] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
+    force = thrust(st, pipe, pressure_of_mass(st, floats, pipe, m))
+    return r - l, total * total / m + force - profile[pipe["flux"] + i]
+
+
+@njit
+def soften_chambers(out, tables):
+    """dp / dm of chambers at their pressures now [Pa/kg]: by it `greatest_rate` bounds the step."""
+    st, floats, nodes = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_NODES]
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == CHAMBER:
+            p = nodes[i]["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + i]
+            value, slope = log_density(st, floats, p)
+            nodes[i]["stiffness"] = 1.0 / (st["rho"] * exp(value) * slope * nodes[i]["volume"])
+
+
+@njit
+def rhs_cavitating(t, y, dydt, out, handle):
+    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch.
+
+    An empty dydt asks for `out` alone, without what the pipes add to its rate.
+    """
+    tables = open_tables(handle)
+    st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
+    floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
+    out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
+    for i in range(pipes.size):
+        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
+        end_states(st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch)
+    clear_net(out, tables)
+    stored_pressures_barotropic(t, y, out, tables)
+    soften_chambers(out, tables)
+    column_inflows(t, y, out, tables)
+    close_nodes_cavitating(t, y, out, tables)
+    hold_columns_barotropic(t, out, tables)
+    net_flows(out, tables)
+    balance_junctions(out, tables)
+    stored_rates(y, dydt, out, tables)
+    out[RATE] = rate = greatest_rate(t, out, tables)
+    if dydt.size == 0:
+        return
+    column_rates_barotropic(t, dydt, out, tables)
+    for i in range(pipes.size):
+        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
+        own = pipe_rates_cavitating(
+            st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch,
+            dydt[o : o + n], dydt[o + n : o + 2 * n],
+        )  # fmt: skip
+        rate = max(rate, own)
+    out[RATE] = rate
+
+
+@njit
+def note_cavity(t, pipe, r, l, at, tables):
+    """First place (share of the length), greatest volume [m3] and its time of cavities, into marks from `at`."""
+    st, floats, profile, marks = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_PROFILE], tables[I_MARKS]
+    volume, first = 0.0, -1
+    for i in range(r.size):
+        if r[i] + l[i] < profile[pipe["cell"] + i]:
+            first = i if first < 0 else first
+            m = profile[pipe["center"] + i] + (r[i] + l[i]) / pipe["speed"]
+            p = pressure_of_mass(st, floats, pipe, max(m, DRY * st["rho"] * pipe["area"]))
+            liquid = 1.0 - (p - st["reference"]) / st["beta"]
+            volume += pipe["area"] * pipe["dx"] * (1.0 - liquid / mixture_volume(st, p)[0])
+    if first >= 0:
+        if marks[at] != marks[at]:
+            marks[at], marks[at + 1] = (first + 0.5) / r.size, 0.0
+        if volume > marks[at + 1]:
+            marks[at + 1], marks[at + 2] = volume, t
+
+
+@njit
+def record_cavities(t, y, tables):
+    """Cavities of all pipes after an accepted step."""
+    pipes, at = tables[I_PIPES], tables[I_MARKS].size - 3 * tables[I_PIPES].size
+    for i in range(pipes.size):
+        n, o = pipes[i]["cells"], pipes[i]["y"]
+        note_cavity(t, pipes[i], y[o : o + n], y[o + n : o + 2 * n], at + 3 * i, tables)

@@ -1,0 +1,188 @@
+"""Nodes where a pipe end may hold a cavity: the law `mixture`. Knows ends and nodes; knows no cells.
+
+As in `barotropic_nodes.py`, but the wave from the cells to the end's own state is the jump of `riemann.py`, an end
+that lets go more than the speed of sound hears nothing of its node, and no pressure passes the law's floor.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.barotropic_nodes import (
+    begin_clusters,
+    finish_clusters,
+    given_flows,
+    node_space,
+    step_clusters,
+)
+from fvsolve.kernels.clusters import settled
+from fvsolve.kernels.density import pressure_of_mass
+from fvsolve.kernels.mixture import mixture_enthalpy, mixture_volume
+from fvsolve.kernels.records import (
+    I_CLUSTERS,
+    I_FLOATS,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PROFILE,
+    I_SCRATCH,
+    I_SETTINGS,
+    JUNCTION,
+)
+from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
+
+ROUNDING = 1e-12  # of a node's pressure: the least that its gas has
+LONG = 30  # sweeps after which Newton is helped along
+
+
+@njit
+def end_side(st, floats, pipe, inside, v_in, p_node, still):
+    """(side of an end, its velocity, slope of that over p_node): h(p) + v^2 / 2 = h(p_node), v towards the node.
+
+    An end that runs into its node at more than half the speed of sound, or into a vessel at rest, has the node's
+    pressure: its v^2 / 2 is lost.
+    """
+    floor, target, side = st["floor"], mixture_enthalpy(st, p_node), side_at(st, pipe, p_node)
+    change, rise = jump(st, floats, pipe, inside, side)
+    v = v_in - change
+    if (still and v >= 0.0) or 2.0 * v * side[1] > side[3]:
+        return side, v, -rise
+    slope, rho, low, high = 1.0, 1.0, floor, p_node
+    for _ in range(60):
+        p, rho = side[0], st["rho"] / mixture_volume(st, side[0])[0]
+        slope, over = 1.0 - v * rise * rho, mixture_enthalpy(st, p) + 0.5 * v * v - target
+        if over > 0.0 and not (v > 0.0 and slope < 0.5):
+            high = p
+        else:
+            low = p
+        step = over * rho / slope
+        if abs(step) <= 1e-15 * abs(p) + 1e-12 * (p - floor):
+            break
+        p -= step
+        side = side_at(st, pipe, p if low < p < high else between(floor, low, high, side[0]))
+        change, rise = jump(st, floats, pipe, inside, side)
+        v = v_in - change
+    return side, v, -rise * rho * mixture_volume(st, p_node)[0] / (slope * st["rho"])
+
+
+@njit
+def end_of_state(st, floats, pipe, p_in, v_in, p_node, still):
+    """(flow into the node [kg/s], its slope over p_node, mass per length [kg/m]) of a pipe end.
+
+    p_in, v_in : what the cells say of the end, velocity towards the node.
+    """
+    inside = side_at(st, pipe, p_in)
+    side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
+    if v >= 0.0:
+        m, at, _ = beside(st, floats, pipe, inside, v_in, side, v)
+        return m * at, side[1] * slope, m
+    return side[1] * v, side[1] * slope, side[1]
+
+
+@njit
+def end_flow_cavitating(st, floats, pipe, m_inside, into_inside, p_node, still):
+    """`end_of_state` from what the cells say as mass per length and mass flow."""
+    p = pressure_of_mass(st, floats, pipe, m_inside)
+    return end_of_state(st, floats, pipe, p, into_inside / m_inside, p_node, still)
+
+
+@njit
+def cavitating_ends(out, tables, slope, final):
+    """Change of flow from pipes into every node at the present pressures, in out[net], and its slope.
+
+    out[ends] holds pressure and velocity [Pa, m/s] that the cells say of each end; `final` puts the ends' own waves
+    in their place.
+    """
+    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
+    pipes = tables[I_PIPES]
+    for i in range(nodes.size):
+        out[layout["net"] + i], slope[i] = 0.0, 0.0
+    for k in range(pipes.size):
+        pipe = pipes[k]
+        for side in range(2):
+            at = layout["ends"] + 4 * k + 2 * side
+            i = pipe["to_node"] if side == 1 else pipe["from_node"]
+            sign = 2.0 * side - 1.0
+            base = pipe["to_base"] if side == 1 else pipe["from_base"]
+            base_mass = pipe["to_mass"] if side == 1 else pipe["from_mass"]
+            p = nodes[i]["pressure"] + out[layout["pressure"] + i]
+            still = nodes[i]["kind"] != JUNCTION
+            into, rise, m = end_of_state(st, floats, pipe, out[at], sign * out[at + 1], p, still)
+            change = into - base
+            out[layout["net"] + i] += change
+            slope[i] += rise
+            if final:
+                dm = pipe["speed"] * (m - base_mass)
+                out[at] = 0.5 * (dm + sign * change)
+                out[at + 1] = 0.5 * (dm - sign * change)
+
+
+@njit
+def hold_back(sweep, out, tables, before, low, high):
+    """Keep Newton's step of every node inside what is known of its root; returns the greatest change, relative.
+
+    A node alone in its cluster takes in less the higher its pressure is, so each step bounds its root on one side.
+    Others keep above the floor, and take half steps after a while.
+    """
+    st, nodes, clusters = tables[I_SETTINGS][0], tables[I_NODES], tables[I_CLUSTERS]
+    pressure, floor, moved = tables[I_LAYOUT][0]["pressure"], st["floor"], 0.0
+    for which in range(clusters.size):
+        for k in range(clusters[which]["nodes"]):
+            i = tables[I_INTEGERS][clusters[which]["first_node"] + k]
+            base = nodes[i]["pressure"]
+            p, q, least = base + before[i], base + out[pressure + i], floor + ROUNDING * (1e5 + base)
+            if clusters[which]["nodes"] > 1:
+                q = max(p + 0.5 * (q - p) if sweep > LONG else q, floor + FALL * (p - floor), least)
+            elif q != p:
+                low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
+                if not low[i] < q < high[i]:
+                    q = max(between(floor, low[i], high[i], p), least)
+            out[pressure + i] = q - base
+            moved = max(moved, abs(q - p) / (1e5 + abs(p)))
+    return moved
+
+
+@njit
+def close_nodes_cavitating(t, y, out, tables):
+    """`close_nodes_barotropic` above the law's floor; done when no pressure changes."""
+    space, n, work = node_space(tables), tables[I_NODES].size, tables[I_SCRATCH]
+    pressure, last = tables[I_LAYOUT][0]["pressure"], space[3]
+    low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
+    low[:], high[:] = tables[I_SETTINGS][0]["floor"], UNBOUNDED
+    given_flows(t, y, out, tables)
+    begin_clusters(out, tables, space)
+    moved, before = 1e300, 1e300
+    for sweep in range(1, 101):
+        cavitating_ends(out, tables, space[0], False)
+        for i in range(n):
+            last[i] = out[pressure + i]
+        step_clusters(sweep, out, tables, space)
+        before, moved = moved, hold_back(sweep, out, tables, last, low, high)
+        if settled(moved, before):
+            break
+    finish_clusters(out, tables, space, moved)
+    cavitating_ends(out, tables, space[0], True)
+
+
+@njit
+def balance_junctions(out, tables):
+    """What Newton has left at junctions goes to their pipe ends, by what these hold: rounding, but mass is kept."""
+    layout, nodes, pipes, profile = tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES], tables[I_PROFILE]
+    left, held, some = tables[I_SCRATCH][: nodes.size], tables[I_SCRATCH][nodes.size : 2 * nodes.size], False
+    for i in range(nodes.size):
+        left[i], held[i] = 0.0, 0.0
+        if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
+            left[i] = out[layout["net"] + i] + (out[layout["supply"] + i] + nodes[i]["demand"])
+            out[layout["net"] + i] -= left[i]
+            some = some or left[i] != 0.0
+    for turn in range(2 if some else 0):
+        for k in range(pipes.size):
+            for side in range(2):
+                i = pipes[k]["to_node"] if side == 1 else pipes[k]["from_node"]
+                at = layout["ends"] + 4 * k + 2 * side
+                m = profile[pipes[k]["face"] + side * pipes[k]["cells"]]
+                m += (out[at] + out[at + 1]) / pipes[k]["speed"]
+                if turn == 0:
+                    held[i] += m
+                elif left[i] != 0.0:
+                    change = (0.5 - side) * left[i] * (m / held[i])
+                    out[at] += change
+                    out[at + 1] -= change

@@ -1,0 +1,43 @@
+"""A check valve that shuts where its flow reverses. Knows one valve; knows no network.
+
+Open, it is a restriction both ways, and its flow is the event function; shut, nothing passes, and it opens once the
+drop exceeds its cracking pressure. armed[event] says which: it changes on accepted states alone.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_NODES, I_VALVES, JUNCTION
+from fvsolve.kernels.restrictions import head_drop
+
+RELUCTANCE = 1.0  # drop beyond the cracking pressure below which it stays shut: rounding must not open it [Pa]
+
+
+@njit
+def set_check_valve(out, tables, device):
+    """Its conductance: whole, or none."""
+    k, shut = device["valve"], tables[I_ARMED][device["event"]] > 0.0
+    out[tables[I_LAYOUT][0]["conductance"] + k] = 0.0 if shut else tables[I_VALVES][k]["conductance"]
+
+
+@njit
+def leads_on(tables, device):
+    """Whether a place without storage lies at one of its ends: there others may hold the flow back, and it is open."""
+    valve, nodes = tables[I_VALVES][device["valve"]], tables[I_NODES]
+    return nodes[valve["from_node"]]["kind"] == JUNCTION or nodes[valve["to_node"]]["kind"] == JUNCTION
+
+
+@njit
+def check_valve_events(out, tables, device, g):
+    """g: flow that is left while open [kg/s], drop beyond what opens it while shut [Pa]; and the same negative."""
+    k, at = device["valve"], device["event"]
+    left = out[tables[I_LAYOUT][0]["valve"] + k]
+    if left == 0.0 and tables[I_ARMED][at] == 0.0 and leads_on(tables, device):
+        left = head_drop(tables, out, k)[1] + RELUCTANCE
+    if tables[I_ARMED][at] > 0.0:
+        left = head_drop(tables, out, k)[1] - tables[I_FLOATS][device["data"]] - RELUCTANCE
+    g[at], g[at + 1] = left, -left
+
+
+@njit
+def check_valve_value(out, tables, device):
+    """1 while it is open, 0 while it is shut."""
+    return 1.0 if out[tables[I_LAYOUT][0]["conductance"] + device["valve"]] > 0.0 else 0.0

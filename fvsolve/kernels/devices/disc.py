@@ -1,0 +1,94 @@
+"""A disc on a spring that opens a restriction, M |M| = G x^2 dP. Knows one disc; knows no network.
+
+T dx/dt = target - x, or x'' = w^2 (target - x) - 2 zeta w x', between its seat at 0 and its stop at 1, where it comes
+to rest: armed[event] says that it is against its stop, armed[event + 2] that it is on its seat. target =
+(what is felt - what begins to open it) / span, of the pressure before a relief valve, of the drop across a check valve.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.devices.codes import RELIEF_DISC
+from fvsolve.kernels.devices.feedback import loop_rate
+from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_VALVES, RATE
+from fvsolve.kernels.restrictions import head_drop
+
+LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6  # numbers: three of the start, then its keys
+AT_REST = 1e-10  # share of its span that does not lift it off a stop: rounding must not
+EARLY = 1e-6  # share of 1 / w by which it is asked which way it moves
+
+
+@njit
+def disc_lift(y, tables, device):
+    """Lift x, beyond its stops by rounding at most."""
+    return tables[I_FLOATS][device["data"] + LIFT] + y[device["y"]]
+
+
+@njit
+def set_disc(y, out, tables, device):
+    """Its conductance G x^2."""
+    k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
+    out[tables[I_LAYOUT][0]["conductance"] + k] = tables[I_VALVES][k]["conductance"] * x * x
+
+
+@njit
+def disc_drive(y, out, tables, device):
+    """target - x."""
+    layout, floats, data, k = tables[I_LAYOUT][0], tables[I_FLOATS], device["data"], device["valve"]
+    if device["kind"] == RELIEF_DISC:
+        felt = out[layout["pressure"] + tables[I_VALVES][k]["from_node"]]
+    else:
+        felt = head_drop(tables, out, k)[1] - floats[data + FELT]
+    return (floats[data + TARGET] - floats[data + LIFT]) + felt / floats[data + SPAN] - y[device["y"]]
+
+
+@njit
+def move_disc(y, dydt, out, tables, device):
+    """Rates of its lift and of its speed, none against a stop; and its greatest rate."""
+    floats, armed, at, o = tables[I_FLOATS], tables[I_ARMED], device["event"], device["y"]
+    drive, held = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
+    time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
+    own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
+    out[RATE] = max(out[RATE], own if held else disc_loop(out, tables, device, own))
+    if dydt.size == 0:
+        return
+    if device["states"] == 1:
+        dydt[o] = 0.0 if held else drive / time
+    else:
+        dydt[o] = 0.0 if held else y[o + 1]
+        dydt[o + 1] = 0.0 if held else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
+
+
+@njit
+def disc_loop(out, tables, device, own):
+    """Its rate with that of the places at its ends in the loop."""
+    k, speed = device["valve"], own / tables[I_FLOATS][device["data"] + SPAN]
+    rate = own + loop_rate(out, tables, k, tables[I_VALVES][k]["from_node"], speed)
+    if device["kind"] != RELIEF_DISC:
+        rate += loop_rate(out, tables, k, tables[I_VALVES][k]["to_node"], speed)
+    return rate if device["states"] == 1 else sqrt(own * rate)
+
+
+@njit
+def disc_events(y, out, tables, device, g):
+    """g: way to its stop, way to its seat; each both ways."""
+    armed, at, o = tables[I_ARMED], device["event"], device["y"]
+    x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
+    stop, seat = -drive - AT_REST, drive - AT_REST
+    if device["states"] == 1:
+        onward = drive - AT_REST, drive + AT_REST
+    else:
+        speed = y[o + 1] / tables[I_FLOATS][device["data"] + SWING] + EARLY * drive
+        onward = speed, speed
+    if armed[at] == 0.0:
+        stop = max(1.0 - x, -onward[1])
+    if armed[at + 2] == 0.0:
+        seat = max(x, onward[0])
+    g[at], g[at + 1] = stop, -stop
+    g[at + 2], g[at + 3] = seat, -seat
+
+
+@njit
+def disc_value(y, tables, device):
+    """Its lift, 0 to 1."""
+    return min(max(disc_lift(y, tables, device), 0.0), 1.0)

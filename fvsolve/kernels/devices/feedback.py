@@ -1,0 +1,29 @@
+"""How fast a valve that answers a pressure acts on it. Knows one restriction; knows no valve."""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.network import stiffness_of
+from fvsolve.kernels.records import I_LAYOUT, I_NODES, I_VALVES, JUNCTION
+from fvsolve.kernels.restrictions import head_drop, restriction_slope
+
+
+@njit
+def yielding(tables, i):
+    """Rise of the pressure at a node without storage for a flow into it [Pa s/kg]; 0 of others."""
+    node = tables[I_NODES][i]
+    return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
+
+
+@njit
+def loop_rate(out, tables, k, i, speed):
+    """Rate [1/s] of restriction k whose opening x moves by dx/dt = -speed p' with the pressure at node i.
+
+    p' follows dM/dx, sqrt(G dP) less what its own drop gives way, through pipes or through stored mass.
+    """
+    layout, valve = tables[I_LAYOUT][0], tables[I_VALVES][k]
+    drop = head_drop(tables, out, k)[1]
+    soft = yielding(tables, valve["from_node"]) + yielding(tables, valve["to_node"])
+    gain = speed * sqrt(valve["conductance"] * abs(drop)) / (1.0 + soft * restriction_slope(tables, out, k, drop))
+    stiff = stiffness_of(tables[I_NODES], layout, out, i) if tables[I_NODES][i]["kind"] != JUNCTION else 0.0
+    return max(gain * yielding(tables, i), sqrt(gain * stiff))

@@ -1,0 +1,97 @@
+"""A valve that moves until what it senses is as set. Knows one valve; knows no network.
+
+dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP. armed[event] says that it holds back reversed flow,
+armed[event + 2] that it stands fully open, armed[event + 4] that it stands on its seat: these change on accepted
+states alone.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING
+from fvsolve.kernels.devices.feedback import loop_rate
+from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_VALVES, RATE
+from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.schedules import schedule_value
+
+OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
+AT_REST = 1e-10  # error, as a share of the band, that does not lift it off a stop: rounding must not
+ALMOST_SHUT = 1e-6  # opening below which its flow may be rounding
+RELUCTANCE = 1e-3  # drop below which it stays shut against reversed flow [Pa]
+
+
+@njit
+def regulator_opening(y, tables, device):
+    """Stem position x, beyond its stops by rounding at most."""
+    return tables[I_FLOATS][device["data"] + OPENING] + y[device["y"]]
+
+
+@njit
+def set_regulator(y, out, tables, device):
+    """Its conductance G x^2; none while it holds back reversed flow."""
+    k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
+    back = tables[I_ARMED][device["event"]] > 0.0
+    out[tables[I_LAYOUT][0]["conductance"] + k] = 0.0 if back else tables[I_VALVES][k]["conductance"] * x * x
+
+
+@njit
+def regulator_error(t, out, tables, device):
+    """What asks it to open, as a share of its band: set less sensed, but sensed less set where it sustains."""
+    layout, floats, data = tables[I_LAYOUT][0], tables[I_FLOATS], device["data"]
+    valve = tables[I_VALVES][device["valve"]]
+    change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
+    if device["kind"] == FLOW_CONTROL:
+        change -= out[layout["valve"] + device["valve"]] - valve["flow"]
+    elif device["kind"] == REDUCING:
+        change -= out[layout["pressure"] + valve["to_node"]]
+    else:
+        change = out[layout["pressure"] + valve["from_node"]] - change
+    return (floats[data + ERROR] + change) / floats[data + BAND]
+
+
+@njit
+def move_regulator(t, y, dydt, out, tables, device):
+    """dx/dt, none against a stop; and its greatest rate."""
+    out[RATE] = max(out[RATE], regulator_rate(out, tables, device))
+    if dydt.size == 0:
+        return
+    armed, at = tables[I_ARMED], device["event"]
+    rate = regulator_error(t, out, tables, device) / tables[I_FLOATS][device["data"] + TIME]
+    dydt[device["y"]] = 0.0 if armed[at + 2] > 0.0 or armed[at + 4] > 0.0 else rate
+
+
+@njit
+def regulator_rate(out, tables, device):
+    """How fast the loop through what it senses can be [1/s]."""
+    k, floats, data = device["valve"], tables[I_FLOATS], device["data"]
+    speed = 1.0 / (floats[data + BAND] * floats[data + TIME])
+    if device["kind"] == FLOW_CONTROL:
+        return speed * sqrt(tables[I_VALVES][k]["conductance"] * abs(head_drop(tables, out, k)[1]))
+    end = tables[I_VALVES][k]["to_node"] if device["kind"] == REDUCING else tables[I_VALVES][k]["from_node"]
+    return loop_rate(out, tables, k, end, speed)
+
+
+@njit
+def regulator_events(t, y, out, tables, device, g):
+    """g: flow that is left or drop beyond what opens it, way to full opening, way to its seat; each both ways."""
+    layout, armed = tables[I_LAYOUT][0], tables[I_ARMED]
+    at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
+    drop, back = head_drop(tables, out, device["valve"])[1], 1.0
+    if device["kind"] != FLOW_CONTROL:
+        back = out[layout["valve"] + device["valve"]] if x > ALMOST_SHUT else drop + RELUCTANCE
+        if armed[at] > 0.0:
+            back = drop - RELUCTANCE
+    full, seat = -error - AT_REST, error - AT_REST
+    if armed[at + 2] == 0.0:
+        full = max(full, 1.0 - x)
+    if armed[at + 4] == 0.0:
+        seat = max(seat, x)
+    g[at], g[at + 1] = back, -back
+    g[at + 2], g[at + 3] = full, -full
+    g[at + 4], g[at + 5] = seat, -seat
+
+
+@njit
+def regulator_value(y, tables, device):
+    """Its opening, 0 to 1."""
+    return min(max(regulator_opening(y, tables, device), 0.0), 1.0)

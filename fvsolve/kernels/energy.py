@@ -1,0 +1,340 @@
+"""Power and stored energy of every part under the linear law. Knows the tables; adds nothing up over time.
+
+P = p - p_ambient + rho g z, z from the datum in the settings; a mass flow M at a port carries the power P M / rho. A
+pipe stores A P^2 / (2 rho c^2) + M^2 / (2 rho A) per length, a chamber V p^2 / (2 beta), a tank its mass times g z, a
+rigid column M^2 L / (2 rho A), and what friction takes is M drag / (rho A) per length. Squares are averaged over a cell
+from the values at three Gauss points of a polynomial of the scheme's degree through neighbouring cells. Stored energies
+are changes since the profile, a cross term and a square: no small difference of large numbers.
+
+Rows of `power` [W], table by table: NODE supply, rate of storage; PIPE in, friction, jets, rate;
+VALVE loss; COLUMN in, friction, rate; BODY rate; BRACE what it takes up (a spring, a damper) or gives (a force); STOP
+rate, loss; PISTON leak, friction, what the linear law makes where a volume moves. Rows of `stored` [J]: node; pipe
+kinetic, elastic and height; column; body; brace; stop.
+"""
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.columns import column_drag
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanics import between, contact, motion
+from fvsolve.kernels.pipes import family_of
+from fvsolve.kernels.records import (
+    CHAMBER,
+    I_ARMED,
+    I_BODIES,
+    I_BRACES,
+    I_COLUMNS,
+    I_FLOATS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PISTONS,
+    I_SETTINGS,
+    I_STOPS,
+    I_VALVES,
+    MUSCL,
+    SHORT,
+    TANK,
+    UPWIND,
+    WENO5,
+)
+from fvsolve.kernels.tanks import tank_level
+
+NODE, PIPE, VALVE, COLUMN, BODY, BRACE, STOP, PISTON = 2, 4, 1, 3, 1, 1, 2, 3  # rows of `power` a part
+WIDEST = 5
+PLACES = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)  # Gauss points of a cell, in cell widths from its centre
+SHARES = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+def point_weights():
+    """Weights of w cells in the value at each Gauss point of cell i of them : float64[w, i, point, cell]."""
+    found = np.zeros((WIDEST + 1, WIDEST, 3, WIDEST))
+    for w in range(1, WIDEST + 1):
+        for i in range(w):
+            edges = np.arange(w + 1) - i - 0.5
+            powers = np.arange(w)
+            means = (edges[1:, None] ** (powers + 1) - edges[:-1, None] ** (powers + 1)) / (powers + 1)
+            found[w, i, :, :w] = np.linalg.solve(means.T, (PLACES[:, None] ** powers).T).T
+    return found
+
+
+POINTS = point_weights()
+
+
+@njit
+def width_of(settings, n):
+    """Cells of the polynomial by which squares are averaged: one below order three, else as many as the order."""
+    family, width = family_of(settings, n), 1
+    if family == WENO5:
+        width = WIDEST
+    elif family == SHORT:
+        width = 3
+    elif family != UPWIND and family != MUSCL and settings["degree"] > 1:
+        width = settings["degree"] + 1
+    return min(width, n)
+
+
+@njit(forceinline=True)
+def at_point(c, width, i, point):
+    """Value at a Gauss point of cell i of the polynomial through `width` cells about it."""
+    first = min(max(i - width // 2, 0), c.size - width)
+    total = 0.0
+    for k in range(width):
+        total += POINTS[width, i - first, point, k] * c[first + k]
+    return total
+
+
+@njit(forceinline=True)
+def gauge(tables, out, i):
+    """p - p_ambient of node i [Pa]."""
+    start = tables[I_NODES][i]["pressure"] - tables[I_SETTINGS][0]["ambient"]
+    return start + out[tables[I_LAYOUT][0]["pressure"] + i]
+
+
+@njit(forceinline=True)
+def potential(tables, out, i):
+    """P = p - p_ambient + rho g z of node i [Pa]."""
+    return gauge(tables, out, i) + lift(tables[I_SETTINGS][0], tables[I_NODES][i])
+
+
+@njit(forceinline=True)
+def lift(st, node):
+    """rho g z of a node [Pa]."""
+    return st["rho"] * st["gravity"] * (node["elevation"] - st["datum"])
+
+
+@njit
+def pipe_power(st, pipe, start, r, l, dr, dl, rows):
+    """Friction, and the rate of what is stored, of one pipe; start : P of the profile at its `from` end [Pa]."""
+    n, width, per = r.size, width_of(st, r.size), 1.0 / (st["rho"] * pipe["area"])
+    fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
+    friction, rate = 0.0, 0.0
+    for i in range(n):
+        for g in range(3):
+            a, b = at_point(r, width, i, g), at_point(l, width, i, g)
+            da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
+            total = flow + (a - b)
+            p = pipe["admittance"] * (start - fall * (i + 0.5 + PLACES[g]) * pipe["dx"])
+            pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], total)
+            friction += SHARES[g] * (total * pull)
+            rate += SHARES[g] * ((p * (da + db) + flow * (da - db)) + 2.0 * (a * da + b * db))
+    rows[1], rows[2], rows[3] = per * pipe["dx"] * friction, 0.0, per * pipe["dx"] * rate
+
+
+@njit
+def pipe_energy(st, pipe, start, r, l, rows):
+    """Change of kinetic and of elastic energy (with that of height) of one pipe since the profile."""
+    n, width, per = r.size, width_of(st, r.size), 0.5 / (st["rho"] * pipe["area"])
+    fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
+    kinetic, elastic = 0.0, 0.0
+    for i in range(n):
+        for g in range(3):
+            a, b = at_point(r, width, i, g), at_point(l, width, i, g)
+            p = pipe["admittance"] * (start - fall * (i + 0.5 + PLACES[g]) * pipe["dx"])
+            kinetic += SHARES[g] * ((2.0 * flow + (a - b)) * (a - b))
+            elastic += SHARES[g] * ((2.0 * p + (a + b)) * (a + b))
+    rows[0], rows[1] = per * pipe["dx"] * kinetic, per * pipe["dx"] * elastic
+
+
+@njit
+def power_linear(t, y, dydt, out, handle, power):
+    """Fill `power` from a state, its rates and what the rhs wrote beside them."""
+    tables = open_tables(handle)
+    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
+    valves, columns, per = tables[I_VALVES], tables[I_COLUMNS], 1.0 / tables[I_SETTINGS][0]["rho"]
+    at = 0
+    for i in range(nodes.size):
+        p = potential(tables, out, i) * per
+        power[at], power[at + 1] = p * out[layout["supply"] + i], 0.0
+        if nodes[i]["kind"] == TANK or nodes[i]["kind"] == CHAMBER:
+            power[at + 1] = p * dydt[nodes[i]["y"]]
+        at += NODE
+    for k in range(pipes.size):
+        pipe = pipes[k]
+        n, o, end = pipe["cells"], pipe["y"], layout["ends"] + 4 * k
+        first = nodes[pipe["from_node"]]
+        start = (first["pressure"] - st["ambient"]) + lift(st, first)
+        into = potential(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
+        into -= potential(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
+        power[at] = into * per
+        pipe_power(
+            st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n], dydt[o + n : o + 2 * n],
+            power[at : at + PIPE],
+        )  # fmt: skip
+        at += PIPE
+    for k in range(valves.size):
+        drop = potential(tables, out, valves[k]["from_node"]) - potential(tables, out, valves[k]["to_node"])
+        power[at] = per * drop * out[layout["valve"] + k]
+        at += VALVE
+    for k in range(columns.size):
+        column = columns[k]
+        flow, own = out[layout["column"] + k], column["flow"] + y[column["y"]]
+        drop = potential(tables, out, column["from_node"]) - potential(tables, out, column["to_node"])
+        size = per * column["length"] / column["area"]
+        power[at], power[at + 1] = per * drop * flow, size * flow * column_drag(column, flow)
+        power[at + 2] = size * own * dydt[column["y"]]
+        at += COLUMN
+    at = power_bodies(t, y, dydt, out, tables, power, at)
+    power_pistons(y, dydt, out, tables, power, at)
+
+
+@njit
+def power_bodies(t, y, dydt, out, tables, power, at):
+    """Rows of bodies, braces and stops from row `at` on; returns the row behind them."""
+    layout, bodies, braces, stops = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_BRACES], tables[I_STOPS]
+    armed = tables[I_ARMED]
+    for i in range(bodies.size):
+        power[at] = 0.0
+        if bodies[i]["y"] >= 0:
+            power[at] = motion(bodies[i], y)[1] * dydt[bodies[i]["y"] + 1] / bodies[i]["lightness"]
+        at += BODY
+    for k in range(braces.size):
+        brace = braces[k]
+        speed = between(tables, y, brace["from_body"], brace["to_body"])[1]
+        power[at] = out[layout["push"] + k] * speed
+        if brace["schedule"] < 0:
+            power[at] = -power[at]
+        at += BRACE
+    first = armed.size - 2 * stops.size
+    for k in range(stops.size):
+        stop = stops[k]
+        x, speed = between(tables, y, stop["from_body"], stop["to_body"])
+        into, rate = 0.0, 0.0
+        for side in range(2):
+            if armed[first + 2 * k + side] > 0.0:
+                deep = x - stop["above"] if side == 1 else -(stop["below"] + x)
+                faster = speed if side == 1 else -speed
+                into += contact(stop["stiffness"], stop["damping"], deep, faster) * faster
+                rate += stop["stiffness"] * deep * faster
+        power[at], power[at + 1] = rate, into - rate
+        at += STOP
+    return at
+
+
+@njit(forceinline=True)
+def moving_side(tables, piston, side):
+    """(node, area with the sign of what a travel adds to its volume, mass swept a travel) of one side."""
+    if side == 1:
+        return piston["b"], -piston["area_b"], piston["sweep_b"]
+    return piston["a"], piston["area_a"], piston["sweep_a"]
+
+
+@njit
+def power_pistons(y, dydt, out, tables, power, at):
+    """Rows of pistons, and of storage in their chambers: V p^2 / (2 beta) and the height of the mass."""
+    st, layout, nodes, pistons = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PISTONS]
+    per = 1.0 / st["rho"]
+    for k in range(pistons.size):
+        piston = pistons[k]
+        speed = between(tables, y, piston["case"], piston["rod"])[1]
+        a, b = piston["a"], piston["b"]
+        drop = potential(tables, out, a) - potential(tables, out, b)
+        law = 0.0
+        for side in range(2):
+            i, area, sweep = moving_side(tables, piston, side)
+            change = out[layout["pressure"] + i]
+            p = (nodes[i]["pressure"] - st["ambient"]) + change
+            excess, swept = dydt[nodes[i]["y"]], area * speed
+            own = p * swept * (0.5 * p / st["beta"] - change / st["beta"])
+            power[NODE * i + 1] = per * (p * excess + lift(st, nodes[i]) * (excess + sweep * speed)) + own
+            law += (per * p * sweep * speed - p * swept) - own
+        power[at] = drop * piston["leakage"] * (gauge(tables, out, a) - gauge(tables, out, b))
+        power[at + 1], power[at + 2] = piston["damping"] * speed * speed, law
+        at += PISTON
+
+
+@njit
+def stored_linear(t, y, dydt, out, handle, stored):
+    """Fill `stored`, changes since the profile [J]."""
+    tables = open_tables(handle)
+    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
+    columns, pistons, per = tables[I_COLUMNS], tables[I_PISTONS], 1.0 / tables[I_SETTINGS][0]["rho"]
+    for i in range(nodes.size):
+        node = nodes[i]
+        stored[i] = 0.0
+        if node["kind"] == CHAMBER:
+            change, p0 = out[layout["pressure"] + i], node["pressure"] - st["ambient"]
+            stored[i] = per * y[node["y"]] * (p0 + 0.5 * change + lift(st, node))
+        elif node["kind"] == TANK:
+            stored[i] = tank_energy(st, tables[I_FLOATS], node, st["rho"], y[node["y"]])
+    for k in range(pistons.size):
+        piston = pistons[k]
+        x = between(tables, y, piston["case"], piston["rod"])[0]
+        for side in range(2):
+            i, area, sweep = moving_side(tables, piston, side)
+            change, p0 = out[layout["pressure"] + i], nodes[i]["pressure"] - st["ambient"]
+            squeezed = nodes[i]["volume"] * change * (2.0 * p0 + change) + area * x * (p0 + change) * (p0 + change)
+            height = per * lift(st, nodes[i]) * (y[nodes[i]["y"]] + sweep * x)
+            stored[i] = 0.5 * squeezed / st["beta"] + height
+    at = nodes.size
+    for k in range(pipes.size):
+        pipe = pipes[k]
+        n, o, first = pipe["cells"], pipe["y"], nodes[pipe["from_node"]]
+        start = (first["pressure"] - st["ambient"]) + lift(st, first)
+        pipe_energy(st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2])
+        at += 2
+    for k in range(columns.size):
+        column = columns[k]
+        change = y[column["y"]]
+        stored[at] = per * column["length"] / column["area"] * change * (column["flow"] + 0.5 * change)
+        at += 1
+    stored_bodies(y, tables, stored, at)
+
+
+@njit
+def tank_energy(st, floats, node, rho, change):
+    """Change of g z m of a tank whose mass has changed [J], integral of g (z + level) dm."""
+    level, z = node["level"], node["elevation"] - st["datum"]
+    if node["shape"] < 0:
+        return st["gravity"] * change * (z + level + 0.5 * change / (rho * node["area"]))
+    new = level_moment(floats, node["shape"], node["shapes"], tank_level(node, floats, rho, change))
+    old = level_moment(floats, node["shape"], node["shapes"], tank_level(node, floats, rho, 0.0))
+    return st["gravity"] * (z * change + rho * (new - old))
+
+
+@njit
+def level_moment(floats, shape, rows, level):
+    """Integral of z A(z) dz from the first level of a shaped tank to `level` [m4]."""
+    total = 0.0
+    for k in range(rows):
+        z0 = floats[shape + k]
+        last = k == rows - 1
+        z1 = level if last else min(floats[shape + k + 1], level)
+        if k > 0 and level <= z0:
+            break
+        a0 = floats[shape + rows + k]
+        growth = 0.0
+        if not last and z1 >= z0:  # below its first level a tank is a prism
+            growth = (floats[shape + rows + k + 1] - a0) / (floats[shape + k + 1] - z0)
+        d = z1 - z0
+        total += d * (a0 * (z0 + 0.5 * d) + growth * d * (0.5 * z0 + d / 3.0))
+    return total
+
+
+@njit
+def stored_bodies(y, tables, stored, at):
+    """Rows of bodies, braces and stops from row `at` on."""
+    bodies, braces, stops = tables[I_BODIES], tables[I_BRACES], tables[I_STOPS]
+    for i in range(bodies.size):
+        stored[at] = 0.0
+        if bodies[i]["y"] >= 0:
+            change = y[bodies[i]["y"] + 1]
+            stored[at] = change * (bodies[i]["velocity"] + 0.5 * change) / bodies[i]["lightness"]
+        at += 1
+    for k in range(braces.size):
+        x = between(tables, y, braces[k]["from_body"], braces[k]["to_body"])[0]
+        stored[at] = x * (0.5 * braces[k]["stiffness"] * x - braces[k]["force"])
+        if braces[k]["stiffness"] == 0.0:
+            stored[at] = 0.0
+        at += 1
+    for k in range(stops.size):
+        stop = stops[k]
+        x = between(tables, y, stop["from_body"], stop["to_body"])[0]
+        now, then = (
+            max(0.0, max(-(stop["below"] + x), x - stop["above"])),
+            max(0.0, max(-stop["below"], -stop["above"])),
+        )
+        stored[at] = 0.5 * stop["stiffness"] * (now - then) * (now + then)
+        at += 1

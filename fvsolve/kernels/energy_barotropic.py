@@ -1,0 +1,253 @@
+"""Power and stored energy of every part under the laws log and table. Knows the tables; adds nothing up over time.
+
+A mass flow M carries the power M H, H = h(p) - h(p_ambient) + g z; a pipe stores M^2 / (2 m) + W(m) + m g z per length
+with dW/dm = h, W = m h - integral of A dp; a vessel of volume V stores m (h + g z) - (p - p_ambient) V, which is
+V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses M v^2 / 2. Rows as in `energy.py`.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.columns import column_drag
+from fvsolve.kernels.density import enthalpy, pressure_of_mass, thrust
+from fvsolve.kernels.energy import (
+    BODY,
+    BRACE,
+    COLUMN,
+    NODE,
+    PIPE,
+    PISTON,
+    PLACES,
+    SHARES,
+    STOP,
+    VALVE,
+    at_point,
+    gauge,
+    moving_side,
+    power_bodies,
+    stored_bodies,
+    tank_energy,
+    width_of,
+)
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanics import between, leak_flow
+from fvsolve.kernels.records import (
+    CHAMBER,
+    I_BODIES,
+    I_BRACES,
+    I_COLUMNS,
+    I_FLOATS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PISTONS,
+    I_PROFILE,
+    I_SETTINGS,
+    I_STOPS,
+    I_VALVES,
+    JUNCTION,
+    LAW_LINEAR,
+    TANK,
+)
+
+EMPTY = 1e-6  # of what a pipe holds: the least that counts as a mass
+
+
+@njit
+def height_of(st, floats, p):
+    """h(p) - h(p_ambient) [J/kg]."""
+    return enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])
+
+
+@njit
+def head_at(st, floats, node, p):
+    """Energy that a mass would bring into a node at p [J/kg], of any law."""
+    height = st["gravity"] * (node["elevation"] - st["datum"])
+    if st["law"] == LAW_LINEAR:
+        return (p - st["ambient"]) / st["rho"] + height
+    return height_of(st, floats, p) + height
+
+
+@njit
+def total_head(tables, out, i):
+    """H = h(p) - h(p_ambient) + g z of node i [J/kg]."""
+    st, node = tables[I_SETTINGS][0], tables[I_NODES][i]
+    h = height_of(st, tables[I_FLOATS], node["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + i])
+    return h + st["gravity"] * (node["elevation"] - st["datum"])
+
+
+@njit(forceinline=True)
+def profile_mass(profile, pipe, i, point):
+    """Mass per length of the profile [kg/m] at a Gauss point of cell i: a parabola through its faces and centre."""
+    left, right, middle = profile[pipe["face"] + i], profile[pipe["face"] + i + 1], profile[pipe["center"] + i]
+    s = PLACES[point]
+    return middle + s * ((right - left) + 2.0 * s * ((left - middle) + (right - middle)))
+
+
+@njit(forceinline=True)
+def held(st, profile, pipe, i, point, change):
+    """Mass per length [kg/m] at a Gauss point of cell i; a cavity is never quite empty."""
+    return max(profile_mass(profile, pipe, i, point) + change, EMPTY * st["rho"] * pipe["area"])
+
+
+@njit
+def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
+    """Friction, and the rate of what is stored, of one pipe; z : height of its `from` end [m]."""
+    n, c, width, dx = r.size, pipe["speed"], width_of(st, r.size), pipe["dx"]
+    base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
+    friction, rate = 0.0, 0.0
+    for i in range(n):
+        for g in range(3):
+            a, b = at_point(r, width, i, g), at_point(l, width, i, g)
+            da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
+            m, flow = held(st, profile, pipe, i, g, (a + b) / c), pipe["flow"] + (a - b)
+            v = flow / m
+            h = enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - base
+            h += st["gravity"] * (z + pipe["slope"] * (i + 0.5 + PLACES[g]) * dx)
+            pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+            friction += SHARES[g] * v * pull * (reference / m)
+            rate += SHARES[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
+    rows[1], rows[3] = dx * friction, dx * rate
+
+
+@njit
+def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
+    """Change of kinetic and of elastic energy (with that of height) of one pipe since the profile."""
+    n, c, width, dx = r.size, pipe["speed"], width_of(st, r.size), pipe["dx"]
+    base = enthalpy(st, floats, st["ambient"])
+    kinetic, elastic = 0.0, 0.0
+    for i in range(n):
+        for g in range(3):
+            a, b = at_point(r, width, i, g), at_point(l, width, i, g)
+            m0 = profile_mass(profile, pipe, i, g)
+            m, flow = held(st, profile, pipe, i, g, (a + b) / c), pipe["flow"] + (a - b)
+            p0, p = pressure_of_mass(st, floats, pipe, m0), pressure_of_mass(st, floats, pipe, m)
+            h0, h = enthalpy(st, floats, p0) - base, enthalpy(st, floats, p) - base
+            height = st["gravity"] * (z + pipe["slope"] * (i + 0.5 + PLACES[g]) * dx)
+            kinetic += SHARES[g] * (0.5 * flow * flow / m - 0.5 * pipe["flow"] * pipe["flow"] / m0)
+            squeezed = (m * h - m0 * h0) - (thrust(st, pipe, p) - thrust(st, pipe, p0))
+            elastic += SHARES[g] * (squeezed + height * (m - m0))
+    rows[0], rows[1] = dx * kinetic, dx * elastic
+
+
+@njit
+def jets(profile, pipe, out, end, nodes):
+    """Power that jets into vessels lose at both ends of a pipe, M v^2 / 2 [W]."""
+    lost = 0.0
+    for side in range(2):
+        i = pipe["to_node"] if side == 1 else pipe["from_node"]
+        r, l = out[end + 2 * side], out[end + 2 * side + 1]
+        m = profile[pipe["face"] + side * pipe["cells"]] + (r + l) / pipe["speed"]
+        flow = (2.0 * side - 1.0) * (pipe["flow"] + (r - l))
+        if nodes[i]["kind"] != JUNCTION and flow > 0.0:
+            lost += 0.5 * flow * (flow / m) * (flow / m)
+    return lost
+
+
+@njit
+def power_barotropic(t, y, dydt, out, handle, power):
+    """Fill `power` from a state, its rates and what the rhs wrote beside them."""
+    tables = open_tables(handle)
+    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
+    valves, columns, floats, profile = tables[I_VALVES], tables[I_COLUMNS], tables[I_FLOATS], tables[I_PROFILE]
+    at = 0
+    for i in range(nodes.size):
+        head = total_head(tables, out, i)
+        power[at], power[at + 1] = head * out[layout["supply"] + i], 0.0
+        if nodes[i]["kind"] == TANK or nodes[i]["kind"] == CHAMBER:
+            power[at + 1] = head * dydt[nodes[i]["y"]]
+        at += NODE
+    for k in range(pipes.size):
+        pipe = pipes[k]
+        n, o, end = pipe["cells"], pipe["y"], layout["ends"] + 4 * k
+        power[at] = total_head(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
+        power[at] -= total_head(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
+        power[at + 2] = jets(profile, pipe, out, end, nodes)
+        z = nodes[pipe["from_node"]]["elevation"] - st["datum"]
+        pipe_power_barotropic(
+            st, floats, profile, pipe, z, y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n],
+            dydt[o + n : o + 2 * n], power[at : at + PIPE],
+        )  # fmt: skip
+        at += PIPE
+    for k in range(valves.size):
+        drop = total_head(tables, out, valves[k]["from_node"]) - total_head(tables, out, valves[k]["to_node"])
+        power[at] = drop * out[layout["valve"] + k]
+        at += VALVE
+    for k in range(columns.size):
+        column = columns[k]
+        flow, own = out[layout["column"] + k], column["flow"] + y[column["y"]]
+        drop = total_head(tables, out, column["from_node"]) - total_head(tables, out, column["to_node"])
+        size = column["length"] / (column["area"] * st["rho"])
+        power[at], power[at + 1] = drop * flow, size * flow * column_drag(column, flow)
+        power[at + 2] = size * own * dydt[column["y"]]
+        at += COLUMN
+    power_bodies(t, y, dydt, out, tables, power, at)
+    at += BODY * tables[I_BODIES].size + BRACE * tables[I_BRACES].size + STOP * tables[I_STOPS].size
+    power_pistons_barotropic(y, dydt, out, tables, power, at)
+
+
+@njit
+def power_pistons_barotropic(y, dydt, out, tables, power, at):
+    """Rows of pistons, and of storage in their chambers, H dm - (p - p_ambient) dV."""
+    nodes, pistons = tables[I_NODES], tables[I_PISTONS]
+    pressure = tables[I_LAYOUT][0]["pressure"]
+    for k in range(pistons.size):
+        piston = pistons[k]
+        speed = between(tables, y, piston["case"], piston["rod"])[1]
+        a, b = piston["a"], piston["b"]
+        for side in range(2):
+            i, area, sweep = moving_side(tables, piston, side)
+            gained = dydt[nodes[i]["y"]] + sweep * speed
+            power[NODE * i + 1] = total_head(tables, out, i) * gained - gauge(tables, out, i) * area * speed
+        p_a, p_b = nodes[a]["pressure"] + out[pressure + a], nodes[b]["pressure"] + out[pressure + b]
+        leak = leak_flow(tables, piston, p_a, p_b)
+        power[at] = (total_head(tables, out, a) - total_head(tables, out, b)) * leak
+        power[at + 1], power[at + 2] = piston["damping"] * speed * speed, 0.0
+        at += PISTON
+
+
+@njit
+def vessel_energy(st, floats, node, mass, volume, p):
+    """m (h + g z) - (p - p_ambient) V [J]."""
+    head = height_of(st, floats, p) + st["gravity"] * (node["elevation"] - st["datum"])
+    return mass * head - (p - st["ambient"]) * volume
+
+
+@njit
+def stored_barotropic(t, y, dydt, out, handle, stored):
+    """Fill `stored`, changes since the profile [J]."""
+    tables = open_tables(handle)
+    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
+    columns, pistons, floats = tables[I_COLUMNS], tables[I_PISTONS], tables[I_FLOATS]
+    for i in range(nodes.size):
+        node = nodes[i]
+        stored[i], p0 = 0.0, node["pressure"]
+        if node["kind"] == CHAMBER:
+            p, volume = p0 + out[layout["pressure"] + i], node["volume"]
+            stored[i] = vessel_energy(st, floats, node, node["mass"] + y[node["y"]], volume, p)
+            stored[i] -= vessel_energy(st, floats, node, node["mass"], volume, p0)
+        elif node["kind"] == TANK:
+            stored[i] = tank_energy(st, floats, node, node["density"], y[node["y"]])
+    for k in range(pistons.size):
+        piston = pistons[k]
+        x = between(tables, y, piston["case"], piston["rod"])[0]
+        for side in range(2):
+            i, area, sweep = moving_side(tables, piston, side)
+            node, p0 = nodes[i], nodes[i]["pressure"]
+            mass, volume = node["mass"] + (y[node["y"]] + sweep * x), node["volume"] + area * x
+            stored[i] = vessel_energy(st, floats, node, mass, volume, p0 + out[layout["pressure"] + i])
+            stored[i] -= vessel_energy(st, floats, node, node["mass"], node["volume"], p0)
+    at = nodes.size
+    for k in range(pipes.size):
+        pipe = pipes[k]
+        n, o, z = pipe["cells"], pipe["y"], nodes[pipe["from_node"]]["elevation"] - st["datum"]
+        pipe_energy_barotropic(
+            st, floats, tables[I_PROFILE], pipe, z, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2]
+        )
+        at += 2
+    for k in range(columns.size):
+        column = columns[k]
+        change = y[column["y"]]
+        size = column["length"] / (column["area"] * st["rho"])
+        stored[at] = size * change * (column["flow"] + 0.5 * change)
+        at += 1
+    stored_bodies(y, tables, stored, at)

@@ -1,0 +1,24 @@
+"""The right-hand side of scenes without a pipe, so that nothing of the pipes' room is compiled. Knows the tables."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.columns import column_rates
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.nodes import close_nodes
+from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
+from fvsolve.kernels.restrictions import open_scheduled
+
+
+@njit
+def rhs_lumped_linear(t, y, dydt, out, handle):
+    """`rhs_linear` of a scene without pipes."""
+    tables = open_tables(handle)
+    out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
+    clear_net(out, tables)
+    close_nodes(t, y, out, tables)
+    net_flows(out, tables)
+    stored_rates(y, dydt, out, tables)
+    out[RATE] = greatest_rate(t, out, tables)
+    if dydt.size > 0:
+        column_rates(t, dydt, out, tables)

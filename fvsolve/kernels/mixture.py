@@ -1,0 +1,187 @@
+"""Liquid with free gas, and vapour where the law has a floor: one barotropic law. Knows one place; knows no cells.
+
+With x = p - floor > 0 the pressure of the gas, and all volumes over the liquid's at the reference pressure,
+
+    rho_ref / rho = 1 - (p - p_ref) / beta + gas (x^-k - x^(1-k) / saturation),   k = 1 / (gas exponent),
+
+free gas as long as x < saturation (it dissolves by Henry's law; infinite for none). The wall's area is linear,
+A = A_ref (1 + compliance (p - p_ref)), so that with k = 1 pressure over mass is the root of a quadratic.
+"""
+
+import os
+from math import exp, log, sqrt
+
+from fvsolve.jit import inner, njit
+
+if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
+    from numba.core import types
+    from numba.extending import intrinsic
+
+    @intrinsic
+    def outside(typingctx):
+        """Keep LLVM from copying the function around this call into its callers: halves what it adds to compiling."""
+
+        def generate(context, builder, kind, args):
+            builder.function.attributes.add("noinline")
+            return context.get_dummy_value()
+
+        return types.none(), generate
+else:
+
+    def outside():
+        """Nothing, without numba."""
+
+
+def part(function):
+    """`njit` for what the functions of `density.py` alone call: no door to Python."""
+    return njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+@part
+def free_gas(st, x):
+    """(volume of free gas over the liquid's, its fall with pressure [1/Pa]) at a pressure x of the gas [Pa]."""
+    if x >= st["saturation"]:
+        return 0.0, 0.0
+    k, share = st["gas_power"], x / st["saturation"]
+    size = st["gas"] / x if k == 1.0 else st["gas"] * x**-k
+    return size * (1.0 - share), size / x * (k + (1.0 - k) * share)
+
+
+@part
+def mixture_volume(st, p):
+    """(rho_ref / rho, its fall with pressure [1/Pa])."""
+    outside()
+    size, fall = free_gas(st, p - st["floor"])
+    return 1.0 - (p - st["reference"]) / st["beta"] + size, 1.0 / st["beta"] + fall
+
+
+@part
+def gas_work(st, x):
+    """Integral of the volume of free gas over pressure [Pa], but for a constant."""
+    k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
+    if k == 1.0:
+        return st["gas"] * (log(at) - at / s)
+    return st["gas"] * at ** (1.0 - k) * (1.0 / (1.0 - k) - at / s / (2.0 - k))
+
+
+@part
+def mixture_enthalpy(st, p):
+    """h = integral of dp / rho from the reference pressure [J/kg]."""
+    outside()
+    dp, floor = p - st["reference"], st["floor"]
+    gas = gas_work(st, p - floor) - gas_work(st, st["reference"] - floor)
+    return (dp * (1.0 - 0.5 * dp / st["beta"]) + gas) / st["rho"]
+
+
+@part
+def mixture_pressure_of_enthalpy(st, h):
+    """Pressure [Pa] at which `mixture_enthalpy` is h, by Newton on p, or on ln x where that would pass the floor."""
+    outside()
+    floor, beta = st["floor"], st["beta"]
+    lift = h * st["rho"]
+    x = st["reference"] - floor
+    if lift > 0.0:
+        x += 2.0 * lift / (1.0 + sqrt(max(0.0, 1.0 - 2.0 * lift / beta)))
+    for _ in range(100):
+        p = x + floor
+        step = (mixture_enthalpy(st, p) - h) * st["rho"] / mixture_volume(st, p)[0]
+        x = x - step if step < 0.8 * x else x * exp(max(-step / x, -700.0))
+        if abs(step) <= 1e-15 * abs(p) or abs(step) <= 1e-14 * x:
+            break
+    return x + floor
+
+
+@inner
+def gas_root(st, compliance, share, slope, rest):
+    """x where share (1 - dp / beta + slope / x + rest) = 1 + compliance dp, a quadratic with one positive root [Pa]."""
+    low = st["reference"] - st["floor"]
+    a = compliance + share / st["beta"]
+    b = 1.0 - compliance * low - share * (1.0 + low / st["beta"] + rest)
+    root = sqrt(b * b + 4.0 * a * share * slope)
+    return 0.5 * (root - b) / a if b < 0.0 else 2.0 * share * slope / (b + root)
+
+
+@part
+def mixture_pressure(st, compliance, share):
+    """Pressure [Pa] of a pipe that holds `share` times rho_ref A_ref [-]; compliance 0 for a vessel.
+
+    Where the gas is not isothermal, its tangent in 1 / x stands for it, until the root stays: the gas is concave there.
+    """
+    outside()
+    floor, gas, saturation = st["floor"], st["gas"], st["saturation"]
+    x = gas_root(st, compliance, share, gas, -gas / saturation) if st["gas_power"] == 1.0 else saturation
+    if x >= saturation and saturation < 1e300:
+        x = gas_root(st, compliance, share, 0.0, 0.0)
+        if x >= saturation:
+            return x + floor
+    if st["gas_power"] == 1.0:
+        return x + floor
+    x = min(st["reference"] - floor, saturation)
+    for _ in range(60):
+        size, fall = free_gas(st, min(x, saturation * (1.0 - 1e-15)))
+        before, slope = x, fall * x * x
+        x = min(gas_root(st, compliance, share, slope, size - slope / x), saturation)
+        if abs(x - before) <= 1e-15 * (x + 1.0 / (share * (1.0 / st["beta"] + fall))):  # what rounding leaves
+            break
+    return x + floor
+
+
+@inner
+def wall_stretch(st, compliance, p):
+    """A / A_ref of a pipe at a pressure."""
+    return 1.0 + compliance * (p - st["reference"])
+
+
+@part
+def mixture_mass(st, pipe, p):
+    """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    outside()
+    size, fall = mixture_volume(st, p)
+    stretch = wall_stretch(st, pipe["compliance"], p)
+    m = st["rho"] * pipe["area"] * stretch / size
+    return m, m * (fall / size + pipe["compliance"] / stretch)
+
+
+@part
+def mixture_impedance(st, compliance, p):
+    """rho c = sqrt(rho / (d ln rho / dp + d ln A / dp)) of a pipe at a pressure [kg/m2/s]."""
+    outside()
+    size, fall = mixture_volume(st, p)
+    return sqrt(st["rho"] / (fall + size * compliance / wall_stretch(st, compliance, p)))
+
+
+# Places in (0, 1) and shares of Gauss' eight points, the upper four; the others lie opposite (Abramowitz, Stegun 25.4).
+PLACES = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
+SHARES = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763)
+
+
+@part
+def velocity_panel(st, compliance, p_from, p_to):
+    """Integral of dp / (rho c) [m/s] between two pressures whose gas pressures differ by a factor of two at most."""
+    middle, half, total = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from), 0.0
+    for i in range(4):
+        far = PLACES[i] * half
+        high, low = mixture_impedance(st, compliance, middle + far), mixture_impedance(st, compliance, middle - far)
+        total += SHARES[i] * (1.0 / high + 1.0 / low)
+    return half * total
+
+
+@part
+def mixture_velocity_change(st, compliance, p_from, p_to):
+    """Integral of dp / (rho c) [m/s], in panels that end where all gas is dissolved; one ratio of 2 a panel."""
+    outside()
+    low, high = min(p_from, p_to), max(p_from, p_to)
+    sign = 1.0 if p_to >= p_from else -1.0
+    floor, total = st["floor"], 0.0
+    for _ in range(200):
+        x = low - floor
+        end = min(high, floor + 2.0 * x)
+        if x < st["saturation"]:
+            end = min(end, floor + st["saturation"])
+        else:
+            end = high
+        total += velocity_panel(st, compliance, low, end)
+        low = end
+        if low >= high:
+            break
+    return sign * total

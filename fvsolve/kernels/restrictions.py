@@ -1,0 +1,139 @@
+"""What restrictions carry now: their conductances, and a Newton step of each law. Knows the tables; closes no node."""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.curves import curve_step
+from fvsolve.kernels.density import density, enthalpy
+from fvsolve.kernels.emitters import emitter_slope, emitter_step
+from fvsolve.kernels.records import (
+    CURVE,
+    I_ARMED,
+    I_DEVICES,
+    I_FLOATS,
+    I_LAYOUT,
+    I_NODES,
+    I_SETTINGS,
+    I_VALVES,
+    LAW_LINEAR,
+    LIFT,
+    POWER,
+    TWO_WAY,
+)
+from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, valve_conductance, valve_step
+
+
+@njit(forceinline=True)
+def open_scheduled(t, out, tables):
+    """Conductances of the restrictions that no device opens and shuts, into out[conductance]."""
+    valves, at = tables[I_VALVES], tables[I_LAYOUT][0]["conductance"]
+    for k in range(valves.size):
+        if valves[k]["device"] < 0:
+            out[at + k] = valve_conductance(tables, k, t)
+
+
+@njit(forceinline=True)
+def conductance(tables, out, k):
+    """Conductance of restriction k now, 0 where it is shut [kg2/s2/Pa]."""
+    return out[tables[I_LAYOUT][0]["conductance"] + k]
+
+
+@njit
+def conductance_at(t, tables, out, k):
+    """The same at another time near by; what a device does is not foreseen."""
+    return valve_conductance(tables, k, t) if tables[I_VALVES][k]["device"] < 0 else conductance(tables, out, k)
+
+
+@njit
+def restriction_step(tables, out, k, g, m, drop):
+    """a, s with dM = a + s d(drop) for the next Newton step of restriction k, which carries m [kg/s] at a drop [Pa].
+
+    g : its conductance now, above zero.
+    """
+    valve = tables[I_VALVES][k]
+    if valve["law"] == POWER:
+        return emitter_step(tables[I_FLOATS], valve["data"], g, m, drop)
+    if valve["law"] == CURVE:
+        rho = tables[I_SETTINGS][0]["rho"]
+        return pump_step(tables, out, k, rho, g, m, drop)
+    if valve["law"] == LIFT and is_lifting(tables, k):
+        return lifting_step(tables, out, k, flow_at_drop(g, valve["transition"], drop), g, m)
+    if valve["law"] == TWO_WAY and drop < 0.0:
+        g *= valve["back"]
+    return valve_step(g, valve["transition"], m, drop)
+
+
+@njit
+def pump_step(tables, out, k, rho, g, m, drop):
+    """The same of a pump whose fluid has the density rho [kg/m3]."""
+    at, speed = tables[I_VALVES][k]["data"], out[tables[I_LAYOUT][0]["drive"] + k]
+    return curve_step(tables[I_FLOATS], at, speed, rho, rho * tables[I_SETTINGS][0]["gravity"], g, m, drop)
+
+
+@njit
+def head_drop(tables, out, k):
+    """(density at its `from` end [kg/m3], that times what heads fall by along restriction k [J/kg]): [Pa] as a drop."""
+    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
+    valve = tables[I_VALVES][k]
+    i, j = valve["from_node"], valve["to_node"]
+    p_i, p_j = out[layout["pressure"] + i], out[layout["pressure"] + j]
+    if st["law"] == LAW_LINEAR:
+        return st["rho"], valve["drop"] + (p_i - p_j)
+    p_i, p_j = p_i + nodes[i]["pressure"], p_j + nodes[j]["pressure"]
+    rise = st["gravity"] * (nodes[j]["elevation"] - nodes[i]["elevation"])
+    rho = density(st, floats, p_i)
+    return rho, rho * (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j) - rise)
+
+
+@njit
+def restriction_slope(tables, out, k, drop):
+    """d flow / d drop of restriction k at a drop [kg/s/Pa]."""
+    valve, g = tables[I_VALVES][k], conductance(tables, out, k)
+    if valve["law"] == POWER:
+        return emitter_slope(tables[I_FLOATS], valve["data"], g, drop)
+    if valve["law"] == CURVE:
+        m = out[tables[I_LAYOUT][0]["valve"] + k]
+        return pump_step(tables, out, k, tables[I_SETTINGS][0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
+    if valve["law"] == LIFT and is_lifting(tables, k):
+        x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, valve["transition"], drop)
+        return x * flow_slope(g, valve["transition"], drop) + lifting_slope(tables, k, full)
+    if valve["law"] == TWO_WAY and drop < 0.0:
+        g *= valve["back"]
+    return flow_slope(g, valve["transition"], drop)
+
+
+@njit
+def is_lifting(tables, k):
+    """Whether a valve that the pressure before it lifts is between shut and fully open."""
+    armed, at = tables[I_ARMED], tables[I_DEVICES][tables[I_VALVES][k]["device"]]["event"]
+    return armed[at] == 0.0 and armed[at + 2] == 0.0
+
+
+@njit
+def pressure_lift(tables, out, k):
+    """Lift x of such a valve, linear in the pressure before it and not held between 0 and 1."""
+    floats, valve = tables[I_FLOATS], tables[I_VALVES][k]
+    change = out[tables[I_LAYOUT][0]["pressure"] + valve["from_node"]]
+    return floats[valve["data"]] + change / floats[valve["data"] + 1]
+
+
+@njit
+def lifting_step(tables, out, k, full, g, m):
+    """a, s of the flow x `full` of a lifting valve; `full` is that at full opening [kg/s]."""
+    x = pressure_lift(tables, out, k)
+    return x * full - m, 0.5 * max(x, 0.0) * g / max(abs(full), LEAST * sqrt(g))
+
+
+@njit
+def lifting_slope(tables, k, full):
+    """What the pressure before a lifting valve adds to its flow by its lift [kg/s/Pa]."""
+    return max(full, 0.0) / tables[I_FLOATS][tables[I_VALVES][k]["data"] + 1]
+
+
+@njit
+def restriction_lift(tables, out, k, g, drop):
+    """The same of restriction k at a drop; none of other laws. A Newton step adds it times the change before it."""
+    valve = tables[I_VALVES][k]
+    if valve["law"] != LIFT or not is_lifting(tables, k):
+        return 0.0
+    return lifting_slope(tables, k, flow_at_drop(g, valve["transition"], drop))

@@ -1,0 +1,37 @@
+"""Unsteady friction under the density laws log and table. Knows what a changing density makes of the flow.
+
+What remembers is the velocity: u = (rho A)_ref M / m, so that v times the drag is a rate of storage and a loss.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.pipes import GAUSS
+from fvsolve.kernels.records import I_FLOATS, I_PIPES, I_PROFILE, I_SCRATCH, I_SETTINGS
+from fvsolve.kernels.unsteady.memory import follow_all, take_off
+
+
+@njit
+def velocity_change(pipe, profile, reference, r, l, change):
+    """change = deviation of reference M / m from the profile's [kg/s], averaged over cells by two Gauss points."""
+    n, c, flow = r.size, pipe["speed"], pipe["flow"]
+    for i in range(n):
+        low, high = max(i - 1, 0), min(i + 1, n - 1)
+        lean = GAUSS / max(high - low, 1)
+        m0, dm, dflow = profile[pipe["center"] + i], (r[i] + l[i]) / c, r[i] - l[i]
+        a = lean * ((r[high] - l[high]) - (r[low] - l[low]))
+        b = lean * ((r[high] + l[high]) - (r[low] + l[low])) / c
+        u = (flow + (dflow + a)) / (m0 + (dm + b)) + (flow + (dflow - a)) / (m0 + (dm - b))
+        change[i] = reference * (0.5 * u - flow / m0)
+
+
+@njit
+def remember_barotropic(y, dydt, tables):
+    """Unsteady friction of all pipes, added to rates, where there are any."""
+    pipes, floats, scratch = tables[I_PIPES], tables[I_FLOATS], tables[I_SCRATCH]
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        if pipe["terms"] > 0 and dydt.size > 0:
+            n, o, reference = pipe["cells"], pipe["y"], tables[I_SETTINGS][0]["rho"] * pipe["area"]
+            change, pull = scratch[:n], scratch[n : 2 * n]
+            velocity_change(pipe, tables[I_PROFILE], reference, y[o : o + n], y[o + n : o + 2 * n], change)
+            follow_all(pipe, floats, change, y, dydt, pull)
+            take_off(pull, dydt[o : o + n], dydt[o + n : o + 2 * n])

@@ -1,0 +1,89 @@
+"""Power and stored energy of what unsteady friction remembers, added to those of its pipe. Knows the tables.
+
+A term of gain g and rate n that follows the flow M as z stores g z^2 / (2 n) and takes g (M - z)^2, both over rho A and
+per length; together they are M times its drag. Rows as in `energy.py`: `friction` and `rate` of a pipe, and its
+kinetic energy. Under the laws log and table M is rho A times the velocity at the reference density.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.energy import NODE, PIPE, SHARES, at_point, width_of
+from fvsolve.kernels.records import I_FLOATS, I_NODES, I_PIPES, I_PROFILE, I_SCRATCH, I_SETTINGS, LAW_LINEAR
+from fvsolve.kernels.unsteady.barotropic import velocity_change
+from fvsolve.kernels.unsteady.memory import difference
+
+
+@njit
+def followed(y, pipe, tables, change):
+    """Fill `change` with what the terms of a pipe follow, cell by cell: deviation from the profile's flow [kg/s]."""
+    st, n, o = tables[I_SETTINGS][0], pipe["cells"], pipe["y"]
+    r, l = y[o : o + n], y[o + n : o + 2 * n]
+    if st["law"] == LAW_LINEAR:
+        difference(r, l, change)
+    else:
+        velocity_change(pipe, tables[I_PROFILE], st["rho"] * pipe["area"], r, l, change)
+
+
+@njit(forceinline=True)
+def begun(st, profile, pipe, i):
+    """What the terms follow in cell i of the profile [kg/s]."""
+    if st["law"] == LAW_LINEAR:
+        return pipe["flow"]
+    return pipe["flow"] * (st["rho"] * pipe["area"] / profile[pipe["center"] + i])
+
+
+@njit
+def memory_power(st, floats, profile, pipe, change, y, dydt):
+    """(power taken, rate of storage) of all terms of a pipe [W]."""
+    n, width = change.size, width_of(st, change.size)
+    taken, rate = 0.0, 0.0
+    for k in range(pipe["terms"]):
+        gain, at = floats[pipe["term"] + 2 * k], pipe["memory"] + k * n
+        share = gain / floats[pipe["term"] + 2 * k + 1]
+        z, dz = y[at : at + n], dydt[at : at + n]
+        for i in range(n):
+            start = begun(st, profile, pipe, i)
+            for g in range(3):
+                here = at_point(z, width, i, g)
+                lag = at_point(change, width, i, g) - here
+                taken += SHARES[g] * gain * lag * lag
+                rate += SHARES[g] * share * (start + here) * at_point(dz, width, i, g)
+    per = pipe["dx"] / (st["rho"] * pipe["area"])
+    return per * taken, per * rate
+
+
+@njit
+def memory_energy(st, floats, profile, pipe, y):
+    """Change of what all terms of a pipe store since the profile [J]."""
+    n, width, total = pipe["cells"], width_of(st, pipe["cells"]), 0.0
+    for k in range(pipe["terms"]):
+        at = pipe["memory"] + k * n
+        share = floats[pipe["term"] + 2 * k] / floats[pipe["term"] + 2 * k + 1]
+        for i in range(n):
+            start = begun(st, profile, pipe, i)
+            for g in range(3):
+                z = at_point(y[at : at + n], width, i, g)
+                total += SHARES[g] * share * z * (2.0 * start + z)
+    return 0.5 * total * pipe["dx"] / (st["rho"] * pipe["area"])
+
+
+@njit
+def add_power(y, dydt, tables, power):
+    """What all pipes remember, into their rows of power."""
+    st, pipes, at = tables[I_SETTINGS][0], tables[I_PIPES], NODE * tables[I_NODES].size
+    for i in range(pipes.size):
+        if pipes[i]["terms"] > 0:
+            change = tables[I_SCRATCH][: pipes[i]["cells"]]
+            followed(y, pipes[i], tables, change)
+            taken, rate = memory_power(st, tables[I_FLOATS], tables[I_PROFILE], pipes[i], change, y, dydt)
+            power[at + 1] += taken
+            power[at + 3] += rate
+        at += PIPE
+
+
+@njit
+def add_stored(y, tables, stored):
+    """What all pipes remember, into their rows of stored energy."""
+    st, pipes, nodes = tables[I_SETTINGS][0], tables[I_PIPES], tables[I_NODES]
+    for i in range(pipes.size):
+        if pipes[i]["terms"] > 0:
+            stored[nodes.size + 2 * i] += memory_energy(st, tables[I_FLOATS], tables[I_PROFILE], pipes[i], y)

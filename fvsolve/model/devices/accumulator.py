@@ -1,0 +1,76 @@
+"""Accumulators in the tables of a scene."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices import accumulator as law
+from fvsolve.kernels.devices.codes import ACCUMULATOR
+from fvsolve.model.devices.device import Device
+
+NECK = 0.01  # share of its volume that is fluid in the neck of a bladder accumulator
+
+
+class Accumulator(Device, kind="accumulator"):
+    """A vessel whose pressure is that of its gas."""
+
+    code = ACCUMULATOR
+    vessel = True
+    quantities = ("gas_volume", "gas_pressure")
+    events = ("is empty", "holds fluid again")
+
+    def place(self, scene, name, node, row) -> None:
+        row["y"] = scene.states([f"{name}.mass"], 0.1 * scene.fluid.density * node.volume)
+
+    def numbers(self, scene, name, part) -> list[float]:
+        return [0.0] * law.NUMBERS
+
+    def begin(self, start, part, row) -> list[str]:
+        scene, fluid = start.scene, start.scene.fluid
+        node = scene.node_table[row["node"]]
+        p, dense = float(node["pressure"]), self.density(start)
+        neck = NECK * part.volume if part.precharge is not None else 0.0
+        first = part.precharge if part.precharge is not None else p
+        gas = part.gas_volume or part.volume * min(1.0, (first / p) ** (1.0 / part.exponent))
+        room = part.volume + neck
+        mass = dense(p) * (room - gas)
+        shed = (first if neck else p * (gas / part.volume) ** part.exponent) - p
+        stiff = fluid.bulk_modulus / (fluid.density * neck) if neck else 0.0
+        empty = dense(p + shed) * neck - mass
+        if fluid.law == "linear":
+            empty = shed / stiff if neck and shed > 0.0 else -fluid.density * (part.volume - gas)
+        floats = scene.tables[rec.I_FLOATS]
+        floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, room, stiff, empty, shed]
+        node["mass"] = mass
+        node["stiffness"] = stiff if shed > 0.0 and neck else part.exponent * p / (fluid.density * gas)
+        if neck and shed >= 0.0:
+            name = list(scene.case.places)[row["node"]].removesuffix(".inside")
+            scene.warnings.append(f"{name}: empty at the start, where its precharge, {first:.6g} Pa, is not below "
+                                  f"the pressure, {p:.6g} Pa")  # fmt: skip
+        return []
+
+    def above(self, model, part, row) -> float:
+        """Over the state in which it could give no more: P = 0, or no fluid left."""
+        from fvsolve.kernels.devices.accumulator_energy import accumulator_energy
+        from fvsolve.kernels.energy_barotropic import head_at
+
+        st, floats = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS]
+        node, at = model.tables[rec.I_NODES][row["node"]], int(row["data"])
+
+        def head(y: float) -> float:
+            return head_at(st, floats, node, float(node["pressure"] + law.gas_and_pressure(st, floats, node, at, y)[1]))
+
+        low = float(floats[at + law.EMPTY]) if not floats[at + law.NECK] else -0.999 * float(node["mass"])
+        high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS])
+        if head(low) < 0.0:
+            for _ in range(200):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if head(middle) < 0.0 else (low, middle)
+        return -float(accumulator_energy(st, floats, node, at, low))
+
+    def density(self, start):
+        """rho(p) [kg/m3] of the case's law."""
+        if start.scene.fluid.law == "linear":
+            return lambda p: start.scene.fluid.density
+        from fvsolve.kernels.density import density
+
+        return lambda p: density(start.st, start.floats, float(p))

@@ -1,0 +1,61 @@
+"""Air valves in the tables of a scene."""
+
+from __future__ import annotations
+
+import math
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices import air_valve as law
+from fvsolve.kernels.devices.codes import AIR_VALVE
+from fvsolve.model.devices.device import Device
+
+GAS_CONSTANT = 287.05  # of air [J/kg/K]
+
+
+class AirValve(Device, kind="air-valve"):
+    """The chamber of one; it is shut at the start."""
+
+    code = AIR_VALVE
+    vessel = True
+    states = ("air",)
+    quantities = ("air_volume", "air_mass", "air_pressure")
+    events = ("opens", "shuts")
+
+    def place(self, scene, name, node, row) -> None:
+        row["density"] = scene.law.tank_density
+        row["y"] = scene.states([f"{name}.mass"], row["density"] * node.volume)
+
+    def gate(self, name: str) -> str:
+        return name.removesuffix(".inside") + ".connection"
+
+    def numbers(self, scene, name, part) -> list[float]:
+        heat = GAS_CONSTANT * part.temperature
+        held = scene.case.ambient_pressure * part.volume / heat
+        ways = [part.discharge_coefficient * math.pi / 4.0 * d**2 for d in (part.inlet, part.outlet)]
+        return [part.volume, held, heat, *ways]
+
+    def scales(self, scene, name, part) -> list[float]:
+        return [self.numbers(scene, name, part)[law.AIR]]
+
+    def revise(self, start, part, row) -> bool:
+        k = int(row["valve"])
+        new = k not in start.shut
+        start.shut |= {k}
+        return new
+
+    def begin(self, start, part, row) -> list[str]:
+        nodes = start.nodes
+        node, place = nodes[row["node"]], nodes[start.valves[row["valve"]]["from_node"]]
+        node["pressure"], node["mass"] = start.case.ambient_pressure, 0.0
+        node["stiffness"] = start.case.ambient_pressure / (part.volume * node["density"])
+        short = start.case.ambient_pressure - float(place["pressure"])
+        name = list(start.case.places)[row["node"]].removesuffix(".inside")
+        return [f"air valve {name}: {short:.4g} Pa below ambient, so it opens"] if short > law.RELUCTANCE else []
+
+    def squares(self, model, part, row, y, out):
+        """R T / (2 m) (dm + m / (V rho) dy)^2 : what changes its pressure, in air or in fluid."""
+        st, floats, node = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS], model.tables[rec.I_NODES]
+        node, at = node[row["node"]], int(row["data"])
+        _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
+        root = math.sqrt(floats[at + law.HEAT] / (2.0 * mass))
+        return [{int(row["y"]): root, int(node["y"]): root * mass / (volume * float(node["density"]))}]

@@ -1,0 +1,123 @@
+"""How parts with a law of their own become rows of tables. Knows scenes while they are built; knows no rhs."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+
+class Device:
+    """Parts of one kind: their rows, their numbers, how they start, what their events mean.
+
+    code : of their law in kernels.devices; states : names of what each holds
+    quantities : probes, in the order in which `device_value` numbers them
+    events : what it means that each event function falls to zero
+    """
+
+    kinds: ClassVar[dict[str, Device]] = {}
+    code: ClassVar[int]
+    states: ClassVar[tuple[str, ...]] = ()
+    quantities: ClassVar[tuple[str, ...]] = ()
+    events: ClassVar[tuple[str, ...]] = ()
+    vessel: ClassVar[bool] = False  # a place whose pressure it computes
+
+    def __init_subclass__(cls, kind: str) -> None:
+        if kind:
+            Device.kinds[kind] = cls()
+
+    def of(self, part: Any) -> Device:
+        """What lowers this part: itself, but where its keys ask for other states."""
+        return self
+
+    def restriction(self, scene, name: str, link: Any, row) -> None:
+        """Fill the VALVE row of a link."""
+        scene.restriction(name, link, row)
+
+    def place(self, scene, name: str, node: Any, row) -> None:
+        """Fill the NODE row of a vessel."""
+
+    def gate(self, name: str) -> str | None:
+        """The link that a vessel opens and shuts beside."""
+        return None
+
+    def numbers(self, scene, name: str, part: Any) -> list[float]:
+        """Its numbers, in the order in which its kernel reads them; those of the start come with `begin`."""
+        return []
+
+    def states_of(self, scene, name: str, part: Any) -> tuple[str, ...]:
+        """Names of what one holds."""
+        return self.states
+
+    def scales(self, scene, name: str, part: Any) -> list[float]:
+        """What counts as a small deviation of each of its states."""
+        return []
+
+    def edge(self, start, k: int):
+        """Its edge in the steady problem, k its VALVE row; None for that of a valve, open as `start.shut` has it."""
+        return None
+
+    def revise(self, start, part: Any, row) -> bool:
+        """Whether a steady solution asks for another state of it, which is then set."""
+        return False
+
+    def begin(self, start, part: Any, row) -> list[str]:
+        """Fill in what depends on the profile; returns what moves, in words."""
+        return []
+
+    def resists(self, part: Any) -> bool:
+        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
+        return True
+
+    def settle(self, armed: np.ndarray, row, y: np.ndarray) -> None:
+        """Put into y what an event of its own, which has just happened, does at once."""
+
+    def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
+        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.
+
+        Of a vessel, m^2 dp/dm / (2 rho) of its mass; nothing of others.
+        """
+        if not self.vessel:
+            return []
+        node = model.tables[rec.I_NODES][row["node"]]
+        stiffness = float(out[model.layout["stiffness"] + node["row"]])
+        return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
+
+    def above(self, model, part: Any, row) -> float:
+        """Energy that it holds at the start above the least it can hold [J]."""
+        return 0.0
+
+
+def lower_devices(scene) -> None:
+    """Fill the table of devices of a scene, with their states, numbers and event functions."""
+    scene.devices = [(name, part, Device.kinds[part.kind].of(part)) for name, part in parts_of(scene.case)]
+    table = scene.device_table = np.zeros(len(scene.devices), rec.DEVICE)
+    table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
+    scene.events = []
+    for k, ((name, part, device), row) in enumerate(zip(scene.devices, table, strict=True)):
+        states = device.states_of(scene, name, part)
+        row["kind"], row["states"] = device.code, len(states)
+        if name in scene.valve_names:
+            row["valve"] = scene.valve_names.index(name)
+            scene.valve_table["device"][row["valve"]] = k
+        elif name in scene.node_index:
+            row["node"] = scene.node_index[name]
+            row["row"] = scene.node_table[row["node"]]["row"]
+        if (gate := device.gate(name)) is not None:
+            row["valve"] = scene.valve_names.index(gate)
+            scene.valve_table["device"][row["valve"]] = k
+        row["data"] = len(scene.floats)
+        scene.floats += device.numbers(scene, name, part)
+        for state, scale in zip(states, device.scales(scene, name, part), strict=True):
+            at = scene.states([f"{name}.{state}"], scale)
+            row["y"] = at if row["y"] < 0 else row["y"]
+        row["event"] = 2 * scene.tanks + len(scene.events)
+        scene.events += [(name.removesuffix(".inside"), text) for text in device.events]
+
+
+def parts_of(case) -> list[tuple[str, Any]]:
+    """Parts of a case that are devices, places first."""
+    parts = [*case.places.items(), *case.conduits.items()]
+    return [(name, part) for name, part in parts if part.kind in Device.kinds]

@@ -1,0 +1,197 @@
+"""Valves whose disc is lifted by a pressure in the tables of a scene, and how they stand in its steady state."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
+from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope
+from fvsolve.model.devices.device import Device
+from fvsolve.model.devices.regulator import opening_of
+from fvsolve.steady import Edge
+
+LIFTING, OPEN = "lifting", "open"  # in `start.shut`, shut
+SMALL_LIFT = 1e-9  # of a lift, what is rounding
+STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat")
+
+
+class Lifting(Device, kind=""):
+    """Shut, fully open, or lifted between; with a disc that takes its time its lift is a state."""
+
+    quantities = ("opening",)
+    events = STOPS
+
+    def numbers(self, scene, name, part) -> list[float]:
+        """At the start: lift, where the pressures draw it, what it feels; then its span, and how its disc moves."""
+        frequency = part.natural_frequency or 0.0
+        return [0.0, 0.0, 0.0, part.overpressure, part.time_constant or 0.0, 2.0 * math.pi * frequency,
+                part.damping_ratio or 0.0]  # fmt: skip
+
+    def scales(self, scene, name, part) -> list[float]:
+        return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
+
+    def settle(self, armed, row, y: np.ndarray) -> None:
+        if row["states"] == 2 and (armed[row["event"]] > 0.0 or armed[row["event"] + 2] > 0.0):
+            y[row["y"] + 1] = 0.0
+
+    def part(self, start, k: int):
+        return start.scene.devices[start.valves[k]["device"]][1]
+
+    def felt(self, start, k: int) -> float:
+        """What lifts it beyond its first opening, in the solution just found [Pa]."""
+        raise NotImplementedError
+
+    def edge(self, start, k):
+        if start.rest:
+            start.shut.add(k)
+        if k in start.shut or start.modes.setdefault(k, LIFTING) == OPEN:
+            return None
+        i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
+        return Edge(i, j, self.row(start, k), 0.0, senses=i)
+
+    def law(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
+        """(flow, its slope over the drop at this lift, its slope over the lift)."""
+        g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
+        transition = float(start.valves[k]["transition"])
+        full, x = flow_at_drop(g, transition, drop), max(lift, 0.0)
+        steep = flow_slope(g, transition, drop) if transition > 0.0 else 0.5 * g / max(abs(full), LEAST * math.sqrt(g))
+        return x * full, x * steep, max(full, 0.0)
+
+    def revise(self, start, part, row) -> bool:
+        k = int(row["valve"])
+        if start.rest:
+            return False
+        before = "shut" if k in start.shut else start.modes[k]
+        x, flow = self.felt(start, k) / part.overpressure, float(start.valve_flows()[k])
+        after = self.next(x, flow < -SMALL_LIFT * start.flow_scale, before)
+        start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
+        start.modes[k] = LIFTING if after == "shut" else after
+        return after != before
+
+    def next(self, x: float, back: bool, now: str) -> str:
+        """As what it should stand in the next solution."""
+        if now == "shut":
+            return LIFTING if x > SMALL_LIFT else now
+        if x < -SMALL_LIFT:
+            return "shut"
+        return OPEN if now == LIFTING and x > 1.0 else LIFTING if now == OPEN and x < 1.0 - SMALL_LIFT else now
+
+    def begin(self, start, part, row) -> list[str]:
+        k = int(row["valve"])
+        valve, name = start.valves[k], start.scene.valve_names[k]
+        lifts = k not in start.shut and start.modes[k] == LIFTING
+        x = 0.0 if k in start.shut else opening_of(start, k) if lifts else 1.0
+        self.fill(start, row, x, x if lifts else self.felt(start, k) / part.overpressure)
+        valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
+        if self.states and x > 0.0 and valve["transition"] == 0.0:
+            valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
+        start.scene.tables[rec.I_FLOATS][row["data"] + 2] = start.law_of(k)[1]
+        self.tell(start, name, x)
+        target = self.felt(start, k) / part.overpressure
+        return [f"{name}: shut, though the pressure lifts it"] if start.rest and target > SMALL_LIFT else []
+
+    def fill(self, start, row, x: float, target: float) -> None:
+        """Its lift at the start, and where the pressures draw it."""
+        start.scene.tables[rec.I_FLOATS][row["data"] : row["data"] + 2] = x, target
+
+    def tell(self, start, name: str, x: float) -> None:
+        """What its user may not expect."""
+
+
+class ReliefDisc(Lifting, kind=""):
+    """A relief valve whose disc takes its time."""
+
+    code = RELIEF_DISC
+
+    def felt(self, start, k):
+        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
+        return start.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
+
+    def row(self, start, k: int):
+        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
+        z = float(start.nodes["elevation"][i])
+
+        def newton(flow, drop, potential):
+            x = (start.pressure_of(potential, z) - part.set_pressure) / part.overpressure
+            asked, slope, rise = self.law(start, k, drop, x)
+            rise /= part.overpressure
+            size = max(slope + rise, 1e-12 * start.flow_scale)
+            return 1.0 / size, slope / size, (asked - flow) / size, rise / size
+
+        return newton
+
+    def tell(self, start, name, x):
+        if x > 0.0:
+            start.scene.warnings.append(f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1")
+
+
+class ReliefSwing(ReliefDisc, kind=""):
+    """The same with inertia."""
+
+    states = ("opening", "speed")
+
+
+class ReliefLag(ReliefDisc, kind=""):
+    """The same without."""
+
+    states = ("opening",)
+
+
+class Relief(ReliefDisc, kind="relief-valve"):
+    """A relief valve that opens at once."""
+
+    code = RELIEF
+    events = ("is shut", "opens", "is fully open", "leaves full opening")
+
+    def of(self, part) -> Device:
+        return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
+
+    def restriction(self, scene, name, link, row) -> None:
+        scene.restriction(name, link, row)
+        row["law"] = rec.ROOT if link.moves else rec.LIFT
+
+    def numbers(self, scene, name, part) -> list[float]:
+        scene.valve_table["data"][scene.valve_names.index(name)] = len(scene.floats)
+        return [0.0, part.overpressure, 0.0]
+
+    def fill(self, start, row, x, target):
+        start.scene.tables[rec.I_FLOATS][row["data"]] = target
+
+
+class CheckDisc(Lifting, kind=""):
+    """A check valve whose disc takes its time."""
+
+    code = CHECK_DISC
+
+    def felt(self, start, k):
+        before, behind = start.across(k)
+        return (before - behind) * start.ratio.get(k, 1.0) - self.part(start, k).cracking_pressure
+
+    def row(self, start, k: int):
+        part, ratio = self.part(start, k), start.ratio.get(k, 1.0)
+
+        def newton(flow, drop, potential):
+            asked, slope, rise = self.law(start, k, drop, (drop * ratio - part.cracking_pressure) / part.overpressure)
+            slope += rise * ratio / part.overpressure
+            size = max(slope, 1e-12 * start.flow_scale)
+            return 1.0 / size, slope / size, (asked - flow) / size, 0.0
+
+        return newton
+
+    def next(self, x, back, now):
+        return "shut" if back and now != "shut" else super().next(x, back, now)
+
+
+class CheckSwing(CheckDisc, kind=""):
+    """The same with inertia."""
+
+    states = ("opening", "speed")
+
+
+class CheckLag(CheckDisc, kind=""):
+    """The same without."""
+
+    states = ("opening",)

@@ -1,0 +1,163 @@
+"""Pumps in the tables of a scene, and how they start. Knows one pump at a time; the curve's numbers are its own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.kernels import curves
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices import pump as law
+from fvsolve.kernels.devices.codes import PUMP
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.model.devices.device import Device
+from fvsolve.model.head_curves import curve_numbers, rated_point, shaft_points
+from fvsolve.parts import Schedule
+from fvsolve.steady import Edge
+
+SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding
+SMALL_SPEED = 0.01  # what counts as a small change of relative speed
+SNAP = 1e-12  # share of the torques on a shaft below which their sum is rounding
+
+
+class Pump(Device, kind="pump"):
+    """A restriction of law CURVE; its steady state is that in which no flow passes its check valve backwards."""
+
+    code = PUMP
+    quantities = ("head", "speed", "torque", "power")
+    events = ("check valve shuts", "check valve opens")
+
+    def states_of(self, scene, name, part) -> tuple[str, ...]:
+        return ("speed",) if part.trip is not None or torques_on(scene.case, name) else ()
+
+    def scales(self, scene, name, part) -> list[float]:
+        return [SMALL_SPEED for _ in self.states_of(scene, name, part)]
+
+    def restriction(self, scene, name, link, row) -> None:
+        weight = scene.fluid.density * scene.case.gravity
+        flow, head = rated_point(link, weight)
+        row["law"], row["data"] = rec.CURVE, len(scene.floats)
+        scene.floats += curve_numbers(link, weight)
+        row["conductance"] = (scene.fluid.density * flow) ** 2 / (weight * head)
+
+    def numbers(self, scene, name, part) -> list[float]:
+        rated, torques = part.rated_speed or 1.0, torques_on(scene.case, name)
+        mode = law.TURNED if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
+        scene.device_table["schedule"][scene.device_names.index(name)] = scene.schedules.add(part.speed)
+        given = [x for torque in torques for x in (scene.schedules.add(torque.torque), 0.0)]
+        own = shaft_points(part, scene.fluid.density * scene.case.gravity)
+        numbers = {
+            law.MODE: mode, law.CHECK: part.check_valve, law.TRIP: self.trip(scene, name, part),
+            law.INERTIA: (part.inertia or np.inf) * rated, law.RATED: rated, law.COUNT_OR_TORQUE: own[0],
+            law.GIVEN: len(torques), law.KNOWN: self.resists(part),
+        }  # fmt: skip
+        return [float(numbers.get(k, 0.0)) for k in range(law.OWN_NUMBERS)] + given + own[1:]
+
+    def trip(self, scene, name, part) -> int:
+        """The schedule that is 0 before and 1 after the trip; its speed has a kink there and no jump."""
+        if part.trip is None:
+            return -1
+        kinks, start = dict(scene.schedules.breaks), scene.case.numerics.start
+        if part.trip < start:
+            scene.fault(f"links.{name}.trip", f"{part.trip:g} s lies before the start at {start:g} s")
+        made = scene.schedules.add(Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0)))
+        scene.schedules.breaks[part.trip] = kinks.get(part.trip, False)
+        return made
+
+    def resists(self, part) -> bool:
+        return not part.inertia is part.efficiency is part.shaft_power is part.suter is None
+
+    def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
+        return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
+
+    def above(self, model, part, row) -> float:
+        speed = float(model.tables[rec.I_VALVES][row["valve"]]["drive"])
+        return 0.5 * part.inertia * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
+
+    def speed_at(self, start, k: int) -> float:
+        """Relative speed at the start."""
+        row = start.scene.device_table[start.valves[k]["device"]]
+        return float(schedule_value(start.scene.tables, int(row["schedule"]), start.t))
+
+    def edge(self, start, k: int):
+        row = start.valves[k]
+        i, j = int(row["from_node"]), int(row["to_node"])
+        row["drive"] = speed = self.speed_at(start, k)
+        row["open"] = 0.0 if k in start.shut else row["conductance"]
+        if k in start.shut:
+            return Edge(i, j, None, 0.0, shut=True)
+        if start.rest:
+            row["open"] = 0.0
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        floats, at, g = start.scene.tables[rec.I_FLOATS], int(row["data"]), float(row["conductance"])
+        rho, gravity = start.density_at(i), start.case.gravity
+        ratio = rho / start.scene.fluid.density
+
+        def newton(flow, present):
+            a, s = curves.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
+            return 1.0 / s, ratio, a / s
+
+        first = rho * floats[at + curves.SCALE] * speed
+        return Edge(i, j, newton, float(first), drives=True)
+
+    def lift(self, start, row, flow: float) -> float:
+        """What a pump adds at a mass flow [Pa]."""
+        floats, rho = start.scene.tables[rec.I_FLOATS], start.density_at(int(row["from_node"]))
+        at, speed = int(row["data"]), float(row["drive"])
+        return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
+
+    def revise(self, start, part, row) -> bool:
+        k = int(row["valve"])
+        if not part.check_valve or start.rest:
+            return False
+        if k in start.shut:
+            high, low = start.across(k)
+            opens = bool(high + self.lift(start, start.valves[k], 0.0) > low + 1e-6)
+            start.shut -= {k} if opens else set()
+            return opens
+        shuts = bool(start.valve_flows()[k] < -SMALL_FLOW * start.flow_scale)
+        start.shut |= {k} if shuts else set()
+        return shuts
+
+    def begin(self, start, part, row) -> list[str]:
+        k, scene = int(row["valve"]), start.scene
+        valve, name, moving = start.valves[k], scene.valve_names[k], []
+        ratio = start.density_at(int(valve["from_node"])) / scene.fluid.density
+        if valve["open"] > 0.0:
+            drop = -self.lift(start, valve, float(valve["flow"]))
+            near = 1e-6 * (abs(drop) + abs(self.lift(start, valve, 0.0))) + 1e-3
+            if abs(drop - valve["drop"] * ratio) > near:
+                valve["open"] = 0.0
+            elif scene.case.fluid.law == "linear":
+                valve["drop"] = drop
+        if valve["open"] == 0.0 and k not in start.shut:
+            moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
+        return moving + self.let_go(start, part, row, valve)
+
+    def let_go(self, start, part, row, valve) -> list[str]:
+        """The speed from which a shaft runs free, and what does not hold it; returns what moves, in words."""
+        scene, floats, at = start.scene, start.scene.tables[rec.I_FLOATS], int(row["data"])
+        name, settings = scene.valve_names[row["valve"]], scene.tables[rec.I_SETTINGS][0]
+        if floats[at + law.MODE] == law.TRIPPING:
+            limit, settings["limit"] = float(settings["limit"]), part.trip
+            floats[at + law.HELD] = schedule_value(scene.tables, int(row["schedule"]), float(part.trip))
+            settings["limit"] = limit
+        if floats[at + law.MODE] != law.TURNED:
+            return []
+        rho = start.density_at(int(valve["from_node"]))
+        speed, flow, dense = float(valve["drive"]), float(valve["flow"]) / rho, rho / scene.fluid.density
+        taken = law.fluid_torque(floats, at, int(valve["data"]), speed, flow, dense)
+        first, total = at + law.OWN_NUMBERS, 0.0
+        for k in range(int(floats[at + law.GIVEN])):
+            value = schedule_value(scene.tables, int(floats[first + 2 * k]), start.t)
+            floats[first + 2 * k + 1], total = value, total + value
+        left = total - taken if abs(total - taken) > SNAP * (abs(total) + abs(taken)) else 0.0
+        floats[at + law.HELD], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, taken, left
+        rise = left / part.inertia
+        return [f"pump {name}: its shaft speeds up by {rise:.4g} rad/s2"] if left != 0.0 else []
+
+
+def torques_on(case, name: str) -> list:
+    """Torques given to the shaft of a pump."""
+    return [link for link in case.links.values() if link.kind == "torque" and link.to == f"{name}.shaft"]

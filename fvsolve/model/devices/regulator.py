@@ -1,0 +1,228 @@
+"""Valves that regulate by themselves in the tables of a scene, and how they stand in its steady state."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING, SUSTAINING
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.valves import flow_at_drop
+from fvsolve.model.devices.device import Device
+from fvsolve.steady import Edge
+
+SMALL_FLOW = 1e-9  # share of the flows of a scene below which one is rounding
+SMALL_PRESSURE = 1e-3  # likewise [Pa]
+OPEN, ACTIVE = "open", "active"  # as EPANET calls them; in `start.shut`, closed
+
+
+class Here(NamedTuple):
+    """One of them in a steady solution: potentials at its ends and as set [Pa], flow, its loss at full opening [Pa]."""
+
+    start: object
+    k: int
+    p_from: float
+    p_to: float
+    target: float
+    flow: float
+    loss: float
+
+    @property
+    def reversed(self) -> bool:
+        return self.flow < 0.0
+
+
+class Regulator(Device, kind=""):
+    """Active, it keeps what it senses as set; else it stands open or shut. Its stem is a state."""
+
+    states = ("opening",)
+    quantities = ("opening",)
+    events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
+              "leaves its seat")  # fmt: skip
+    key, end, verb = "set_pressure", "", ""  # what is set, at which end it is sensed, what it does
+
+    def numbers(self, scene, name, part) -> list[float]:
+        scale = 1.0 if self.end else scene.fluid.density
+        schedule = getattr(part, self.key)
+        row = scene.device_table[scene.device_names.index(name)]
+        row["schedule"] = scene.schedules.add(schedule, scale)
+        if self.end:
+            self.reach(scene, name, part)
+        band = part.band if self.end else schedule.first * scale
+        return [0.0, 0.0, 0.0, band, part.time_constant]
+
+    def reach(self, scene, name, part) -> None:
+        """A fault where no source can bring the pressure that is set."""
+        nodes, case = scene.case.nodes.values(), scene.case
+        if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
+            return  # pressure comes from elsewhere too
+        weight, place = scene.fluid.density * case.gravity, getattr(part, "to" if self.end == "to" else "from_")
+        best, source = max(head_of(case, weight, other) for other in case.nodes)
+        least = float(np.min(part.set_pressure.value))
+        head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
+        if head > best:
+            what = f"{least:.6g} Pa at {place} is a head of {head:.4g} m, above every source: {source} has {best:.4g} m"
+            scene.fault(f"links.{name}.set_pressure", f"{what}; it would never {self.verb}, set it lower")
+
+    def scales(self, scene, name, part) -> list[float]:
+        return [0.1]
+
+    def given(self, start, k: int) -> float:
+        """What is set at the start: a pressure [Pa], or a mass flow [kg/s]."""
+        row = start.scene.device_table[start.valves[k]["device"]]
+        return schedule_value(start.scene.tables, int(row["schedule"]), start.t)
+
+    def target(self, start, k: int) -> float:
+        """The same, of a pressure as a potential [Pa]."""
+        if not self.end:
+            return self.given(start, k)
+        return start.potential_of(self.given(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
+
+    def sensed(self, start, k: int) -> int:
+        return int(start.valves[k][f"{self.end}_node"])
+
+    def free(self, start, k: int) -> bool:
+        """Whether the flow through it can set what it senses."""
+        return not self.end or bool(np.isnan(start.held[self.sensed(start, k)]))
+
+    def mode(self, start, k: int) -> str:
+        return start.modes.setdefault(k, ACTIVE if self.free(start, k) else OPEN)
+
+    def edge(self, start, k):
+        if k in start.shut or self.mode(start, k) == OPEN:
+            return None
+        i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
+        goal = self.target(start, k)
+        if not self.end:
+            return Edge(i, j, None if start.rest else lambda flow, drop: (1.0, 0.0, goal - flow), drop=lambda flow: 0.0)
+        if start.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, holds=(self.sensed(start, k), goal))
+        return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, holds=(self.sensed(start, k), goal))
+
+    def revise(self, start, part, row) -> bool:
+        k = int(row["valve"])
+        flow = float(start.valve_flows()[k])
+        p_from, p_to = start.across(k)
+        loss = flow * abs(flow) / (float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0))
+        here = Here(start, k, p_from, p_to, self.target(start, k), flow, loss)
+        before = "shut" if k in start.shut else self.mode(start, k)
+        after = self.next(here, before)
+        if after == ACTIVE and not self.free(start, k):
+            after = "shut"
+        start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
+        start.modes[k] = OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.modes[k]
+        return after != before
+
+    def next(self, here: Here, now: str) -> str:
+        """As what it should stand in the next solution, by EPANET's rules."""
+        raise NotImplementedError
+
+    def begin(self, start, part, row) -> list[str]:
+        k = int(row["valve"])
+        valve, floats, at = start.valves[k], start.scene.tables[rec.I_FLOATS], int(row["data"])
+        shut, active = k in start.shut, self.mode(start, k) == ACTIVE
+        error = self.error(start, k)
+        if active and not shut:
+            if abs(error) > start.slack(self.end):
+                self.refuse(start, k)
+            error = 0.0
+        x = opening_of(start, k) if active and not shut else 1.0 if error > 0.0 or not shut else 0.0
+        floats[at], floats[at + 1], floats[at + 2] = x, error, self.given(start, k)
+        valve["open"] = 0.0 if shut else valve["conductance"] * x * x
+        if valve["open"] > 0.0 and valve["transition"] == 0.0:
+            valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
+        return []
+
+    def error(self, start, k: int) -> float:
+        """What asks it to open at the start, in the unit of what it senses."""
+        given = self.given(start, k)
+        if not self.end:
+            return given - float(start.valves[k]["flow"])
+        pressure = float(start.nodes["pressure"][self.sensed(start, k)])
+        return given - pressure if self.end == "to" else pressure - given
+
+    def refuse(self, start, k: int) -> None:
+        """A fault: nothing that it could do keeps what it senses as set."""
+        name = start.scene.valve_names[k]
+        start.scene.fault(f"links.{name}.{self.key}", "no steady state: what is drawn beyond it hangs on it alone, "
+                          'and leaves it nothing to set; change the demand, or use initial = "rest"')  # fmt: skip
+
+
+class PressureReducing(Regulator, kind="pressure-reducing"):
+    """Keeps the pressure at `to` down: open where even full opening leaves less, shut where others bring more."""
+
+    code, end, verb = REDUCING, "to", "reduce"
+
+    def next(self, here, now):
+        low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
+        if now == "shut" and here.p_to < low:
+            return ACTIVE if here.p_from >= high else OPEN if here.p_from > here.p_to + SMALL_PRESSURE else now
+        if now != "shut" and here.reversed:
+            return "shut"
+        if now == ACTIVE:
+            return OPEN if here.p_from - here.loss < low or here.p_to < low else now
+        return ACTIVE if now == OPEN and here.p_to > high else now
+
+
+class PressureSustaining(Regulator, kind="pressure-sustaining"):
+    """Keeps the pressure at `from` up: open where even full opening leaves more, shut where there is less."""
+
+    code, end, verb = SUSTAINING, "from", "open"
+
+    def next(self, here, now):
+        low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
+        if now == "shut" and here.p_from > here.p_to + SMALL_PRESSURE:
+            return OPEN if here.p_to > high else ACTIVE if here.p_from >= high else now
+        if now != "shut" and here.reversed:
+            return "shut"
+        if now == ACTIVE:
+            return OPEN if here.p_to + here.loss > high or here.p_from > high else now
+        return ACTIVE if now == OPEN and here.p_from < low else now
+
+
+class FlowControl(Regulator, kind="flow-control"):
+    """Keeps the flow down: open where even full opening lets less pass."""
+
+    code, key = FLOW_CONTROL, "set_flow"
+
+    def next(self, here, now):
+        if now == ACTIVE:
+            drop, small = here.p_from - here.p_to, SMALL_FLOW * here.start.flow_scale
+            return OPEN if drop < here.loss - SMALL_PRESSURE or here.flow < here.target - small else now
+        return ACTIVE if here.flow > here.target + SMALL_FLOW * here.start.flow_scale else now
+
+
+def kinds_of(case) -> set[str]:
+    """Types of the links of a case."""
+    return {link.kind for link in case.links.values()}
+
+
+def head_of(case, weight: float, name: str) -> tuple[float, str]:
+    """(greatest head [m] that a place can bring, its name)."""
+    node, z = case.nodes[name], case.elevation(name) or 0.0
+    if node.kind == "tank":
+        return z + max(node.level, node.height or 0.0), name
+    if node.kind == "junction":
+        return (math.inf if np.min(node.demand.value) < 0.0 else -math.inf), name
+    if node.head is not None:
+        return float(np.max(node.head.value)), name
+    return (float(np.max(node.pressure.value)) - case.ambient_pressure) / weight + z, name
+
+
+def opening_of(start, k: int) -> float:
+    """Opening x between 0 and 1 at which valve k passes its flow of the profile, M |M| = G x^2 dP."""
+    valve = start.valves[k]
+    dense, drop = start.law_of(k)
+    flow, transition = abs(float(valve["flow"])), float(valve["transition"])
+    if flow == 0.0 or not dense * drop > 0.0:
+        return 0.0
+    if flow >= transition:
+        return min(flow / math.sqrt(dense * drop), 1.0)
+    low, high, x = 0.0, 1.0, 0.5
+    for _ in range(60):
+        low, high = (x, high) if flow_at_drop(dense * x * x, transition, drop) < flow else (low, x)
+        x = 0.5 * (low + high)
+    return x

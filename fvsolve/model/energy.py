@@ -1,0 +1,223 @@
+"""The energy of a deviation as a sum of squares: the norm in which growth is measured. Knows tables; steps nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import records as rec
+from fvsolve.model.unsteady import memory_shares
+
+RANK = 1e-12  # of the greatest singular value of what hangs together: below, a motion stores no energy
+TOGETHER = 2500  # positions joined by springs whose singular values are taken, in some 7 s
+CLOSED = 1e-6  # share of what its terms could add up to, below which a rate is round-off of differences
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyForm:
+    """Energy |L y|^2 [J] of a deviation y of n states, and coordinates z = forth y, |z|^2 the same energy.
+
+    rows : sparse float64[m, n]  L, one row for each store; parts : names of what stores, one for each row
+    forth : sparse float64[r, n], back : sparse float64[n, r]  forth back = 1
+    idle : float64[n, d]  motions that store nothing, such as all positions of a train together; each small
+    idle_rows : float64[d, n]  how much of each a deviation holds; least : energy that small deviations have at least
+    """
+
+    rows: Any
+    parts: tuple[str, ...]
+    forth: Any
+    back: Any
+    idle: np.ndarray
+    idle_rows: np.ndarray
+    least: float
+
+    @property
+    def size(self) -> int:
+        """Coordinates z."""
+        return self.forth.shape[0]
+
+    def seen(self, a: Any) -> Any:
+        """A in coordinates z: forth A back, dense or sparse as A is. What is idle is left out."""
+        if isinstance(a, np.ndarray):
+            return self.forth @ (a @ self.back.toarray())
+        return (self.forth @ a @ self.back).tocsc()
+
+    def closed(self, a: Any) -> bool:
+        """Whether A takes idle motions to idle ones, so that growth of the others does not hang on them."""
+        if self.idle.shape[1] == 0:
+            return True
+        most = abs(self.forth) @ (abs(a) @ np.abs(self.idle))
+        return bool(np.all(np.abs(self.forth @ (a @ self.idle)) <= CLOSED * most))
+
+    def fitting(self, a: Any) -> EnergyForm:
+        """This form where A is `closed`, else the `completed` one."""
+        return self if self.closed(a) else self.completed()
+
+    def completed(self) -> EnergyForm:
+        """The same with the least weight for idle motions, a norm of all the states."""
+        from scipy.sparse import csr_array, hstack, vstack
+
+        if self.idle.shape[1] == 0:
+            return self
+        root, n = np.sqrt(self.least), self.idle.shape[0]
+        more = csr_array(root * self.idle_rows)
+        return EnergyForm(
+            vstack([self.rows, more]).tocsr(), (*self.parts, *[""] * more.shape[0]),
+            vstack([self.forth, more]).tocsr(), hstack([self.back, csr_array(self.idle / root)]).tocsr(),
+            np.zeros((n, 0)), np.zeros((0, n)), self.least,
+        )  # fmt: skip
+
+
+def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
+    """The energy of a deviation from the state y, that of the start if None.
+
+    A wave of r [kg/s] stores r^2 dx / (rho A), a flow that unsteady friction remembers (`kernels.unsteady`)
+    g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a body m v^2 / 2,
+    a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
+    its excess at y. Exact under `linear` about a profile at rest.
+    Devices store what their `squares` say. Positions that nothing holds, one by one or together, store nothing: idle.
+    """
+    from scipy.sparse import csr_array
+
+    y = np.zeros(model.y_size) if y is None else y
+    own = energy_weights(model)
+    names = [name.rsplit(".", 1)[0] for name in model.state_names]
+    stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
+    stored |= {e: (names[e], row) for e, row in swept(model, y)}
+    found = [*stored.values(), *held(model, y), *of_devices(model, y)]
+    entries = [(k, i, value) for k, (_, row) in enumerate(found) for i, value in row.items()]
+    row, column, value = (np.array(one) for one in zip(*entries, strict=True))
+    matrix = csr_array((value, (row, column)), shape=(len(found), model.y_size))
+    return form_of(matrix, tuple(name for name, _ in found), model.scale)
+
+
+def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
+    """Coordinates of |L y|^2 : state by state where a row has one, else by singular values of what hangs together.
+
+    scale : float64[n]  what counts as a small deviation: so much of each state is compared. Raises FvsolveError where
+    too much hangs together.
+    """
+    from scipy.sparse import coo_array
+
+    alone, blocks = apart(rows)
+    n, r = rows.shape[1], alone.size
+    own = np.asarray(np.abs(rows[:, alone]).sum(axis=0)).ravel() if r else np.zeros(0)
+    to, fro = [(np.arange(r), alone, own)], [(alone, np.arange(r), 1.0 / own)]
+    idle, idle_rows = [np.zeros((n, 0))], [np.zeros((0, n))]
+    for at in blocks:
+        if at.size > TOGETHER:
+            raise FvsolveError(
+                f"{at.size} bodies hang together: their energy norm is found up to {TOGETHER}; take fewer"
+            )
+        part = rows[:, at].toarray() * scale[at]
+        part = np.vstack([part[np.any(part, axis=1)], np.zeros((1, at.size))])
+        _, sizes, v = np.linalg.svd(part, full_matrices=part.shape[0] < at.size)
+        k = int(np.sum(sizes > RANK * sizes[0]))
+        here, there = np.repeat(np.arange(r, r + k), at.size), np.tile(at, k)
+        to.append((here, there, (sizes[:k, None] * v[:k] / scale[at]).ravel()))
+        fro.append((there, here, (v[:k] * scale[at] / sizes[:k, None]).ravel()))
+        rest = np.zeros((at.size - k, n))
+        rest[:, at] = v[k:]
+        idle.append((rest * scale).T)
+        idle_rows.append(rest / scale)
+        r += k
+    (i, j, v), (p, q, w) = (map(np.concatenate, zip(*pieces, strict=True)) for pieces in (to, fro))
+    forth, back = coo_array((v, (i, j)), shape=(r, n)).tocsr(), coo_array((w, (p, q)), shape=(n, r)).tocsr()
+    small = np.asarray((back.multiply(1.0 / scale[:, None]).tocsr() ** 2).sum(axis=0)).ravel()
+    return EnergyForm(rows, parts, forth, back, np.hstack(idle), np.vstack(idle_rows), float(1.0 / small.max()))
+
+
+def apart(rows: Any) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(states with one row that is theirs alone, groups of the others that rows join)."""
+    from scipy.sparse.csgraph import connected_components
+
+    single = np.diff(rows.tocsr().indptr) == 1
+    ones = (rows != 0).astype(int)
+    alone = (ones.sum(axis=0) == 1) & (ones[single].sum(axis=0) == 1)
+    others = np.flatnonzero(~alone)
+    part = ones[:, others]
+    count, labels = connected_components(part.T @ part, directed=False)
+    return np.flatnonzero(alone), [others[labels == k] for k in range(count)]
+
+
+def energy_weights(model) -> np.ndarray:
+    """Weights w of states that store w_i y_i^2 by themselves, 0 of cylinders, positions, devices : float64[n]."""
+    tables, rho = model.tables, model.case.properties.density
+    found = np.zeros(model.y_size)
+    for row in tables[rec.I_PIPES]:
+        found[row["y"] : row["y"] + 2 * row["cells"]] = row["dx"] / (rho * row["area"])
+        shares = memory_shares(tables[rec.I_FLOATS], row)
+        kept = slice(row["memory"], row["memory"] + shares.size * row["cells"])
+        found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
+    for row in tables[rec.I_NODES]:
+        if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
+            found[row["y"]] = stiffness(model, row) / (2.0 * rho)
+    for row in tables[rec.I_COLUMNS]:
+        found[row["y"]] = row["length"] / (2.0 * rho * row["area"])
+    for row in tables[rec.I_BODIES]:
+        if row["y"] >= 0:
+            found[int(row["y"]) + 1] = 0.5 / row["lightness"]
+    return found
+
+
+def held(model, y: np.ndarray):
+    """(name, row of L) of springs and of stops in touch."""
+    tables, links = model.tables, model.case.links
+    springs = [name for name, link in links.items() if link.kind == "spring"]
+    for name, row in zip(springs, tables[rec.I_BRACES], strict=False):
+        yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
+    stops = [name for name, link in links.items() if link.kind == "end-stop"]
+    for name, row in zip(stops, tables[rec.I_STOPS], strict=True):
+        x = distance(model, y, row["from_body"], row["to_body"])
+        if row["below"] + x < 0.0 or x > row["above"]:
+            yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
+
+
+def of_devices(model, y: np.ndarray):
+    """(name, row of L) of what devices store."""
+    if not model.devices:
+        return
+    out = model.evaluate(model.case.numerics.start, y)[1]
+    for (name, part, device), row in zip(model.devices, model.tables[rec.I_DEVICES], strict=True):
+        for square in device.squares(model, part, row, y, out):
+            yield name, square
+
+
+def swept(model, y: np.ndarray):
+    """(state, row of L) of moving chambers at y: with less room the same excess e [kg] is more pressure."""
+    nodes, pistons = model.tables[rec.I_NODES], model.tables[rec.I_PISTONS]
+    per_mass = model.evaluate(model.case.numerics.start, y)[1][model.layout["stiffness"] :] if len(pistons) else []
+    for row in pistons:
+        bodies = row["case"], row["rod"]
+        x = distance(model, y, *bodies)
+        for name, sign in (("a", 1.0), ("b", -1.0)):
+            node, area = nodes[row[name]], sign * float(row[f"area_{name}"])
+            at, volume = int(node["y"]), float(node["volume"] + area * x)
+            added = float(y[at]) / volume  # density, over that of the start
+            density = float(row[f"sweep_{name}"]) / area + added
+            root = float(np.sqrt(per_mass[node["row"]] / (2.0 * density)))
+            yield at, {at: root} | (travel(model, *bodies, -root * added * area) if added else {})
+
+
+def travel(model, i: int, j: int, factor: float) -> dict[int, float]:
+    """Row of `factor` times (x_j - x_i), of those of the two bodies that can move."""
+    places = model.tables[rec.I_BODIES]["y"]
+    return {int(places[k]): sign * factor for k, sign in ((i, -1.0), (j, 1.0)) if places[k] >= 0 and i != j}
+
+
+def distance(model, y: np.ndarray, i: int, j: int) -> float:
+    """By how much body j has moved away from body i since the start [m]."""
+    places = model.tables[rec.I_BODIES]["y"]
+    back, forth = (float(y[places[k]]) if places[k] >= 0 else 0.0 for k in (i, j))
+    return forth - back
+
+
+def stiffness(model, row) -> float:
+    """Pressure per stored mass [Pa/kg] of a node that stores, at its profile."""
+    if row["kind"] == rec.TANK and row["shape"] >= 0:
+        floats, at, n = model.tables[rec.I_FLOATS], int(row["shape"]), int(row["shapes"])
+        return float(model.case.gravity / np.interp(row["level"], floats[at : at + n], floats[at + n : at + 2 * n]))
+    return float(row["stiffness"])

@@ -1,0 +1,187 @@
+"""The accounts of energy of a model: which row of power or storage is whose. Knows names; steps nothing."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.kernels import compose
+from fvsolve.kernels import records as rec
+from fvsolve.model.model import Model
+
+
+@functools.cache
+def energy_functions(law: str, rooms: tuple[str, ...], kinds: tuple[int, ...]) -> tuple:
+    """(power, stored) of a density law and the rooms of a scene, compiled; asked for by energy studies alone."""
+    from fvsolve.kernels.functions import compile_as, kind_of, rooms_of
+
+    made = compose.energies(kind_of(law), rooms_of(law, rooms), kinds)
+    for function in (made.power, made.stored):
+        compile_as(function, "tvvvhv")
+    return made.power, made.stored
+
+
+@dataclass(frozen=True)
+class Account:
+    """Rows that make one line of the ledger: `what` of `place`, and their signs."""
+
+    what: str  # "supplied" | "stored" | "dissipated" | "scheme" | "law"
+    place: str
+    kind: str  # "reservoir", "friction", "valve", ...
+    rows: tuple[int, ...]
+    signs: tuple[float, ...]
+
+
+class Accounts:
+    """Power rows and stored rows of a model by account.
+
+    stored rows and the power rows of their rates stand in the same order in `stored` and `rates`.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model, case = model, model.case
+        self.power, self.stored = energy_functions(case.fluid.law, model.rooms, model.device_kinds)
+        self.accounts: list[Account] = []
+        self.held: list[Account] = []  # of stored energy: rows of `stored`
+        self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
+        self.powers = self.stores = 0
+        nodes = model.tables[rec.I_NODES]
+        kinds = [place.kind for place in case.places.values()]
+        for i, name in enumerate(model.node_names):
+            self.node(name, kinds[i], int(nodes[i]["kind"]))
+        for pipe in model.pipes:
+            at = self.take(4)
+            self.add("dissipated", pipe.name, "friction", at + 1)
+            self.add("dissipated", pipe.name, "jet", at + 2)
+            self.hold(pipe.name, "pipe", at + 3, 2)
+            self.accounts.append(Account("scheme", pipe.name, "pipe", (at, at + 1, at + 2, at + 3), (1, -1, -1, -1)))
+        self.valves()
+        for name in model.column_names:
+            at = self.take(3)
+            self.add("dissipated", name, "friction", at + 1)
+            self.hold(name, "rigid column", at + 2)
+            self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
+        self.mechanics()
+        self.devices()
+        self.matrix = matrix_of(self.accounts, self.powers)
+        self.holding = matrix_of(self.held, self.stores)
+
+    def take(self, count: int) -> int:
+        """The next rows of power."""
+        self.powers += count
+        return self.powers - count
+
+    def add(self, what: str, place: str, kind: str, row: int, sign: float = 1.0) -> None:
+        """One more line, of one row of power."""
+        self.accounts.append(Account(what, place, kind, (row,), (sign,)))
+
+    def hold(self, place: str, kind: str, rate: int | None, rows: int = 1) -> None:
+        """One more part that stores: its next rows of `stored`, and the row of power that is their rate."""
+        at = self.stores
+        self.stores += rows
+        if rate is not None:
+            self.held.append(Account("stored", place, kind, tuple(range(at, at + rows)), (1.0,) * rows))
+            self.add("rate", place, kind, rate)
+
+    def node(self, name: str, kind: str, code: int) -> None:
+        at = self.take(2)
+        if code in (rec.FIXED, rec.JUNCTION):
+            self.add("supplied", name, "demand" if kind == "junction" else kind, at)
+        elif code == rec.TANK:
+            self.add("supplied", name, "over the rim", at)
+        stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # a vessel's is its device's
+        self.hold(name, kind, at + 1 if stores else None)
+
+    def valves(self) -> None:
+        seen: dict[str, int] = {}
+        self.taken: dict[str, tuple[int, bool]] = {}  # row of a device's restriction, and whether it dissipates
+        resists = {name: device.resists(part) for name, part, device in self.model.devices}
+        for name in self.model.valve_names:
+            at = self.take(1)
+            link = self.model.case.conduits[name]
+            if link.kind == "spool-valve":
+                edge = seen[name] = seen.get(name, -1) + 1
+                name = f"{name}.{edge_name(edge)}"
+            if name in resists:
+                self.taken[name] = at, resists[name]
+            else:
+                self.add("dissipated", name, "valve", at)
+
+    def mechanics(self) -> None:
+        model, tables = self.model, self.model.tables
+        names = [*model.body_names, *[""] * (len(tables[rec.I_BODIES]) - len(model.body_names))]
+        for name, row in zip(names, tables[rec.I_BODIES], strict=True):
+            at = self.take(1)
+            self.hold(name, "mass", at if row["y"] >= 0 else None)
+        of = {kind: [name for name, link in model.case.links.items() if link.kind == kind]
+              for kind in ("spring", "damper", "force", "end-stop")}  # fmt: skip
+        for kind in ("spring", "damper", "force"):
+            for name in of[kind]:
+                at = self.take(1)
+                self.hold(name, kind, at if kind == "spring" else None)
+                if kind != "spring":
+                    self.add("supplied" if kind == "force" else "dissipated", name, kind, at)
+        for name in of["end-stop"]:
+            at = self.take(2)
+            self.stops.append((len(self.accounts), len(self.accounts) + 1))
+            self.hold(name, "end-stop", at)
+            self.add("dissipated", name, "end-stop", at + 1)
+        for name in model.piston_names:
+            at = self.take(3)
+            self.add("dissipated", name, "leak", at)
+            self.add("dissipated", name, "friction", at + 1)
+            self.add("law", name, "cylinder", at + 2)
+
+    def devices(self) -> None:
+        for name, part, _ in self.model.devices:
+            at, kind = self.take(3), part.kind.replace("-", " ")
+            own, resists = self.taken.get(name, (None, True))
+            rows = {"supplied": [at], "dissipated": [at + 2]}
+            if own is not None:
+                rows["dissipated" if resists else "supplied"].append(own)
+            for what, (sign, of) in {
+                "supplied": (-1.0, rows["supplied"]),
+                "dissipated": (1.0, rows["dissipated"]),
+            }.items():
+                self.accounts.append(Account(what, name, kind, tuple(of), (1.0, sign)[: len(of)]))
+            self.hold(name, kind, at + 1)
+
+    def of(self, what: str) -> list[int]:
+        """Numbers of the lines of one kind."""
+        return [k for k, one in enumerate(self.accounts) if one.what == what]
+
+    def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Power of every line [W] : float64[lines], from a state; its rates and `out` are written here."""
+        self.model.functions()[0](t, y, dydt, out, self.model.handle)
+        return self.power_by(t, y, dydt, out)
+
+    def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """The same, from a state with rates and `out` as given."""
+        rows = np.zeros(self.powers)
+        self.power(t, y, dydt, out, self.model.handle, rows)
+        return self.matrix @ rows
+
+    def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Change of what every part stores since the profile [J] : float64[held]."""
+        rows, out = np.zeros(self.stores), self.model.new_out()
+        self.model.functions()[0](t, y, np.zeros(0), out, self.model.handle)
+        self.stored(t, y, np.zeros(0), out, self.model.handle, rows)
+        return self.holding @ rows
+
+
+def edge_name(edge: int) -> str:
+    """Which edge of a spool, as `parts.EDGES` orders them."""
+    from fvsolve.parts import EDGES as edges
+
+    start, end, _ = edges[edge]
+    return f"{start}-{end}"
+
+
+def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:
+    """float64[accounts, rows] that sums rows with their signs."""
+    found = np.zeros((len(accounts), rows))
+    for k, one in enumerate(accounts):
+        found[k, list(one.rows)] += one.signs
+    return found

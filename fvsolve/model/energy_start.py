@@ -1,0 +1,125 @@
+"""What energy a model starts with, above that of the same parts at rest with ambient. Knows tables; steps nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.model import Model
+from fvsolve.model.unsteady import memory_shares
+
+
+def datum_of(model: Model, port: str | None = None) -> float:
+    """Elevation from which heights count [m]: the port's, else the lowest; a reservoir given by head has none."""
+    if port is not None:
+        return float(model.elevation[port])
+    placed = [model.elevation[name] for name, node in model.case.places.items() if getattr(node, "head", None) is None]
+    return float(min(placed, default=0.0))
+
+
+def available(model: Model) -> dict[str, float]:
+    """Energy of the starting profile above that of the same parts all at P = 0 [J]: what could be had at most.
+
+    P = p - p_ambient + rho g z, z from the datum in the settings: there, or as near to it as it can, the surface of a
+    tank would stand.
+    """
+    tables, nodes, found = model.tables, model.tables[rec.I_NODES], {}
+    vessels = vessels_above(model)
+    for name, row in zip(model.node_names, nodes, strict=True):
+        if row["y"] >= 0 and row["kind"] != rec.VESSEL:
+            found[name] = tank_above(model, row) if row["kind"] == rec.TANK else vessels(row)
+    for (name, part, device), row in zip(model.devices, tables[rec.I_DEVICES], strict=True):
+        if above := device.above(model, part, row):
+            found[name] = above
+    for k, pipe in enumerate(model.pipes):
+        found[pipe.name] = pipe_above(model, k) + memory_above(model, k)
+    for name, row in zip(model.column_names, tables[rec.I_COLUMNS], strict=True):
+        found[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
+    for name, row in zip(model.body_names, tables[rec.I_BODIES], strict=False):
+        if row["y"] >= 0:
+            found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
+    springs = [name for name, link in model.case.links.items() if link.kind == "spring"]
+    for name, row in zip(springs, tables[rec.I_BRACES], strict=False):
+        found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
+    stops = [name for name, link in model.case.links.items() if link.kind == "end-stop"]
+    for name, row in zip(stops, tables[rec.I_STOPS], strict=True):
+        found[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
+    return {name: float(value) for name, value in found.items()}
+
+
+def vessels_above(model: Model):
+    """energy(node row) of a chamber at the start above that at P = 0 [J]."""
+    st, floats = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS]
+    if st["law"] == rec.LAW_LINEAR:
+        return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
+    from fvsolve.kernels.density import density, enthalpy, pressure_of_enthalpy
+    from fvsolve.kernels.energy_barotropic import vessel_energy
+
+    def energy(row) -> float:
+        ambient, height = float(st["ambient"]), float(row["elevation"] - st["datum"])
+        rest = pressure_of_enthalpy(st, floats, enthalpy(st, floats, ambient) - float(st["gravity"]) * height)
+        volume = float(row["volume"])
+        parts = [vessel_energy(st, floats, row, density(st, floats, float(p)) * volume, volume, float(p))
+                 for p in (row["pressure"], rest)]  # fmt: skip
+        return parts[0] - parts[1]
+
+    return energy
+
+
+def potential(model: Model, row) -> float:
+    """P of a node at the start under the linear law [Pa]."""
+    st = model.tables[rec.I_SETTINGS][0]
+    height = float(row["elevation"] - st["datum"])
+    return float(row["pressure"]) - model.case.ambient_pressure + float(st["rho"] * st["gravity"]) * height
+
+
+def pipe_above(model: Model, k: int) -> float:
+    """Energy of pipe k at the start above that at P = 0 and rest [J]."""
+    row, pipe, st = model.tables[rec.I_PIPES][k], model.pipes[k], model.tables[rec.I_SETTINGS][0]
+    if st["law"] == rec.LAW_LINEAR:
+        p, flow = potential(model, model.tables[rec.I_NODES][row["from_node"]]), row["flow"] / row["area"]
+        q = p - row["drag"] / row["area"] * pipe.length
+        square = (p * p + p * q + q * q) / (3.0 * row["speed"] ** 2) + flow * flow
+        return float(0.5 * pipe.length * row["area"] / st["rho"] * square)
+    from fvsolve.kernels.density import enthalpy, mass_of_pressure, pressure_of_enthalpy, pressure_of_mass, thrust
+
+    floats, profile = model.tables[rec.I_FLOATS], model.tables[rec.I_PROFILE]
+    base, total = enthalpy(st, floats, float(st["ambient"])), 0.0
+    for i, z in enumerate(pipe.elevation):
+        height, m = float(st["gravity"] * (z - st["datum"])), float(profile[row["center"] + i])
+        rest = pressure_of_enthalpy(st, floats, base - height)
+        low = mass_of_pressure(st, floats, row, rest)[0]
+        p = pressure_of_mass(st, floats, row, m)
+        head, least = enthalpy(st, floats, p) - base + height, enthalpy(st, floats, rest) - base + height
+        squeezed = m * head - low * least - (thrust(st, row, p) - thrust(st, row, rest))
+        total += float(row["dx"]) * (squeezed + 0.5 * row["flow"] ** 2 / m)
+    return float(total)
+
+
+def memory_above(model: Model, k: int) -> float:
+    """What unsteady friction of pipe k remembers of the flow of the start [J]."""
+    row, pipe, st = model.tables[rec.I_PIPES][k], model.pipes[k], model.tables[rec.I_SETTINGS][0]
+    share, full, square = float(memory_shares(model.tables[rec.I_FLOATS], row).sum()), st["rho"] * row["area"], 1.0
+    if st["law"] != rec.LAW_LINEAR:  # the velocity is remembered
+        square = np.mean((full / model.tables[rec.I_PROFILE][row["center"] + np.arange(pipe.cells)]) ** 2)
+    return float(0.5 * share * square * row["flow"] ** 2 * pipe.length / full)
+
+
+def tank_above(model: Model, row) -> float:
+    """Energy of a tank above that with its surface at the datum, or as near as its bottom and rim allow [J]."""
+    from fvsolve.kernels.energy import tank_energy
+    from fvsolve.kernels.tanks import tank_level
+
+    st, floats = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS]
+    rho, target = float(row["density"]), float(st["datum"] - row["elevation"])
+    low = -float(row["mass"])
+    if target <= 0.0:
+        return float(-tank_energy(st, floats, row, rho, low))
+    room = rho * float(row["area"]) * target + float(row["mass"])
+    while tank_level(row, floats, rho, low + room) < target and row["mass"] + low + room < row["full"]:
+        room *= 2.0
+    high = min(float(row["full"] - row["mass"]), low + room)
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if tank_level(row, floats, rho, middle) < target else (low, middle)
+    return float(-tank_energy(st, floats, row, rho, high))

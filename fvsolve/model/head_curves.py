@@ -1,0 +1,119 @@
+"""Head curves and powers of pumps as the numbers that kernels read. Knows the curves; knows no scene."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.kernels import curves
+from fvsolve.parts.head_curve import Points, first_root
+from fvsolve.parts.pump import EFFICIENCY
+
+LEAST_FLOW = 1e-5  # share of the last flow below which a curve that is flat there is a straight line
+HIGHEST, LOWEST = 1000.0, 0.1  # heads between which a pump of constant power keeps it [m]
+
+
+def curve_numbers(part, weight: float) -> list[float]:
+    """Numbers of a pump's head curve, in the order that `kernels.curves` states; weight = rho g [N/m3]."""
+    if part.suter is not None:
+        one = part.suter
+        return [
+            curves.SUTER,
+            len(one.head),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            one.rated_flow,
+            one.rated_head,
+            one.rated_flow,
+            *one.head,
+        ]
+    law, count, first, last, own = base_law(part, weight)
+    numbers = [law, count, first, last, 0.0, 0.0, last, *own]
+    head, slope = curves.base_head(np.array(numbers), 0, float(last))
+    tail = -slope / (2.0 * last)
+    numbers[curves.TAIL_HEAD], numbers[curves.TAIL] = head + tail * last**2, tail
+    numbers[curves.SCALE] = rated_point(part, weight)[0]
+    return [float(one) for one in numbers]
+
+
+def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
+    """(law, how many, first and last flow, own numbers) of a curve that is no Suter table."""
+    if part.power is not None:
+        product = part.power / weight
+        return curves.POWER, 3, product / HIGHEST, product / LOWEST, [0.0, -product, -1.0]
+    curve = part.curve
+    if curve.coefficients:
+        last = first_root(curve.coefficients)
+        first = LEAST_FLOW * last if len(curve.coefficients) < 2 or curve.coefficients[1] == 0.0 else 0.0
+        return curves.POLYNOMIAL, len(curve.coefficients), first, last, list(curve.coefficients)
+    if (fit := power_law(curve)) is None:
+        return curves.POINTS, len(curve.flow), 0.0, curve.flow[-1], [*curve.flow, *curve.value]
+    a, b, c = fit
+    last = (a / b) ** (1.0 / c)
+    return curves.POWER, 3, 0.0 if c == 1.0 else LEAST_FLOW * last, last, [a, b, c]
+
+
+def power_law(curve: Points) -> tuple[float, float, float] | None:
+    """a, b, c of H = a - b q^c through one point (4/3 of its head at no flow, 0 at twice its flow) or three from q = 0.
+
+    None of other curves, which are straight lines between their points. As EPANET has it (Rossman 2020).
+    """
+    if len(curve.flow) == 1:
+        return 4.0 / 3.0 * curve.value[0], curve.value[0] / 3.0 / curve.flow[0] ** 2, 2.0
+    if len(curve.flow) != 3 or curve.flow[0] != 0.0:
+        return None
+    fall, full = curve.value[0] - curve.value[1], curve.value[0] - curve.value[2]
+    c = math.log(full / fall) / math.log(curve.flow[2] / curve.flow[1])
+    return curve.value[0], fall / curve.flow[1] ** c, c
+
+
+def rated_point(part, weight: float) -> tuple[float, float]:
+    """(flow [m3/s], head [m]) where a pump is meant to work: its point, the middle of three, or the greatest q H."""
+    if part.suter is not None:
+        return part.suter.rated_flow, part.suter.rated_head
+    if part.power is not None:
+        flow = part.power / weight / math.sqrt(HIGHEST * LOWEST)
+        return flow, math.sqrt(HIGHEST * LOWEST)
+    curve = part.curve
+    if not curve.coefficients and power_law(curve) is not None:
+        k = min(1, len(curve.flow) - 1)
+        return curve.flow[k], curve.value[k]
+    law, count, first, last, own = base_law(part, weight)
+    numbers = np.array([law, count, first, last, 0.0, 0.0, last, *own], dtype=float)
+    flows = np.linspace(0.0, last, 1001)[1:]
+    heads = np.array([curves.base_head(numbers, 0, float(q))[0] for q in flows])
+    best = int(np.argmax(flows * heads))
+    return float(flows[best]), float(heads[best])
+
+
+def shaft_points(part, weight: float) -> list[float]:
+    """[how many, flows, powers at the shaft [W]] at relative speed 1; of a Suter table [rated torque, WB]."""
+    flow, head = rated_point(part, weight)
+    best = EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, Points) else part.efficiency
+    rated = weight * flow * head / best
+    if part.suter is not None:
+        return [rated / (part.rated_speed or 1.0), *part.suter.torque]
+    if part.power is not None and part.shaft_power is None:
+        return [2, 0.0, flow, part.power / best, part.power / best]
+    if part.shaft_power is not None:
+        flows, powers = part.shaft_power.flow, part.shaft_power.value
+    elif isinstance(part.efficiency, Points):
+        flows, powers = by_efficiency(part, weight)
+    else:
+        flows, powers = (0.0, flow, 4.0 * flow), (2.0 / 3.0 * rated, rated, 2.0 * rated)
+    if len(flows) == 1:
+        flows, powers = (flows[0], 2.0 * flows[0] + 1.0), (powers[0], powers[0])
+    return [len(flows), *flows, *powers]
+
+
+def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
+    """Powers at the points of an efficiency over flow, rho g q H / eta; at no flow that of the first one above it."""
+    numbers = np.array(curve_numbers(part, weight))
+    points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
+    flows = [q for q, _ in points]
+    powers = [weight * q * curves.curve_head(numbers, 0, 1.0, float(q))[0] / e for q, e in points]
+    shut_off = weight * curves.curve_head(numbers, 0, 1.0, 0.0)[0] * flows[0] / points[0][1]
+    return [0.0, *flows], [shut_off, *powers]

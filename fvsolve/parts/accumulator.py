@@ -1,0 +1,44 @@
+"""A vessel with gas over its fluid. Knows sizes and pressures; computes nothing."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.connection import Connection, Joined, joined
+from fvsolve.parts.junction import Junction
+from fvsolve.parts.node import Node
+from fvsolve.parts.table import at_least_one
+from fvsolve.parts.value import Number, Quantity, Range, positive
+
+
+class Accumulator(Node, kind="accumulator"):
+    """A bladder accumulator (`precharge`) or an air vessel (`gas_volume`): p V^n constant in the gas over its fluid.
+
+    Ports: any number, at one pressure, that of the gas: the height of the fluid inside is left out. Stored energy, p
+    from ambient: the gas's, p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1) less the work of ambient [J]. Dissipated energy: that
+    of its connection.
+
+    A bladder fills `volume` at `precharge`; below it nothing but the hundredth part of `volume`, of fluid in the neck,
+    feels the pressure. An air vessel that runs empty lets its air into the place it is joined to.
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("precharge", "gas_volume"),)
+    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
+    fixes_pressure: ClassVar[bool] = True
+
+    volume: Annotated[float, Quantity("volume", positive, "that gas and fluid share [m3]")]
+    precharge: Annotated[float | None, Quantity("pressure", about="of the gas when it fills the vessel [Pa]")] = None
+    gas_volume: Annotated[float | None, Quantity("volume", positive, "of the gas at the start [m3]")] = None
+    exponent: Annotated[float, Number(Range(1.0), "n of p V^n: 1 isothermal, 1.4 adiabatic air")] = 1.2
+    initial_pressure: Annotated[
+        float | None, Quantity("pressure", about="of the gas at the start [Pa]; in equilibrium if left out")
+    ] = None
+    connection: Annotated[Connection | None, Joined()] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        missing = at_least_one(given, ("precharge", "gas_volume"))
+        return super().key_faults(given) + [(keys, f"no gas; {message}") for keys, message in missing]
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+        return joined(name, self, Junction.model_construct(elevation=self.elevation))

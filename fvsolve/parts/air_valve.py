@@ -1,0 +1,44 @@
+"""A valve that lets air in and out. Knows its bores; evaluates no flow."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.connection import Connection, behind
+from fvsolve.parts.junction import Junction
+from fvsolve.parts.node import Node
+from fvsolve.parts.schedule import constant
+from fvsolve.parts.value import Number, Quantity, between, positive
+
+WIDE = 30.0  # throat between fluid and air, in diameters of the inlet, of loss 1
+
+
+class AirValve(Node, kind="air-valve"):
+    """A junction until its pressure falls below ambient; then air comes in, and goes out where it exceeds ambient.
+
+    Air flows isentropically through bores of their own each way, choked beyond their critical pressures, and stays at
+    `temperature`: p V = m R T. The float's chamber, `volume`, holds air from the start; once the fluid has filled all
+    else the valve shuts, with the blow that this makes. Ports: any number. Stored energy: m R T (ln(p / p_ambient) - 1)
+    + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W].
+    """
+
+    quantities: ClassVar[dict[str, str]] = {
+        **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",
+    }  # fmt: skip
+
+    inlet: Annotated[float, Quantity("length", positive, "diameter of the bore for air in [m]")]
+    outlet: Annotated[float, Quantity("length", positive, "diameter of the bore for air out [m]")]
+    discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of both bores")] = 0.6
+    volume: Annotated[float | None, Quantity("volume", positive, "of the float's chamber [m3]")] = None
+    temperature: Annotated[float, Quantity("temperature", positive, "of the air [K]")] = 293.15
+
+    initial_pressure: ClassVar[None] = None
+    at_ambient: ClassVar[bool] = True
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+        size = Connection.model_construct(area=None, diameter=WIDE * self.inlet, loss_in=1.0, loss_out=1.0)
+        volume = self.volume if self.volume is not None else math.pi / 4.0 * self.inlet**3
+        chamber = self.model_copy(update={"volume": volume})
+        place = Junction.model_construct(elevation=self.elevation, demand=constant(0.0))
+        return behind(name, chamber, place, size)

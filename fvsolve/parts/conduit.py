@@ -1,0 +1,89 @@
+"""What pipes and rigid columns share: length, bore and fittings. Turns names of sizes into numbers; knows no flow."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.friction import NONE, Friction
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.sizes import FITTINGS, bore, loss
+from fvsolve.parts.table import at_least_one
+from fvsolve.parts.value import Misfit, Number, Quantity, Setting, Text, Value, nonnegative, positive
+from fvsolve.units import show
+
+DIAMETER = Quantity("length", positive, "inner diameter [m]")
+LOSS = Number(nonnegative, "loss coefficient on its velocity, spread along it")
+
+
+class Fittings(Value):
+    """A list of names of fittings; a name may stand there several times."""
+
+    about = "fittings by name, their loss coefficients are added to minor_loss"
+
+    def read(self, given: Any, setting: Setting) -> list[str]:
+        if not isinstance(given, (list, tuple)):
+            raise Misfit([((), f'{show(given)} is no list; wanted one such as ["bend-90", "gate-valve"]')])
+        faults = []
+        for index, name in enumerate(given):
+            if name not in FITTINGS:
+                near = did_you_mean(str(name), FITTINGS) or f"; fittings are {listing(list(FITTINGS))}"
+                faults.append(((index,), f"no fitting named {show(name)}{near}"))
+        if faults:
+            raise Misfit(faults)
+        return list(given)
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"enum": list(FITTINGS)}}
+
+
+class Conduit(TwoPort):
+    """A pipe of whatever kind; `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
+
+    length: Annotated[float, Quantity("length", positive, "along its axis [m]")]
+    diameter: Annotated[float, DIAMETER] = None  # nominal stands in for it
+    nominal: Annotated[str | None, Text('nominal size in place of diameter, "DN100" or "NPS 4"')] = None
+    schedule: Annotated[str | None, Text('of the nominal size, "40" if left out')] = None
+    friction: Friction = NONE
+    minor_loss: Annotated[float, LOSS] = 0.0
+    fittings: Annotated[list[str] | None, Fittings()] = None
+    initial_flow: Annotated[float | None, Quantity("flow", about="at the start [m3/s]")] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        return super().key_faults(given) + at_least_one(given, ("diameter", "nominal"))
+
+    @classmethod
+    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+        """Names turned into `diameter`, wall `thickness` and `minor_loss`; Misfit where one means nothing."""
+        found, faults = {**given}, []
+        if isinstance(given.get("nominal"), str) and "diameter" not in given:
+            try:
+                found["diameter"], thickness = sized(found.pop("nominal"), found.pop("schedule", "40"))
+                if isinstance(given.get("wall"), dict):
+                    found["wall"] = {"thickness": thickness, **given["wall"]}
+            except Misfit as error:
+                faults += error.faults
+        if "fittings" in found:
+            try:
+                names = Fittings().read(found.pop("fittings"), setting)
+                own = LOSS.read(found.get("minor_loss", 0.0), setting)
+                found["minor_loss"] = own + loss(names, DIAMETER.read(found["diameter"], setting))
+            except Misfit as error:
+                faults += [(("fittings", *keys), text) for keys, text in error.faults]
+            except (KeyError, ValueError):  # a key that is read, and blamed, in its own right
+                pass
+        if faults:
+            raise Misfit(faults)
+        return found
+
+
+def sized(nominal: str, schedule: Any) -> tuple[float, float]:
+    """`bore` of what the file says; Misfit with the key to blame."""
+    try:
+        return bore(nominal, str(schedule))
+    except ValueError as error:
+        key = "schedule" if "schedule named" in str(error) else "nominal"
+        raise Misfit([((key,), str(error))]) from None

@@ -1,0 +1,81 @@
+"""What a vessel is joined by, and with what loss each way. Knows its size; knows no vessel."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar
+
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.table import Table, at_least_one
+from fvsolve.parts.value import Number, Quantity, Setting, Value, positive
+from fvsolve.units import show
+
+
+class Connection(Table):
+    """The throat between a vessel and its place: dp = loss rho v |v| / 2, v in its area, one loss each way."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
+
+    area: Annotated[float | None, Quantity("area", positive, "of the throat [m2]")] = None
+    diameter: Annotated[float | None, Quantity("length", positive, "of the throat [m]")] = None
+    loss_in: Annotated[float, Number(positive, "K on the velocity in the throat, into the vessel")]
+    loss_out: Annotated[float, Number(positive, "K out of the vessel")]
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        return super().key_faults(given) + at_least_one(given, ("area", "diameter"))
+
+
+class Joined(Value):
+    """The table of a connection."""
+
+    about = "throat with a loss each way: { diameter or area, loss_in, loss_out }"
+
+    def read(self, given: Any, setting: Setting) -> Connection:
+        if isinstance(given, Connection):
+            return given
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is no connection; wanted {{ diameter, loss_in, loss_out }}")
+        return Connection.model_validate(given, context=setting)
+
+    def json(self) -> dict[str, Any]:
+        return Connection.model_json_schema()
+
+
+class Throat(TwoPort):
+    """A connection as a link: from the place where the vessel is joined to what is inside."""
+
+    kind: ClassVar[str] = "connection"
+
+    size: Connection
+    diameter: float | None
+    area: float | None
+    laminar_reynolds: float | None = None
+
+    def flow_area(self) -> float:
+        """Area over the root of the loss into the vessel [m2]."""
+        return self.throat / math.sqrt(self.size.loss_in)
+
+    @property
+    def throat(self) -> float:
+        """Its area [m2]."""
+        return self.size.area if self.size.area is not None else math.pi / 4.0 * self.size.diameter**2
+
+    @property
+    def back(self) -> float:
+        """Conductance out of the vessel over that into it [-]."""
+        return self.size.loss_in / self.size.loss_out
+
+
+def joined(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
+    """(places, links) of a vessel: itself, or `place` at `name`, the throat and the vessel inside."""
+    if vessel.connection is None:
+        return {name: vessel}, {}
+    return behind(name, vessel.model_copy(update={"connection": None}), place, vessel.connection)
+
+
+def behind(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
+    """(places, links) of what lies inside, behind a throat from `place` at `name`."""
+    ends = {"from": name, "to": f"{name}.inside"}
+    throat = Throat.model_construct(**ends, size=size, diameter=size.diameter, area=size.area)
+    return {name: place, f"{name}.inside": inside}, {f"{name}.connection": throat}

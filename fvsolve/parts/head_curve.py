@@ -1,0 +1,215 @@
+"""Head and efficiency of a pump over its flow, as a file may say them. Knows points; evaluates none of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from fvsolve.parts.suter_tables import SUTER_TABLES
+from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.value import (
+    NEEDED,
+    Choice,
+    Misfit,
+    Number,
+    Quantity,
+    Rows,
+    Setting,
+    Value,
+    between,
+    check_rising,
+    nonnegative,
+    positive,
+)
+from fvsolve.units import show
+
+
+@dataclass(frozen=True)
+class Points:
+    """What a pump does at flows [m3/s]; the file's words for both are the names of the fields.
+
+    flow, value : points; word : what the values are; coefficients : of a polynomial in their place
+    """
+
+    flow: tuple[float, ...] = ()
+    value: tuple[float, ...] = ()
+    word: str = "head"
+    coefficients: tuple[float, ...] = ()
+
+    def table(self) -> dict[str, list[float]]:
+        """What the file would say."""
+        if self.coefficients:
+            return {"coefficients": list(self.coefficients)}
+        return {"flow": list(self.flow), self.word: list(self.value)}
+
+
+def points(
+    given: dict[str, Any], word: str, dimension: str, setting: Setting, range=nonnegative, faults_of=lambda *_: []
+) -> Points:
+    """Points of a table { flow, WORD }; Misfit where flows do not rise, the lists differ in length, or `faults_of`."""
+    found = read_keys(given, keys_of(word, dimension, range), setting)
+    flow, value = found["flow"], found[word]
+    faults = faults_of(given, flow, value)
+    if len(flow) != len(value):
+        faults.append(((word,), f"{len(value)} values for {len(flow)} flows; wanted as many of both"))
+    try:
+        check_rising(flow, given["flow"], "flows")
+    except ValueError as error:
+        faults.append((("flow",), str(error)))
+    if faults:
+        raise Misfit(faults)
+    return Points(flow, value, word)
+
+
+def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Value, Any]]:
+    return {"flow": (Rows("flow", nonnegative), NEEDED), word: (Rows(dimension, range), NEEDED)}
+
+
+class HeadCurve(Value):
+    """A head curve: points { flow, head }, or { coefficients } of head [m] over powers of flow [m3/s]."""
+
+    about = "head over flow at relative speed 1"
+    polynomial = {"coefficients": (Rows("number"), NEEDED)}
+
+    def read(self, given: Any, setting: Setting) -> Points:
+        if isinstance(given, Points):
+            return given
+        if not isinstance(given, dict):
+            raise ValueError(f'{show(given)} is no table; wanted one such as {{ flow = ["50 l/s"], head = ["40 m"] }}')
+        if "coefficients" in given:
+            found = read_keys(given, self.polynomial, setting)["coefficients"]
+            self.check_polynomial(found)
+            return Points(coefficients=found)
+        return points(given, "head", "head", setting, nonnegative, self.faults_of)
+
+    def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]) -> list:
+        """Faults of one point that cannot make a curve, and of heads that do not fall from each to the next."""
+        faults = []
+        if len(flow) == 1 and not (flow[0] > 0 and head[0] > 0):
+            faults.append(((), "one point must have a flow and a head above 0, or give two points or more"))
+        for k, (before, after) in enumerate(zip(head, head[1:], strict=False)):
+            if not after < before:
+                said = f"{show(given['head'][k + 1])} comes after {show(given['head'][k])}"
+                faults.append((("head", k + 1), f"{said}; the head must fall as the flow rises"))
+        return faults
+
+    def check_polynomial(self, found: tuple[float, ...]) -> None:
+        """Misfit where there is no flow without head, or the head rises before it."""
+        end = first_root(found)
+        if found[0] <= 0.0 or end is None:
+            raise Misfit([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
+                                              "[60.0, 0.0, -900.0], 60 m less 900 m at 1 m3/s")])  # fmt: skip
+        slope = np.polynomial.polynomial.polyder(found)
+        flows = np.linspace(0.0, end, 1001)
+        rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
+        if rises.size:
+            raise Misfit([(("coefficients",), f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; it must fall "
+                                              "as the flow rises")])  # fmt: skip
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [keys_json(keys_of("head", "head")), keys_json(self.polynomial)]}
+
+
+def first_root(coefficients: tuple[float, ...]) -> float | None:
+    """The least flow above 0 at which a polynomial is 0."""
+    roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b")) if any(coefficients) else []
+    real = [float(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0]
+    return min(real, default=None)
+
+
+class Efficiency(Value):
+    """A number, or points { flow, efficiency }."""
+
+    about = "hydraulic power over power at the shaft: at the rated point, or over flow [-]"
+    number = Number(between(0, 1, open=True))
+
+    def read(self, given: Any, setting: Setting) -> float | Points:
+        if isinstance(given, Points):
+            return given
+        if isinstance(given, dict):
+            found = points(given, "efficiency", "number", setting, between(0, 1))
+            if not any(q > 0.0 and eta > 0.0 for q, eta in zip(found.flow, found.value, strict=True)):
+                raise Misfit([(("efficiency",), "wanted one above 0 at a flow above 0")])
+            return found
+        return self.number.read(given, setting)
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [self.number.json(), keys_json(keys_of("efficiency", "number"))]}
+
+
+class ShaftPower(Value):
+    """Points { flow, power }."""
+
+    about = "power at the shaft over flow, at relative speed 1 [W]"
+
+    def read(self, given: Any, setting: Setting) -> Points:
+        if isinstance(given, Points):
+            return given
+        if not isinstance(given, dict):
+            raise ValueError(f'{show(given)} is no table; wanted one such as {{ flow = [0, "50 l/s"], power = [...] }}')
+        return points(given, "power", "power", setting)
+
+    def json(self) -> dict[str, Any]:
+        return keys_json(keys_of("power", "power"))
+
+
+@dataclass(frozen=True)
+class SuterTable:
+    """A pump in all four quadrants, H = rated_head (n^2 + v^2) WH(x), T = T_rated (n^2 + v^2) WB(x).
+
+    x = pi + atan2(v, n) at equal distances from 0 to 2 pi, v = q / rated_flow, n = speed / rated speed.
+    head, torque : WH and WB
+    """
+
+    rated_flow: float
+    rated_head: float
+    head: tuple[float, ...]
+    torque: tuple[float, ...]
+
+    def table(self) -> dict[str, Any]:
+        """What the file would say."""
+        made = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in made.items()}
+
+
+class Suter(Value):
+    """A table of Suter form."""
+
+    about = "all four quadrants: WH and WB at equal distances of x = pi + atan2(flow / rated, speed / rated)"
+    keys = {
+        "rated_flow": (Quantity("flow", positive), NEEDED),
+        "rated_head": (Quantity("head", positive), NEEDED),
+        "table": (Choice("table", SUTER_TABLES, "a published one"), None),
+        "head": (Rows("number"), ()),
+        "torque": (Rows("number"), ()),
+    }
+
+    def read(self, given: Any, setting: Setting) -> SuterTable:
+        if isinstance(given, SuterTable):
+            return given
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is no table; wanted one with keys {', '.join(self.keys)}")
+        found = read_keys(given, self.keys, setting)
+        table = found.pop("table")
+        if table is not None and ("head" in given or "torque" in given):
+            raise Misfit([(("table",), "says head and torque; leave one or the other out")])
+        if table is not None:
+            found["head"], found["torque"] = SUTER_TABLES[table]
+        head, torque, faults = found["head"], found["torque"], []
+        if len(head) != len(torque):
+            faults.append((("torque",), f"{len(torque)} values for {len(head)} of head; wanted as many of both"))
+        if not head and not torque:
+            raise Misfit([((), f"wanted table, or head and torque; tables are {', '.join(SUTER_TABLES)}")])
+        for key, row in (("head", head), ("torque", torque)):
+            if len(row) < 9:
+                faults.append(((key,), f"{len(row)} values; wanted 9 or more, from x = 0 to x = 2 pi"))
+            elif row[0] != row[-1]:
+                faults.append(((key,), f"ends at {row[-1]:g} and begins at {row[0]:g}; x = 2 pi is x = 0 again"))
+        if faults:
+            raise Misfit(faults)
+        return SuterTable(**found)
+
+    def json(self) -> dict[str, Any]:
+        return keys_json(self.keys)

@@ -1,0 +1,38 @@
+"""A hole through which fluid is lost. Knows its coefficient; evaluates no flow."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from fvsolve.parts.link import Link
+from fvsolve.parts.outlet import out_of
+from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.value import Number, Text, between, positive
+
+
+class Leak(Link, kind="leak"):
+    """A leak or emitter, q = opening coefficient (p - ambient)^exponent, none where p is below ambient.
+
+    Port: from; it runs out at the elevation of its place. Below 10 Pa, a millimetre of head, a cubic leads from there
+    to no flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
+    """
+
+    joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
+
+    from_: Annotated[str, Text("the place it drains"), Field(alias="from")]
+    coefficient: Annotated[float, Number(positive, "q in m3/s at a drop of 1 Pa")]
+    exponent: Annotated[float, Number(between(0, 3, open=True), "of the drop, 0.5 for a hole of fixed size")] = 0.5
+    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "share of the coefficient that is open")] = Field(
+        default_factory=lambda: constant(1.0)
+    )
+
+    @property
+    def ports(self) -> dict[str, str]:
+        """Port name -> place."""
+        return {"from": self.from_}
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
+        law = {"flow": self.coefficient * 1e5**self.exponent, "exponent": self.exponent, "opening": self.opening}
+        return out_of(name, self.from_, **law)

@@ -1,0 +1,62 @@
+"""A pump with its shaft. Knows its curve and what turns it; computes no head."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from fvsolve.parts.head_curve import Efficiency, HeadCurve, Points, ShaftPower, Suter, SuterTable
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.schedule import Schedule, Scheduled, constant
+from fvsolve.parts.table import at_least_one
+from fvsolve.parts.value import Flag, Quantity, nonnegative, positive
+
+EFFICIENCY = 0.75
+
+
+class Pump(TwoPort, kind="pump"):
+    """Raises the head from `from` to `to` by n^2 f(q / n), n its relative speed; J d(omega)/dt = sum of torques.
+
+    f is a - b q^c through one point (4/3 of its head at no flow, none at twice its flow) or three from no flow on, and
+    straight lines through others, as in EPANET. Ports: from, to. Place: shaft (angular velocity, torque). Stored
+    energy: J omega^2 / 2 [J] where the shaft runs free. It supplies rho g H q [W].
+    """
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("curve", "power", "suter"),
+        ("efficiency", "shaft_power"),
+    )
+    owns: ClassVar[dict[str, str]] = {"shaft": "rotational"}
+    quantities: ClassVar[dict[str, str]] = {
+        "flow": "flow", "head": "head", "speed": "number", "torque": "torque", "power": "power"
+    }  # fmt: skip
+
+    curve: Annotated[Points | None, HeadCurve()] = None
+    power: Annotated[float | None, Quantity("power", positive, "given to the fluid whatever its flow [W]")] = None
+    suter: Annotated[SuterTable | None, Suter()] = None
+    speed: Annotated[Schedule, Scheduled("number", nonnegative, "relative speed")] = Field(
+        default_factory=lambda: constant(1.0)
+    )
+    rated_speed: Annotated[float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]")] = None
+    inertia: Annotated[
+        float | None, Quantity("inertia", positive, "of all that turns with the shaft, water too [kg m2]")
+    ] = None
+    trip: Annotated[float | None, Quantity("time", about="when its motor lets the shaft run down [s]")] = None
+    efficiency: Annotated[Any, Efficiency()] = None
+    shaft_power: Annotated[Points | None, ShaftPower()] = None
+    check_valve: Annotated[bool, Flag("lets nothing pass from `to` to `from`, without loss")] = False
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given) + at_least_one(given, ("curve", "power", "suter"))
+        if "trip" in given and "inertia" not in given:
+            faults.append((("trip",), "wants the inertia of all that turns with the shaft; to stop it at once let "
+                                      "speed fall to 0 by a schedule"))  # fmt: skip
+        if "inertia" in given and "rated_speed" not in given:
+            faults.append((("inertia",), 'wants rated_speed, for example "1480 rpm"'))
+        if "suter" in given and isinstance(given.get("efficiency"), dict):
+            faults.append((("efficiency",), "the torque is that of suter; wanted one number, at the rated point"))
+        if "suter" in given and "shaft_power" in given:
+            faults.append((("shaft_power",), "the torque is that of suter; leave it out"))
+        return faults

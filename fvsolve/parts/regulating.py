@@ -1,0 +1,48 @@
+"""Valves that regulate a pressure or a flow by themselves. Knows their set points; moves nothing."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.schedule import Schedule, Scheduled
+from fvsolve.parts.value import Quantity, positive
+from fvsolve.parts.valve import Sized
+
+
+class Regulating(Sized, TwoPort):
+    """A restriction whose stem moves by itself: time_constant dx/dt = error / band, between its stops 0 and 1."""
+
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
+
+    time_constant: Annotated[float, Quantity("time", positive, "time in which an error of one band moves it fully [s]")]
+
+
+class PressureReducing(Regulating, kind="pressure-reducing"):
+    """q = x Cd A sqrt(2 dp / rho), time_constant dx/dt = (set_pressure - p_to) / band, 0 <= x <= 1; never backwards.
+
+    Ports: from, to; p_to is taken at the elevation of `to`. Stored energy: none. Dissipated power: dp q [W].
+    """
+
+    set_pressure: Annotated[Schedule, Scheduled("pressure", about="that it keeps at `to` [Pa]")]
+    band: Annotated[float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant")] = 1e5
+
+
+class PressureSustaining(Regulating, kind="pressure-sustaining"):
+    """q = x Cd A sqrt(2 dp / rho), time_constant dx/dt = (p_from - set_pressure) / band, 0 <= x <= 1; never backwards.
+
+    Ports: from, to; p_from is taken at the elevation of `from`. Stored energy: none. Dissipated power: dp q [W].
+    """
+
+    set_pressure: Annotated[Schedule, Scheduled("pressure", about="that it keeps at `from` [Pa]")]
+    band: Annotated[float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant")] = 1e5
+
+
+class FlowControl(Regulating, kind="flow-control"):
+    """q = x Cd A sqrt(2 |dp| / rho) sign(dp), time_constant dx/dt = (set_flow - q) / set_flow, 0 <= x <= 1.
+
+    It limits the flow from `from` to `to`; backwards it stands open. Ports: from, to. Stored energy: none. Dissipated
+    power: dp q [W].
+    """
+
+    set_flow: Annotated[Schedule, Scheduled("flow", positive, "greatest flow that it lets pass [m3/s]")]

@@ -1,0 +1,30 @@
+"""Questions asked of a case by running it: order, chart, stability, energy. Knows cases and runs; prints nothing."""
+
+from fvsolve.names import offer
+
+_HOMES = {  # public name -> module of this room
+    "LineImpedance": "ports.line",
+    "Linear": "linear.linearise",
+    "Transfer": "ports.state_space",
+    "advection_limit": "stability.grid",
+    "advection_limits": "stability.grid",
+    "chart": "accuracy.chart",
+    "energy": "energy.energy",
+    "failures": "failure.failure_map",
+    "fit": "accuracy.fit",
+    "ladder": "accuracy.models",
+    "limited_limits": "stability.limited",
+    "line_positive_real": "ports.line",
+    "linearise": "linear.linearise",
+    "measured_limits": "stability.periodic",
+    "order": "accuracy.order",
+    "passivity": "energy.passivity",
+    "positive_real": "ports.positive_real",
+    "response": "ports.response",
+    "stability": "stability.stability",
+    "state_positive_real": "ports.state_space",
+    "sweep": "sweep",
+    "sweep_positive_real": "ports.line",
+}
+
+__all__ = offer(__name__, _HOMES)  # noqa: PLE0605

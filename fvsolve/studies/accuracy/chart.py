@@ -1,0 +1,255 @@
+"""What accuracy costs: error against time and work over schemes, methods and resolution. Knows runs; draws nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from fvsolve.case.case import Case
+from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.studies.accuracy.distance import Distance, distance, track
+from fvsolve.studies.accuracy.front import Point, Row, cheapest, curves, errors_of, row, setting_between
+from fvsolve.studies.accuracy.pareto import targets
+from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, settings
+from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
+from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
+from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
+from fvsolve.studies.outcome import Told, prepared, refusal
+from fvsolve.studies.points import Points
+
+WRONG = 1.0  # an error as great as all that the component does
+
+
+@dataclass(frozen=True)
+class Aim:
+    """A setting that reaches a target, found and run: its point, and the lines that ask for it."""
+
+    target: float
+    point: Point
+    numerics: dict
+    others: dict  # dotted keys outside [numerics]
+
+    def lines(self) -> list[str]:
+        """TOML: keys of `[numerics]`, then the tables of pipes whose cells change."""
+        found = [f"{key} = {toml(value)}" for key, value in self.numerics.items()]
+        for key, value in self.others.items():
+            table, _, name = key.rpartition(".")
+            found += ["", f"[{table}]", f"{name} = {toml(value)}"]
+        return found
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Error against cost of a case, with the floor below which it means nothing."""
+
+    case: str
+    points: list[Point]
+    reference: str
+    second: str
+    floor: dict
+    default: str
+    compile_seconds: float
+    front: list[Row]
+    reused: int = 0
+    aim: Aim | None = None
+    told: tuple[str, ...] = field(default=())
+
+    def curves(self) -> dict[str, list[Point]]:
+        """Points by name of scheme and method, from coarse to fine."""
+        return curves(self.points)
+
+    @property
+    def stands(self) -> Point | None:
+        """The program's defaults as they stand: 100 cells, or a tolerance of 1e-6; None where that was not run."""
+        curve = self.curves().get(self.default, [])
+        return next(
+            (one for one in curve if DEFAULT_CELLS == one.setting.cells or one.setting.size == DEFAULT_RTOL), None
+        )
+
+    @property
+    def failed(self) -> list[Point]:
+        """Points without a usable answer."""
+        return [point for point in self.points if not point.ok]
+
+    def plain(self) -> dict:
+        """All of it as dicts and lists, SI; the lines to paste as text."""
+        stands = None if self.stands is None else asdict(self.stands)
+        return asdict(self) | {"stands": stands} | ({} if self.aim is None else {"paste": "\n".join(self.aim.lines())})
+
+
+def chart(
+    case,
+    set: Mapping | None = None,
+    schemes: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    cells: Sequence[int] | None = None,
+    rtol: Sequence[float] | None = None,
+    step: Sequence[float] | None = None,
+    target: float | None = None,
+    folder: Path | None = None,
+    progress: Told = lambda done, total, what: None,
+) -> Chart:
+    """Run a case over schemes x methods x cells (or tolerances) and lay error against cost.
+
+    cells : of the pipe a wave takes longest to cross; rtol, step : of a case without cells [-], [s]
+    target : an error over the trajectory for which a setting is to be found and run
+    folder : where finished points are kept and found again. Raises CaseError, FvsolveError.
+    """
+    return _Study(case, set, folder, progress).go(schemes, methods, cells, rtol, step, target)
+
+
+def toml(value) -> str:
+    """Text or a number as TOML writes it."""
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+class _Study:
+    """One chart while it is made."""
+
+    def __init__(self, case, set: Mapping | None, folder: Path | None, progress: Told) -> None:
+        from fvsolve.case import load
+
+        self.case: Case = load(case, set)
+        self.points, self.progress = Points(folder), progress
+        self.default, self.compiling = default_curve(self.case), 0.0
+        self.coarse: Coarse | None = None  # with pipes
+        self.done, self.total, self.least_overshoot = 0, 0, 0.0
+        self.given_up: dict[tuple, str] = {}  # curve -> the fineness at which it was
+
+    def go(self, schemes, methods, cells, rtol, step, target) -> Chart:
+        known(schemes, methods)
+        if longest(self.case):
+            self.coarse = coarse(self.case)
+            self.compiling += self.coarse.compile_seconds
+        self.all = settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
+        self.finest = max((one.cells for one in self.all if one.cells), default=None)
+        self.total = len(self.all) + 1
+        floor = self.floor()
+        self.least_overshoot = floor["overshoot"] or 0.0
+        points, least = [self.point(setting) for setting in self.all], floor["trajectory"]
+        if all(point.trajectory < least for point in points if point.ok):
+            raise FvsolveError(_useless(self.case, points, floor))
+        rows = [row(points, one, least, self.default) for one in targets(errors_of(points), least)]
+        aim = None if target is None else self.aim(points, target, floor)
+        return Chart(
+            self.case.name, points, floor["reference"], floor["second"], floor, self.default, self.compiling, rows,
+            self.points.reused, aim, tuple(floor["told"]),
+        )  # fmt: skip
+
+    @cached_property
+    def witnesses(self) -> Witnesses:
+        """The references, run only where some point is not known yet; what runs need is compiled before."""
+        for setting in {one.curve: one for one in reversed(self.all)}.values():
+            self.progress(self.done, self.total, f"compiling {setting.name}")
+            self.compiling += self.compile(setting)
+        stiff = self.coarse is not None and self.coarse.stiff
+        return witnesses(
+            self.case, self.finest, stiff, lambda name: self.progress(self.done, self.total, f"reference {name}")
+        )
+
+    def floor(self) -> dict:
+        """What the references are called and how far they disagree."""
+
+        def make() -> dict:
+            found = self.witnesses
+            said = {"reference": found.name, "second": found.second, "told": found.told}
+            return said | asdict(found.floor)
+
+        found = self.points.get(self.case, {"study": "chart", "floor": self.finest}, make)
+        self.done += 1
+        return found
+
+    def point(self, setting: Setting) -> Point:
+        """A setting run and measured, or as it was found before; none that costs more than one that was given up."""
+        self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
+        extra, dearer = {"study": "chart", "keys": setting.keys, "judged by": self.finest}, self.given_up
+        if setting.curve in dearer:
+            found = nothing(f"not tried: already {dearer[setting.curve]} was given up")
+        else:
+            found = self.points.get(self.case, extra, lambda: self.measure(setting))
+        self.done += 1
+        if found["reason"].startswith(GIVEN_UP) and grows(setting):
+            dearer[setting.curve] = setting.fineness
+        told = {key: math.nan if value is None else value for key, value in found.items()}
+        if told["overshoot"] < self.least_overshoot:
+            told["overshoot"] = 0.0
+        return Point(setting, **told)
+
+    def compile(self, setting: Setting) -> float:
+        """Seconds that the first run of a curve takes beyond its second; none for what is refused."""
+        try:
+            return compile_seconds(prepared(self.case, setting.keys))
+        except CaseError:
+            return 0.0
+
+    def measure(self, setting: Setting) -> dict:
+        """What a point stores: errors and cost of a run, or why there are none."""
+        try:
+            model = prepared(self.case, setting.keys)
+        except CaseError as error:
+            return nothing(refusal(error))
+        judge = self.witnesses.judge
+        found = best(model)
+        errors = asdict(distance(track(found), judge) if found.ok else Distance())
+        ok, reason = found.ok, found.reason
+        if ok and not errors["trajectory"] <= WRONG:
+            ok, reason = False, f"wrong: off by {errors['trajectory']:.3g} times the range of {errors['worst']}"
+        cost = {"seconds": found.processor, "rhs": found.counts["rhs"], "updates": found.cell_updates}
+        return {"ok": ok, "reason": reason, **errors, **cost, "steps": found.counts["steps"]}
+
+    def aim(self, points: list[Point], target: float, floor: dict) -> Aim:
+        """The cheapest setting for a target, run; made finer until it holds."""
+        if not target >= floor["trajectory"]:
+            raise FvsolveError(
+                f"a target of {target:g} lies below the floor: the two references ({floor['reference']}; "
+                f"{floor['second']}) disagree by {floor['trajectory']:.2g}; ask for a larger one, or give more cells"
+            )
+        found = cheapest(points, target, floor["trajectory"], "seconds")
+        if found is None:
+            finer = "more cells" if self.coarse else "a smaller rtol"
+            raise FvsolveError(
+                f"no setting reaches {target:g}; the best is at {min(errors_of(points)):.2g}: give {finer}"
+            )
+        name, where = found
+        curve = curves(points)[name]
+        for share in (where.share, 0.5 * (1.0 + where.share)) if where.within else ():
+            made = self.point(
+                setting_between(self.case, curve[where.coarser].setting, curve[where.finer].setting, share)
+            )
+            if made.ok and made.trajectory <= target:
+                return _aim(target, made)
+        return _aim(target, curve[where.finer])
+
+
+def nothing(reason: str) -> dict:
+    """What a point stores that was not run."""
+    cost = {"seconds": math.nan, "rhs": 0, "updates": 0, "steps": 0}
+    return {"ok": False, "reason": reason, **asdict(Distance()), **cost}
+
+
+def grows(setting: Setting) -> bool:
+    """Whether the finer settings of a curve cost more: an implicit method may gain by a smaller tolerance."""
+    if setting.cells is not None or not adaptive(setting.method):
+        return True
+    return setting.method != AUTO and METHODS[setting.method].explicit
+
+
+def _aim(target: float, point: Point) -> Aim:
+    keys = point.setting.keys
+    own = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
+    return Aim(target, point, own, {key: value for key, value in keys.items() if not key.startswith("numerics.")})
+
+
+def _useless(case: Case, points: list[Point], floor: dict) -> str:
+    finest = min(errors_of(points), default=math.nan)
+    told = (
+        f"all errors (least {finest:.2g})" if math.isfinite(finest) else "what can be told, for no run reached the end"
+    )
+    way = "fewer --cells (references have four times the finest)" if longest(case) else "a larger --rtol"
+    return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
+            f"{floor['trajectory']:.2g}, more than {told}; try {way}, or end the run earlier")  # fmt: skip

@@ -1,0 +1,305 @@
+"""The rows of one order study: run, measured against a reference, fitted. Knows runs and errors; knows no words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.model.schemes import ORDER
+from fvsolve.steppers.methods import METHODS
+from fvsolve.studies.accuracy.apart import NORMS, differences, recorded, size_of
+from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
+from fvsolve.studies.accuracy.order import Order, Row
+from fvsolve.studies.accuracy.reference import ROUNDING, WORTH, Reference, of_run, reference
+from fvsolve.studies.accuracy.refine import Level, Plan, greatest_rate, pipes
+from fvsolve.studies.outcome import Outcome, Told, outcome, prepared
+from fvsolve.studies.points import Points
+
+BEST_OF = 2  # timings of a row
+UNSURE = "reference"  # the mark of rows that the reference cannot judge
+FINEST = "finest"  # the mark of a row that ran, with no finer one to judge it
+SURE_FACTOR = 0.25  # error that an extrapolated error may have
+ASTRAY = 0.06, 0.04  # how far from theory an order of three differences may lie: a + b order
+
+
+class Judge:
+    """The rows of one study and what they are measured against."""
+
+    def __init__(self, case, made: Plan, against: str) -> None:
+        self.case, self.plan, self.against = case, made, against
+        self.own = tuple(probe.text for probe in case.probes)
+        if against == "exact" and case.exact is None:
+            raise FvsolveError('against = "exact": the case names no solution under [exact]; wanted "finer"')
+        self.truth: Reference | None = None
+
+    def study(self, points: Points | None, progress: Told) -> Order:
+        """Run all rows, coarsest first, and fit; those that `points` has are reused.
+
+        Under "auto", where a finer run fails or is no better than what it would judge, each row judges the one before.
+        """
+        if self.against == "richardson":
+            return self.richardson(progress)
+        try:
+            return self.judged(points, progress)
+        except FvsolveError as error:
+            if self.against != "auto" or self.case.exact is not None:
+                raise
+            found = self.richardson(progress)
+            return replace(found, notes=(f"no other reference would do: {error}", *found.notes))
+
+    def judged(self, points: Points | None, progress: Told) -> Order:
+        """The study against an exact solution or a finer run."""
+        rows, total = [], len(self.plan.levels) + 1
+
+        def kept(what, make):
+            return make() if points is None else points.get(self.case, self.extra(what), make)
+
+        known = kept("reference", lambda: self.about(progress, total))
+        for k, level in enumerate(self.plan.levels):
+            progress(k + 1, total, words_of(self.plan, level))
+            found = kept(k, lambda level=level: self.row(level).plain())
+            rows.append(row_of(level, found))
+        own, sizes = plain_numbers(known["own"]), known["sizes"]
+        return self.made(rows, known["kind"], known["words"], own, sizes)
+
+    def extra(self, what) -> dict:
+        """What names a point beside the case."""
+        return {"study": "order", "against": self.against, "way": self.plan.way, "what": what,
+                "levels": [level.set for level in self.plan.levels]}  # fmt: skip
+
+    def about(self, progress: Told, total: int) -> dict:
+        """The reference in words and numbers."""
+        progress(0, total, "reference")
+        truth = self.reference()
+        return {"kind": truth.kind, "words": truth.words, "own": truth.own, "sizes": self.sizes()}
+
+    def reference(self) -> Reference:
+        """What rows are measured against, found when first asked for."""
+        if self.truth is None:
+            finest, avoid = self.plan.levels[-1].set, (self.case.numerics.scheme,)
+            way = "both" if self.against == "exact" else self.plan.way
+            self.truth = reference(self.case, finest, avoid, way, self.against != "finer")
+        return self.truth
+
+    def run(self, level: Level) -> Outcome:
+        """The run of a row."""
+        return outcome(self.case, recorded(self.case, level.set), best_of=BEST_OF)
+
+    def sizes(self) -> dict[str, float]:
+        """How large each variable is, by the first row that runs: rounding is measured against it."""
+        for level in self.plan.levels:
+            run = self.run(level)
+            if run.ok:
+                return {name: size_of(run, name) for name in differences(run, self.reference(), self.own)}
+        raise FvsolveError(f"no row could be run: {run.reason}")
+
+    def row(self, level: Level) -> Row:
+        """A run with its errors."""
+        run = self.run(level)
+        errors = differences(run, self.reference(), self.own) if run.ok else {}
+        return measured(level, run, errors)
+
+    def made(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
+        """Fits of all variables and norms, and what is to be said of them."""
+        fits, doubtful = {}, []
+        for name in sizes:
+            fits[name] = {}
+            for norm in NORMS:
+                errors = [row.errors.get(name, {}).get(norm, np.nan) for row in rows]
+                floor, rounding = own.get(name, {}).get(norm, 0.0), ROUNDING * sizes[name]
+                found = fit([row.level.size for row in rows], errors, max(floor, rounding))
+                unsure = [e < WORTH * floor and floor > rounding for e in errors]
+                pairs = zip(unsure, found.marks, strict=True)
+                marks = [UNSURE if bad and mark == FLOOR else mark for bad, mark in pairs]
+                fits[name][norm] = replace(found, marks=tuple(marks))
+                doubtful += [name] if any(mark == UNSURE for mark in marks) else []
+        self.refuse(rows, fits, words)
+        left_out = self.case.exact is None and "exact" in self.case.raw
+        notes = ["[exact] does not hold with these settings and is left out"] if left_out else []
+        notes += [*notes_of(rows, doubtful), *self.expected(), *self.way_out(fits)]
+        numerics = self.case.numerics
+        return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
+                     tuple(notes))  # fmt: skip
+
+    def refuse(self, rows, fits, words: str) -> None:
+        """FvsolveError where the reference can judge no row in any variable."""
+        told = [
+            mark == UNSURE
+            for name, norms in fits.items() for norm, one in norms.items()
+            for row, mark in zip(rows, one.marks, strict=True) if row.errors.get(name, {}).get(norm, 0.0) > 0.0
+        ]  # fmt: skip
+        if told and all(told):
+            raise FvsolveError(
+                f"the reference is no better than the runs it judges ({words}); name an exact solution under [exact], "
+                'take against = "richardson", or coarser rows'
+            )
+
+    def smooth_order(self) -> float:
+        """Order that scheme and method have together where all is smooth; NaN where rows are tolerances."""
+        numerics, space = self.case.numerics, ORDER[self.case.numerics.scheme]
+        if self.plan.way == "space" or (self.plan.way == "both" and numerics.rtol is not None):
+            return space
+        if self.plan.measure == "rtol":
+            return np.nan
+        method = METHODS[numerics.method].order
+        return method if self.plan.way == "time" else min(space, method)
+
+    def theory(self) -> dict[str, float]:
+        """Norm -> order that is expected: jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
+        p, breaks = self.smooth_order(), prepared(self.case).breaks
+        if self.plan.way == "time" or not breaks:
+            return dict.fromkeys(NORMS, p)
+        s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
+        return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
+
+    def expected(self) -> list[str]:
+        """What is to be said where jumps or kinks of schedules run through pipes."""
+        breaks = prepared(self.case).breaks
+        if self.plan.way == "time" or not breaks:
+            return []
+        jump, told = any(jumps for _, jumps in breaks), self.theory()
+        what = "jumps, so fronts run" if jump else "has kinks, and these run"
+        most = "none in max" if jump else f"{told['max']:.2g} in max"
+        return [
+            f"a schedule {what} through the pipes: order {self.smooth_order()} in space and time is expected to show "
+            f"about {told['L1']:.2g} in L1, {told['L2']:.2g} in L2 and {most}"
+        ]
+
+    def way_out(self, fits) -> list[str]:
+        """How to lower what steps do wrong, where it hides the order of the cells."""
+        seen = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
+        hidden = any(FLOOR in one.marks or one.reason for one in seen)
+        if self.plan.way != "space" or not hidden or len(self.plan.levels) < LEAST_ROWS:
+            return []
+        numerics, step = self.case.numerics, self.plan.levels[-1].step
+        if numerics.rtol is not None:
+            key = f"rtol={max(1e-13, 1e-3 * numerics.rtol):.2g}"
+        elif numerics.step is not None:
+            key = f"step={0.25 * step:.2g}"
+        else:
+            rate = greatest_rate(
+                self.case, {name: self.plan.levels[-1].set[f"links.{name}.cells"] for name in pipes(self.case)}
+            )
+            key = f"courant={0.25 * step * rate:.2g}"
+        return [f"what steps do wrong is the same in all rows; where that hides the order: --set numerics.{key}"]
+
+    # Richardson ------------------------------------------------------------------------------------------------
+
+    def richardson(self, progress: Told) -> Order:
+        """Errors of each row but the last: the sum of the differences to the next from there on, and what is left."""
+        runs = []
+        for k, level in enumerate(self.plan.levels):
+            progress(k, len(self.plan.levels), words_of(self.plan, level))
+            runs.append(self.run(level))
+        rows = []
+        for level, run, after in zip(self.plan.levels, runs, [*runs[1:], None], strict=True):
+            both = run.ok and after is not None and after.ok
+            rows.append(measured(level, run, differences(run, of_run(after), self.own) if both else {}))
+        names = next((row.errors for row in rows if row.errors), {})
+        good = next((run for run in runs if run.ok), None)
+        if good is None:
+            raise FvsolveError(f"no row could be run: {runs[0].reason}")
+        sizes = {name: size_of(good, name) for name in names}
+        made, theory = self.made(rows, "richardson", RICHARDSON, {}, sizes), self.theory()
+        fits = {name: {norm: alone(trusted(one, theory[norm]), rows) for norm, one in found.items()}
+                for name, found in made.fits.items()}  # fmt: skip
+        return replace(
+            made, rows=extrapolated(rows, fits), fits=fits, notes=(*made.notes, *differences_only(rows, fits))
+        )
+
+
+RICHARDSON = "Richardson: each row against the next, extrapolated"
+
+
+def trusted(found: Fit, theory: float) -> Fit:
+    """A fit of differences, none where there are just three of them and they show another order than theory."""
+    within = max(found.spread, ASTRAY[0] + ASTRAY[1] * theory)
+    if found.reason or found.marks.count("") > LEAST_ROWS or not abs(found.order - theory) > within:
+        return found
+    reason = (f"no order: three differences show {found.order:.2f} where {theory:.2g} is expected; too few to tell "
+              "whether rows are still too coarse: more levels, or finer ones")  # fmt: skip
+    return replace(found, order=np.nan, spread=np.nan, constant=np.nan, reason=reason, note="")
+
+
+def alone(found: Fit, rows) -> Fit:
+    """A fit whose rows that ran, and only lack a finer one, are not called failed."""
+    pairs = zip(found.marks, rows, strict=True)
+    return replace(found, marks=tuple(FINEST if mark == FAILED and not row.reason else mark for mark, row in pairs))
+
+
+def sure(found: Fit, ratio: float) -> bool:
+    """Whether an order p is known so well that 1 / (1 - ratio^-p) is, to a quarter."""
+    return found.order > 0.0 and np.log(ratio) * found.spread <= SURE_FACTOR * (ratio**found.order - 1.0)
+
+
+def extrapolated(rows, fits) -> tuple[Row, ...]:
+    """Rows whose differences d to the next are errors where an order p is sure: d and the error of the next.
+
+    The last difference leaves d / (ratio^p - 1).
+    """
+    found: list[Row] = []
+    for k in range(len(rows) - 1, -1, -1):
+        errors, after = {}, found[-1].errors if found else {}
+        for name, norms in rows[k].errors.items():
+            ratio, errors[name] = rows[k].level.size / rows[k + 1].level.size, {}
+            for norm, d in norms.items():
+                one = fits[name][norm]
+                rest = after[name][norm] if name in after else d / (ratio**one.order - 1.0)
+                errors[name][norm] = d + rest if sure(one, ratio) else d
+        found.append(replace(rows[k], errors=errors))
+    return tuple(reversed(found))
+
+
+def differences_only(rows, fits) -> list[str]:
+    """Where differences between rows stand in place of errors."""
+    ratio = rows[0].level.size / rows[1].level.size
+    lost = [f"{name} ({', '.join(none)})" for name, norms in fits.items()
+            if (none := [norm for norm, one in norms.items() if not sure(one, ratio)])]  # fmt: skip
+    if not lost:
+        return []
+    more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+    return [f"without a sure order nothing is extrapolated: of {', '.join(lost[:3])}{more} the table shows differences "
+            "to the next row; errors are larger"]  # fmt: skip
+
+
+def measured(level: Level, run: Outcome, errors: dict) -> Row:
+    """A row of the table from its run."""
+    counts = run.counts
+    updates = run.cell_updates if run.model is not None else 0
+    return Row(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
+               "" if run.ok else run.reason)  # fmt: skip
+
+
+def row_of(level: Level, found: Mapping) -> Row:
+    """A row from plain data."""
+    seconds = np.nan if found["seconds"] is None else found["seconds"]
+    return Row(level, plain_numbers(found["errors"]), seconds, found["rhs"], found["cell_updates"], found["steps"],
+               found["reason"])  # fmt: skip
+
+
+def plain_numbers(found: Mapping) -> dict:
+    """Variable -> norm -> number, NaN where there is None."""
+    return {name: {norm: np.nan if e is None else e for norm, e in norms.items()} for name, norms in found.items()}
+
+
+def words_of(made: Plan, level: Level) -> str:
+    """A row in words."""
+    return f"{level.cells} cells" if made.way != "time" else f"{made.measure.split(' ')[0]} {level.size:.4g}"
+
+
+def notes_of(rows, doubtful: list[str]) -> list[str]:
+    """What must be said of the numbers."""
+    notes = []
+    failed = [row for row in rows if row.reason]
+    if failed:
+        notes.append(f"{len(failed)} of {len(rows)} rows failed; the first: {failed[0].reason}")
+    if doubtful:
+        names = ", ".join(dict.fromkeys(doubtful))
+        notes.append(
+            f'rows marked "{UNSURE}" are less than {WORTH:g} times as far off as the reference itself is ({names}): '
+            "it is no judge of them; name an exact solution under [exact], or take fewer levels"
+        )
+    return notes

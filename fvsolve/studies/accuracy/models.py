@@ -1,0 +1,353 @@
+"""The ladder of models of one case, from a rigid column to the full line, linear to tabled: what each one errs, costs.
+
+Knows how a pipe is said with less; leaves the runs to `outcome`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.fluid import LAWS
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.studies.outcome import Outcome, outcome, prepared
+
+TARGET = 1e-2
+WITHOUT_CELLS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
+BEST_OF = 3
+BEYOND = 3.0  # times dp/K: from there on the laws differ by something else
+SAMPLES = 4001  # of each schedule, to find how quickly it changes
+
+
+class Misfit(Exception):
+    """Why a case cannot be said by a rung."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model of the scene: its name and law, states, what it errs against the richest and what it costs.
+
+    errors : of each probe, root mean square over time of the difference to the richest rung, over the range there [-]
+    error : the greatest of them, None where the rung is skipped, and then `reason` says why
+    greatest : the greatest difference at any time over the range, of all probes
+    seconds : of stepping, best of three; rhs : calls of the rates
+    """
+
+    name: str
+    law: str
+    reason: str = ""
+    states: int | None = None
+    error: float | None = None
+    greatest: float | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    seconds: float | None = None
+    rhs: int | None = None
+
+
+@dataclass(frozen=True)
+class Apart:
+    """How the linear law differs from the richest one, by the probe that shows it most, over its range [-].
+
+    error : root mean square over time; start : at the start of the run; moves : the range over the greatest value [-]
+    level : greatest pressure at the start over the stiffness [-]
+    """
+
+    probe: str
+    error: float
+    start: float
+    moves: float
+    level: float
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """All rungs, poorest first, and what chooses among them.
+
+    richest : the one that the others are measured against
+    cheapest : the quickest rung whose error is within the target; travel_time : of a wave along the longest pipe [s]
+    change_time : of the quickest schedule, its range over its steepest slope [s]
+    strain : greatest change of pressure from the start over the stiffness of what it acts on [-]
+    apart : how the linear law differs from the richest on its structure, None where it was not run
+    """
+
+    rungs: list[Rung]
+    richest: Rung
+    target: float
+    cheapest: Rung
+    travel_time: float
+    change_time: float
+    strain: float
+    apart: Apart | None
+
+    @property
+    def thumb(self) -> list[str]:
+        """The rules of thumb that the choice follows."""
+        found = [] if self.apart is None else [self._of_laws(self.apart)]
+        if self.travel_time > 0.0 and math.isfinite(self.change_time):
+            ratio = self.change_time / self.travel_time
+            kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
+            found.append(
+                f"a wave crosses the longest pipe in {self.travel_time:.3g} s, what acts changes in "
+                f"{self.change_time:.3g} s, {ratio:.3g} times that: {kind}"
+            )
+        return found
+
+    def _of_laws(self, apart: Apart) -> str:
+        side = "within" if apart.error <= self.target else "above"
+        said = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
+        said += f", {side} the target"
+        if apart.error <= BEYOND * self.strain:
+            return f"dp/K = {self.strain:.2g}: of a change of pressure the laws differ by about that; here {said}"
+        why = f"it is {apart.start:.3g} at the start and grows from there"
+        if apart.start >= 0.5 * apart.error:
+            why = f"{apart.start:.3g} is there from the start: pressures of {apart.level:.2g} K put the laws that far "
+            why += f"apart, and all that {apart.probe} moves is {apart.moves:.2g} of itself"
+        return f"{said}, more than dp/K = {self.strain:.2g}: {why}"
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON says it."""
+        own = {"target": self.target, "travel_time": self.travel_time, "change_time": self.change_time}
+        laws = {"strain": self.strain, "apart": self.apart and vars(self.apart), "thumb": self.thumb}
+        rungs = {"rungs": [vars(one) for one in self.rungs]}
+        return own | laws | rungs | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
+
+
+def ladder(
+    case,
+    set: Mapping | None = None,
+    target: float = TARGET,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Ladder:
+    """Run a case as rigid columns, lumped volumes, few cells, many cells, under every law it can have.
+
+    A rung that does not fit the scene is skipped and says why. The richest has the case's own cells and the richest law
+    that runs; errors are of the probes that a rung has too. Raises FvsolveError where the case itself does not run, and
+    where none of its probes moves.
+    """
+    from fvsolve.case import load
+
+    case, told = load(case, dict(set or {})), progress or (lambda *_: None)
+    asked = [(rung, law) for rung in structures(case) for law in laws(case)]
+    runs = []
+    for at, (rung, law) in enumerate(asked):
+        told(at, len(asked), f"{rung}, {law}")
+        runs.append(_run(case, rung, law))
+    at = max((k for k, one in enumerate(runs) if one.ok and asked[k][0] == asked[-1][0]), default=None)
+    if at is None:
+        raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
+    richest = runs[at]
+    rungs = [_rung(*names, one, richest) for names, one in zip(asked, runs, strict=True)]
+    able = [one for one in rungs if one.error is not None and one.error <= target]
+    if not able:
+        raise FvsolveError("no probe moves, so no model errs; probe what does, or let something act")
+    cheapest = min(able, key=lambda one: one.seconds)
+    travel, change = travel_time(richest.model), change_time(richest.model)
+    plain = next((one for one, said in zip(runs, asked, strict=True) if said == (asked[at][0], "linear")), richest)
+    return Ladder(rungs, rungs[at], target, cheapest, travel, change, strain(richest), apart(plain, richest))
+
+
+def laws(case) -> list[str]:
+    """The density laws that its fluid can have; its own alone where no place holds any."""
+    from fvsolve.case import load
+
+    if not case.places:
+        return [case.fluid.law]
+    found = [case.fluid.law]
+    for law in LAWS:
+        if law == "mixture":  # a case's own, or without gas the same as `log`
+            continue
+        try:
+            load(case, {"fluid.law": law})
+        except CaseError:
+            continue
+        found.append(law)
+    return [law for law in LAWS if law in found]
+
+
+def structures(case) -> list[str]:
+    """Names of the rungs of a case, poorest first."""
+    pipes = [link for link in case.links.values() if link.kind == "pipe"]
+    if not pipes:
+        return ["as it is"]
+    most = max(pipe.cells for pipe in pipes)
+    counts = [2**k for k in range(20) if 2 ** (k + 1) <= most]
+    cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
+    return ["rigid column", "lumped volume", "column and volume", *cells, "full line"]
+
+
+def _run(case, rung: str, law: str) -> Outcome:
+    try:
+        return outcome(case, {**restated(case, rung), "fluid.law": law}, best_of=BEST_OF)
+    except (CaseError, Misfit) as error:
+        return Outcome(f"skipped: {error}", refused=True)
+
+
+# how a scene is said with less ------------------------------------------------------------------------------
+
+
+def restated(case, rung: str) -> dict[str, Any]:
+    """The keys that say a case by a rung; raises Misfit where it cannot be."""
+    if rung in ("full line", "as it is"):
+        return {}
+    pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
+    if rung.endswith(("cell", "cells")):
+        count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
+        return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}
+    found = {"expect": {}, "compare": {}, **WITHOUT_CELLS}
+    found["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
+    if rung != "lumped volume":
+        found |= {f"links.{name}": column(case, name) for name in pipes}
+    else:
+        model = prepared(case)
+        found |= {f"links.{name}": resistance(case, model, name) for name in pipes}
+    if rung != "rigid column":
+        found |= volumes(case, pipes)
+    return found
+
+
+def _survives(probe, pipes: dict) -> bool:
+    return probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
+
+
+def column(case, name: str) -> dict[str, Any]:
+    """A pipe as a rigid column."""
+    keys = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
+    said = case.raw["links"][name]
+    found = {"type": "rigid-column", **{key: said[key] for key in keys if key in said}}
+    if found.get("friction", {}).get("model") == "unsteady":  # a column has no memory
+        kept = {key: value for key, value in found["friction"].items() if key in ("roughness", "factor")}
+        found["friction"] = {"model": "quasi-steady", **kept}
+    return found
+
+
+def resistance(case, model, name: str) -> dict[str, Any]:
+    """A pipe as the drop that its friction takes from the flow of the start, dp = zeta rho v^2 / 2."""
+    row = model.tables[rec.I_PIPES][[pipe.name for pipe in model.pipes].index(name)]
+    law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
+    flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * row["dx"] * row["cells"]
+    if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
+        raise Misfit(f"{name} is at rest at the start, so what its friction takes is not known")
+    zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
+    if not zeta > 0.0:
+        raise Misfit(f"{name} has no friction, so nothing is left of it between two volumes")
+    said = case.raw["links"][name]
+    return {"type": "orifice", "from": said["from"], "to": said["to"], "diameter": said["diameter"],
+            "loss_coefficient": zeta}  # fmt: skip
+
+
+def volumes(case, pipes: dict) -> dict[str, Any]:
+    """The junctions that pipes touch as chambers that hold half of each, wall and all: V beta / K."""
+    held: dict[str, float] = {}
+    fluid = case.properties
+    for name, pipe in pipes.items():
+        stiff = fluid.density * case.wave_speed(name) ** 2
+        half = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiff
+        for end in pipe.ports.values():
+            held[end] = held.get(end, 0.0) + half
+    found = {}
+    for name, volume in held.items():
+        node = case.places[name]
+        if node.kind in ("reservoir", "tank"):
+            continue
+        if name not in case.nodes:
+            raise Misfit(f"{name} belongs to a cylinder and holds no more than its own volume")
+        said = case.raw["nodes"][name]
+        if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
+            raise Misfit(f"flow enters or leaves at {name}, which a volume does not do by itself")
+        keys = {key: said[key] for key in ("elevation", "position", "initial_pressure") if key in said}
+        own = node.volume if node.kind == "chamber" else 0.0
+        found[f"nodes.{name}"] = {"type": "chamber", "volume": own + volume, **keys}
+    if not found:
+        raise Misfit("all ends hold their pressure, so there is no volume between them")
+    return found
+
+
+# what a rung amounts to -------------------------------------------------------------------------------------
+
+
+def _rung(name: str, law: str, one: Outcome, richest: Outcome) -> Rung:
+    if not one.ok:
+        return Rung(name, law, one.reason)
+    gaps = differences(one, richest)
+    errors = {name: _rms(gap) for name, gap in gaps.items()}
+    worst, greatest = max(errors.values(), default=None), max((float(np.max(x)) for x in gaps.values()), default=None)
+    reason = "" if errors else "none of the probes is left in it"
+    return Rung(name, law, reason, one.model.y_size, worst, greatest, errors, one.seconds, one.counts["rhs"])
+
+
+def differences(one: Outcome, richest: Outcome) -> dict[str, np.ndarray]:
+    """Probe -> sizes of the differences over the rows of both, over the range of the probe in the richest."""
+    found = {}
+    for k, name in enumerate(one.probes, 1):
+        if name not in richest.probes:
+            continue
+        truth = richest.rows[:, 1 + richest.probes.index(name)]
+        span = float(np.ptp(truth))
+        if span > 0.0:  # a probe that does not move there says nothing
+            found[name] = np.abs(one.rows[:, k] - truth) / span
+    return found
+
+
+def _rms(gap: np.ndarray) -> float:
+    return math.sqrt(float(np.mean(gap**2)))
+
+
+def apart(plain: Outcome, richest: Outcome) -> Apart | None:
+    """How one law differs from another on the same structure; None where that is the same run, or one failed."""
+    if plain is richest or not plain.ok:
+        return None
+    gaps = differences(plain, richest)
+    probe = max(gaps, key=lambda name: _rms(gaps[name]))
+    truth = richest.rows[:, 1 + richest.probes.index(probe)]
+    level = max((float(abs(change[0])) for change in pressures(richest)), default=0.0) / stiffness(richest)
+    moves = float(np.ptp(truth) / np.max(np.abs(truth)))
+    return Apart(probe, _rms(gaps[probe]), float(gaps[probe][0]), moves, level)
+
+
+def travel_time(model) -> float:
+    """Of a wave along the pipe that takes it longest [s]; 0 without pipes."""
+    return max((pipe.length / pipe.wave_speed for pipe in model.pipes), default=0.0)
+
+
+def change_time(model) -> float:
+    """Of the quickest schedule: its range over its steepest slope; 0 where one jumps, infinite where none moves [s]."""
+    numerics = model.case.numerics
+    if any(jump for t, jump in model.breaks if t > numerics.start):
+        return 0.0
+    times = np.unique([*np.linspace(numerics.start, numerics.end, SAMPLES), *(t for t, _ in model.breaks)])
+    model.tables[rec.I_SETTINGS][0]["limit"] = np.inf  # from where on schedules hold their left limit
+    quickest = math.inf
+    for index in range(len(model.tables[rec.I_SCHEDULES])):
+        values = np.array([schedule_value(model.tables, index, t) for t in times])
+        steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
+        if steepest > 0.0:
+            quickest = min(quickest, float(np.ptp(values)) / steepest)
+    return quickest
+
+
+def strain(one: Outcome) -> float:
+    """Greatest change of a pressure or head probe from the start, over the stiffness [-]."""
+    return max((float(np.max(np.abs(p - p[0]))) for p in pressures(one)), default=0.0) / stiffness(one)
+
+
+def pressures(one: Outcome) -> list[np.ndarray]:
+    """What its probes show of pressure, a head as rho g h [Pa]."""
+    weight = one.model.case.properties.density * one.model.case.gravity
+    found = []
+    for k, probe in enumerate(one.model.case.probes, 1):
+        if probe.quantity == "head" or probe.quantity.endswith("pressure"):
+            found.append(one.rows[:, k] * (weight if probe.quantity == "head" else 1.0))
+    return found
+
+
+def stiffness(one: Outcome) -> float:
+    """Of the softest pipe, wall and all, K = rho a^2; the fluid's own bulk modulus without pipes [Pa]."""
+    fluid = one.model.case.properties
+    return min((fluid.density * pipe.wave_speed**2 for pipe in one.model.pipes), default=fluid.bulk_modulus)

@@ -1,0 +1,105 @@
+"""How fast the error of a case falls with refinement, row by row. Knows rows and errors; draws and prints nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.studies.accuracy.fit import Fit
+from fvsolve.studies.accuracy.refine import Level, Plan, plan
+from fvsolve.studies.outcome import Told
+from fvsolve.studies.points import Points
+
+REFERENCES = ("auto", "exact", "finer", "richardson")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row: its level, its errors by variable and norm, and what it cost; a failed run has its reason."""
+
+    level: Level
+    errors: dict[str, dict[str, float]]
+    seconds: float
+    rhs: int
+    cell_updates: int
+    steps: int
+    reason: str = ""
+
+    def plain(self) -> dict:
+        """As plain data."""
+        said = {"cells": self.level.cells, "size": self.level.size, "step": self.level.step, "set": self.level.set}
+        cost = {"seconds": self.seconds, "rhs": self.rhs, "cell_updates": self.cell_updates, "steps": self.steps}
+        return {**said, **cost, "reason": self.reason, "errors": self.errors}
+
+
+@dataclass(frozen=True)
+class Order:
+    """An order study of one scheme and method.
+
+    fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> the reference's own error
+    kind : of the reference, "exact" | "finer" | "richardson" | "function"; notes : what must be said of the numbers
+    """
+
+    case: str
+    scheme: str
+    method: str
+    plan: Plan
+    kind: str
+    words: str
+    rows: tuple[Row, ...]
+    fits: dict[str, dict[str, Fit]]
+    own: dict[str, dict[str, float]]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """What was compared."""
+        return tuple(self.fits)
+
+    def plain(self) -> dict:
+        """As plain data, SI."""
+        return {
+            "case": self.case, "scheme": self.scheme, "method": self.method, "refine": self.plan.way,
+            "measure": self.plan.measure, "how": self.plan.words, "reference": {"kind": self.kind, "words": self.words,
+            "own_error": self.own}, "rows": [row.plain() for row in self.rows],
+            "fits": {name: {norm: one.plain() for norm, one in found.items()} for name, found in self.fits.items()},
+            "notes": list(self.notes),
+        }  # fmt: skip
+
+
+def order(
+    case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
+    cells: int | None = None, scheme: str | None = None, method: str | None = None, against: str = "auto",
+    initial: Callable | None = None, source: Callable | None = None, exact: Callable | None = None,
+    points: Points | None = None, progress: Told | None = None,
+) -> Order:  # fmt: skip
+    """Errors of a case over a refinement and the order at which they fall.
+
+    case, set : as `run` takes them; refine, key, levels, cells : as `studies.refine.plan` takes them
+    scheme, method : in place of the case's; against : "auto" (exact if the case names one, else finer), "exact",
+    "finer" (two levels finer by another scheme and method) or "richardson" (each row against the next)
+    initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
+    source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
+    exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start where `initial` is left out
+    points : finished rows, reused; progress(done, total, next)
+    Raises CaseError, FvsolveError.
+    """
+    from fvsolve.case import load
+
+    if against not in REFERENCES:
+        raise FvsolveError(
+            f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}; wanted {", ".join(REFERENCES)}'
+        )
+    given = {"numerics.scheme": scheme, "numerics.method": method}
+    case = load(case, {**(set or {}), **{name: value for name, value in given.items() if value is not None}})
+    made = plan(case, refine, key, levels, cells)
+    if initial is None and source is None and exact is None:
+        from fvsolve.studies.accuracy.judge import Judge
+
+        judge = Judge(case, made, against)
+    else:
+        from fvsolve.studies.accuracy.manufactured import Manufactured
+
+        judge = Manufactured(case, made, against, initial, source, exact)
+    return judge.study(points, progress or (lambda *_: None))

@@ -1,0 +1,116 @@
+"""Which settings a chart runs: schemes, methods, and how fine. Knows cases and what is telling; measures nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fvsolve.case.case import Case
+from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME, SCHEMES
+from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.studies.accuracy.setting import Setting, adaptive, longest, with_cells, without_cells
+from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
+from fvsolve.studies.outcome import prepared
+
+CHART_SCHEMES = ("upwind", "muscl", "upwind5", "weno5")
+EXPLICIT, IMPLICIT, IMPLICIT_SCHEME = ("ssp-rk3", "rk4", "dormand-prince"), "rodas-5p", "upwind5"
+LUMPED = ("rk4", "bogacki-shampine", "dormand-prince", "radau-iia-5", "rodas-5p", AUTO)
+TOLERANCES = tuple(float(f"1e-{k}") for k in range(2, 11))
+STEPS = tuple(32 * 4**k for k in range(7))  # of methods that estimate no error
+LEVELS, MOST_CELLS = 5, 400
+MOST_WORK = 1e7  # cells times steps of the finest run
+STIFF = 3.0  # times the steps that waves ask for
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """A coarse run of a case with pipes: its cells, the steps that its waves ask for, and the steps it took.
+
+    compile_seconds : what it took beyond a second run [s]
+    """
+
+    cells: int
+    waves: float
+    steps: int
+    compile_seconds: float
+
+    @property
+    def stiff(self) -> bool:
+        """Whether something else than waves, a small chamber say, holds explicit steps back."""
+        return self.steps > STIFF * self.waves
+
+    @property
+    def levels(self) -> list[int]:
+        """Five numbers of cells, each twice the one before, the finest as fine as a minute allows."""
+        finest = MOST_CELLS
+        while finest > 2**LEVELS:
+            finer = 16 * finest / MOST_CELLS
+            stiff = self.steps * self.cells * finer if self.stiff else 0.0
+            if self.waves * self.cells * finer**2 <= MOST_WORK and stiff <= 10 * MOST_WORK:
+                break
+            finest //= 2
+        return [finest // 2**k for k in range(LEVELS - 1, -1, -1)]
+
+
+def coarse(case: Case) -> Coarse:
+    """Run a case with pipes by the program's default on few cells."""
+    model = prepared(case, with_cells(case, DEFAULT_SCHEME, DEFAULT_METHOD, MOST_CELLS // 16).keys)
+    span = case.numerics.end - case.numerics.start
+    waves, spent = span * float(model.wave_rates.max()) / DEFAULT_COURANT, compile_seconds(model)
+    found = finished(model, capped)
+    done = (found.t - case.numerics.start) / span  # less than 1 where it was given up
+    return Coarse(model.cells, waves, round(found.counts["steps"] / done) if done > 0.0 else 0, spent)
+
+
+def default_curve(case: Case) -> str:
+    """Name of the curve that the program's defaults lie on."""
+    return f"{DEFAULT_SCHEME} {DEFAULT_METHOD}" if longest(case) else DEFAULT_METHOD_RTOL
+
+
+def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, step) -> list[Setting]:
+    """All settings, curve by curve from coarse to fine; the default's curve is always there.
+
+    found : the coarse run of a case with pipes, None of one without. Raises FvsolveError for what the case has not.
+    """
+    if found is None:
+        return _lumped(case, schemes, methods, cells, rtol, step)
+    if rtol or step:
+        raise FvsolveError(f"{case.name} has pipes, so its resolution is cells: use --cells, not a tolerance")
+    pairs, levels = chosen(schemes, methods, found.stiff), sorted({*(cells or found.levels)})
+    return [with_cells(case, *pair, level) for pair in pairs for level in levels]
+
+
+def _lumped(case: Case, schemes, methods, cells, rtol, step) -> list[Setting]:
+    if schemes or cells:
+        asked = "scheme" if schemes else "cells"
+        raise FvsolveError(f"{case.name} has no pipe, so no {asked} to choose; its resolution is rtol or step")
+    span = case.numerics.end - case.numerics.start
+    steps = sorted(step or [span / n for n in STEPS], reverse=True)
+    found = []
+    for method in dict.fromkeys([*(methods or LUMPED), DEFAULT_METHOD_RTOL]):
+        sizes = sorted(rtol or TOLERANCES, reverse=True) if adaptive(method) else steps
+        found += [without_cells(method, size) for size in sizes]
+    return found
+
+
+def chosen(schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: bool = False) -> list[tuple[str, str]]:
+    """Pairs of scheme and method: all of those asked for, else a telling set; the default's pair always."""
+    taken = list(schemes or CHART_SCHEMES)
+    if methods:
+        found = [(scheme, method) for scheme in taken for method in methods]
+    else:
+        found = [("upwind", "euler")] if "upwind" in taken else []
+        explicit = EXPLICIT[:1] if stiff else EXPLICIT  # what holds them back is the same for all
+        found += [(scheme, method) for scheme in taken for method in explicit]
+        implicit = taken if stiff else [IMPLICIT_SCHEME] if IMPLICIT_SCHEME in taken else taken[:1]
+        found += [(scheme, IMPLICIT) for scheme in implicit]
+    return list(dict.fromkeys([*found, (DEFAULT_SCHEME, DEFAULT_METHOD)]))
+
+
+def known(schemes: Sequence[str] | None, methods: Sequence[str] | None) -> None:
+    """Raises FvsolveError for a name that is none, with the nearest."""
+    for what, asked, names in (("scheme", schemes, SCHEMES), ("method", methods, (AUTO, *METHODS))):
+        for name in asked or ():
+            if name not in names:
+                raise FvsolveError(f"no {what} {name}{did_you_mean(name, names)}; {what}s are {listing(names, 60)}")

@@ -1,0 +1,208 @@
+"""The rows of a refinement: which keys a case is given, from coarse to fine. Knows cases; runs nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.model.schemes import ORDER
+from fvsolve.parts import Pipe
+from fvsolve.steppers.methods import AUTO, METHODS
+
+WAYS = ("both", "space", "time")
+TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
+LEVELS = {"both": 4, "space": 4, "time": 6}
+LOOSE = 1e-4  # tolerance that a refinement of it begins with, unless the case is looser
+MOST_CELLS = 10**6  # of a row
+STEP_SHARE = 0.01  # of what cells do wrong on the finest row that its step may, about, where space alone is refined
+LEAST_COURANT = 0.02  # below which that is not worth its time
+
+
+@dataclass(frozen=True)
+class Level:
+    """One row: what is set on the case, the size that halves from row to row, and the words of the table.
+
+    set : dotted keys -> values; size : of cells [m], steps [s] or a tolerance; cells : of all pipes
+    step : fixed step [s], NaN where steps follow a tolerance
+    """
+
+    set: dict
+    size: float
+    cells: int
+    step: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A refinement: way "both" | "space" | "time", what `size` is, the rows, and what is to be said of it."""
+
+    way: str
+    measure: str  # "cell size [m]" | "step [s]" | "rtol"
+    levels: tuple[Level, ...]
+    words: str
+
+
+def resolutions(case) -> dict[str, str]:
+    """Key -> the way it refines, of every key of a case that is a resolution."""
+    found = {f"links.{name}.cells": "both" for name in pipes(case)}
+    if found:
+        found["numerics.courant"] = "time"
+    if by_cell_time(case):
+        found["numerics.cell_time"] = "both"
+    return found | {"numerics.step": "time", "numerics.rtol": "time"}
+
+
+def by_cell_time(case) -> list[str]:
+    """Pipes that state no cells."""
+    return [name for name in pipes(case) if "cells" not in case.raw["links"][name]]
+
+
+def pipes(case) -> dict[str, Pipe]:
+    """The pipes of a case, by name."""
+    return {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
+
+
+def plan(
+    case, refine: str | None = None, key: str | None = None, levels: int | None = None, cells: int | None = None
+) -> Plan:
+    """The rows of a refinement of a case, coarsest first.
+
+    refine : "both" (cells and steps halved together, the default with pipes), "space" (cells halved, one step that
+    suits the finest), "time" (steps halved, or rtol where the case steps by error; the default without pipes)
+    key : one resolution in place of all; cells : of the coarsest row, in the pipe with most (the others in proportion)
+    Raises FvsolveError for a way, key or number of levels that cannot be.
+    """
+    known = resolutions(case)
+    if key is not None and key not in known:
+        near = did_you_mean(key, known)
+        raise FvsolveError(f"{key} is no resolution{near}; those of this case are {', '.join(known)}")
+    refine = refine or (known[key] if key else "both" if pipes(case) else "time")
+    if refine not in WAYS:
+        raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}; wanted {", ".join(WAYS)}')
+    if refine != "time" and not pipes(case):
+        raise FvsolveError(f'this case has no pipe and so no cells: refine "{refine}" cannot be; wanted "time"')
+    if key is not None and (known[key] == "time") != (refine == "time"):
+        raise FvsolveError(f'{key} refines {"time" if known[key] == "time" else "space"}, not "{refine}"')
+    levels = LEVELS[refine] if levels is None else levels
+    if levels < 2:
+        raise FvsolveError(f"levels = {levels}; wanted 2 at least, and 3 for a fitted order")
+    return time_plan(case, key, levels) if refine == "time" else space_plan(case, refine, key, levels, cells)
+
+
+# space ------------------------------------------------------------------------------------------------------------
+
+
+def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
+    """Cells of all pipes, or of the one that the key names, doubled from row to row."""
+    counts = coarsest(case, key, cells)
+    moving = [name for name in counts if key in (None, f"links.{name}.cells")]
+    moving = by_cell_time(case) if key == "numerics.cell_time" else moving
+    finest = {name: n * 2 ** (levels - 1) if name in moving else n for name, n in counts.items()}
+    most = sum(finest.values())
+    if most > MOST_CELLS:
+        raise FvsolveError(f"the finest of {levels} levels would have {most:.3g} cells; {MOST_CELLS:.0e} at most: "
+                           "fewer levels, or fewer cells to begin with")  # fmt: skip
+    rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
+    for k in range(levels):
+        now = {name: n * 2**k if name in moving else n for name, n in counts.items()}
+        kept = now if way == "both" else finest
+        step, stepping = stepping_of(case, now, kept, k, courant)
+        size = max(pipes(case)[name].length / now[name] for name in moving)
+        chosen = {f"links.{name}.cells": n for name, n in now.items()} | stepping
+        rows.append(Level(chosen, size, sum(now.values()), step))
+    what = "cells of all pipes" if len(moving) == len(counts) else f"cells of {', '.join(moving)}"
+    return Plan(way, "cell size [m]", tuple(rows), f"{what} doubled, {time_words(case, way, courant)}")
+
+
+def coarsest(case, key: str | None, cells: int | None) -> dict[str, int]:
+    """Cells of the first row."""
+    counts = {name: pipe.cells for name, pipe in pipes(case).items()}
+    if cells is None:
+        return counts
+    if cells < 1:
+        raise FvsolveError(f"cells = {cells}; wanted 1 at least")
+    if key is not None and key.endswith(".cells"):
+        return counts | {key.split(".")[1]: cells}
+    most = max(counts.values())
+    return {name: max(1, round(n * cells / most)) for name, n in counts.items()}
+
+
+def space_courant(case, levels: int) -> float | None:
+    """Courant number of the finest row that makes its step err about a hundredth as much as its cells, or the case's.
+
+    The step errs by C^q dx^q, the cells by dx^p; where p > q the share of the step doubles p - q times a level.
+    """
+    numerics = case.numerics
+    if numerics.courant is None:
+        return None
+    p, q = ORDER[numerics.scheme], METHODS[numerics.method].order
+    share = STEP_SHARE * 2.0 ** (-(levels - 1) * max(p - q, 0))
+    return min(numerics.courant, max(LEAST_COURANT, float(f"{share ** (1.0 / q):.2g}")))
+
+
+def stepping_of(
+    case, cells: Mapping[str, int], kept: Mapping[str, int], k: int, courant: float | None
+) -> tuple[float, dict]:
+    """(step [s], keys) of a row: at a Courant number on the cells `kept`, or the case's step halved k times."""
+    numerics = case.numerics
+    if numerics.rtol is not None:
+        return math.nan, {}
+    if numerics.step is not None:
+        halved = kept is cells
+        finest = numerics.step if halved else min(numerics.step, 1.0 / greatest_rate(case, kept))
+        step = finest / 2**k if halved else finest
+        return step, {"numerics.step": step}
+    step = courant / greatest_rate(case, kept)
+    return step, {} if kept is cells else {"numerics.step": step}
+
+
+def greatest_rate(case, cells: Mapping[str, int]) -> float:
+    """Cells that the quickest wave crosses in a second [1/s]."""
+    return max(case.wave_speed(name) * n / case.links[name].length for name, n in cells.items())
+
+
+def time_words(case, way: str, courant: float | None) -> str:
+    numerics = case.numerics
+    if numerics.rtol is not None:
+        return f"steps by error, rtol = {numerics.rtol:g} in all rows"
+    if way == "space":
+        finest = "" if courant is None else f": Courant number {courant:g}"
+        return f"one step for all rows, that of the finest{finest}"
+    return "steps halved with them" if numerics.step is not None else f"Courant number {numerics.courant:g} in all rows"
+
+
+# time -------------------------------------------------------------------------------------------------------------
+
+
+def time_plan(case, key: str | None, levels: int) -> Plan:
+    """Steps halved from row to row on one grid, or tolerances divided by ten."""
+    numerics, count = case.numerics, sum(pipe.cells for pipe in pipes(case).values())
+    by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
+    if by_error:
+        if numerics.method != AUTO and not METHODS[numerics.method].adaptive:
+            raise FvsolveError(f"{numerics.method} estimates no error, so rtol is no resolution of it; "
+                               "wanted numerics.step, or another method")  # fmt: skip
+        first = max(LOOSE, numerics.rtol or 0.0)
+        tolerances = [first / 10.0**k for k in range(levels)]
+        rows = tuple(Level({"numerics.rtol": rtol}, rtol, count, math.nan) for rtol in tolerances)
+        return Plan("time", "rtol", rows, "rtol divided by ten, on one grid" if count else "rtol divided by ten")
+    if numerics.method == AUTO:
+        raise FvsolveError('method "auto" goes by the error of its steps; refine numerics.rtol')
+    step = first_step(case)
+    steps = [step / 2**k for k in range(levels)]
+    rows = tuple(Level({"numerics.step": h}, h, count, h) for h in steps)
+    return Plan("time", "step [s]", rows, "steps halved, on one grid" if count else "steps halved")
+
+
+def first_step(case) -> float:
+    """The longest step of a time refinement [s]: the case's, made to fit between two rows of its history."""
+    numerics, every = case.numerics, case.output.every
+    if numerics.step is not None:
+        return numerics.step
+    if not pipes(case):
+        return every
+    cells = {name: pipe.cells for name, pipe in pipes(case).items()}
+    step = (numerics.courant or 0.9) / greatest_rate(case, cells)
+    return every / math.ceil(every / step) if every > step else step

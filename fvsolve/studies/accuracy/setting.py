@@ -1,0 +1,87 @@
+"""A setting of a chart: scheme, method and how fine, as keys of a case. Knows cases; runs nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fvsolve.case.case import Case
+from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
+from fvsolve.parts import Pipe
+from fvsolve.steppers.methods import AUTO, METHODS
+
+TOLERANCE = 1e-4  # of implicit methods where there are cells: their steps follow what moves, not the cells
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Scheme (None without cells), method, step control and its size; cells of the pipe a wave takes longest to cross.
+
+    keys : dotted keys of the case -> values
+    """
+
+    scheme: str | None
+    method: str
+    control: str
+    size: float
+    cells: int | None = None
+    keys: dict = field(default_factory=dict, compare=False)
+
+    @property
+    def curve(self) -> tuple:
+        """What the points of one curve share."""
+        return self.scheme, self.method, "courant" if self.control == "courant" else self.control
+
+    @property
+    def name(self) -> str:
+        """`upwind5 rk4`."""
+        return f"{self.scheme} {self.method}" if self.scheme else self.method
+
+    @property
+    def fineness(self) -> str:
+        """What makes it finer than its neighbours, in words."""
+        return f"{self.cells} cells" if self.cells is not None else f"{self.control} {self.size:.3g}"
+
+
+def longest(case: Case) -> str | None:
+    """Name of the pipe that a wave takes longest to cross, None without pipes."""
+    pipes = {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
+    return max(pipes, key=lambda name: pipes[name].length / case.wave_speed(name), default=None)
+
+
+def cell_keys(case: Case, cells: int) -> dict:
+    """Keys that give the longest pipe so many cells, and the others as many more or fewer as they had beside it.
+
+    Pipes that state `cells` keep stating them; those that do not share one `cell_time`.
+    """
+    main = longest(case)
+    pipes = {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
+    stated = {name for name in pipes if case.raw["links"][name].get("cells") is not None}
+    factor = cells / pipes[main].cells
+    found = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in pipes if name in stated}
+    if main not in stated:
+        found["numerics.cell_time"] = pipes[main].length / case.wave_speed(main) / cells
+    elif len(stated) < len(pipes):
+        travel = max(pipes[name].length / case.wave_speed(name) for name in pipes if name not in stated)
+        most = max(pipes[name].cells for name in pipes if name not in stated)
+        found["numerics.cell_time"] = travel / (most * factor)
+    return found
+
+
+def with_cells(case: Case, scheme: str, method: str, cells: int) -> Setting:
+    """A setting on pipes: Courant 0.9, 1 for upwind with Euler; a tolerance for adaptive implicit methods."""
+    by_error = steps_by_error(method)
+    control = "rtol" if by_error else "courant"
+    size = TOLERANCE if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
+    keys = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
+    return Setting(scheme, method, control, size, cells, keys | cell_keys(case, cells))
+
+
+def without_cells(method: str, size: float) -> Setting:
+    """A setting of ordinary differential equations: by tolerance, or by step where a method estimates no error."""
+    control = "rtol" if adaptive(method) else "step"
+    return Setting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
+
+
+def adaptive(method: str) -> bool:
+    """Whether a method can hold its steps to a tolerance."""
+    return method == AUTO or METHODS[method].adaptive

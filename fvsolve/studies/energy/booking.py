@@ -1,0 +1,177 @@
+"""Steps whose energy is booked by their own weights, from the accepted stage values. Knows a run; judges nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.mechanics import motion
+from fvsolve.model.energy_ledger import Accounts
+from fvsolve.solve.loop import Loop
+from fvsolve.solve.solve import Run
+from fvsolve.steppers import automatic
+from fvsolve.steppers import orders as told
+
+ROWS = 1000  # of the table, about
+SOUND = (
+    told.CHUNK,
+    told.DONE,
+    told.ROWS_FULL,
+    told.FIELD,
+    told.STOPPED,
+)  # answers of the loop after a step that counts
+
+
+class Booked(Loop):
+    """A loop that books the power of every accepted step by the step's own weights."""
+
+    def watch(self, accounts: Accounts, on_step) -> None:
+        """Book from here on; on_step() is called after every accepted step."""
+        self.accounts, self.on_step = accounts, on_step
+        self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # the lines, then what Newton leaves
+        self.supplied, self.rates = accounts.of("supplied"), accounts.of("rate")
+        self.dydt, self.beside = np.zeros(self.model.y_size), self.model.new_out()
+        self.orders[told.LEAPS] = 0.0  # a leap leaves no stages behind
+
+    def run(self, budget: float) -> int:
+        """`Loop.run`, one step at a time."""
+        code, left, armed = super().run(0.0), budget, self.model.tables[rec.I_ARMED]
+        while code == told.CHUNK and left > 0.0 and not automatic.wants_change(self.stepper):
+            t, y, rules = self.t, self.now.copy(), armed.copy()
+            first = self.stepper.k[0].copy(), self.stepper.supply[0].copy()
+            steps = self.memory[told.STEPS]
+            code, left = super().run(1.0), left - 1.0
+            if self.memory[told.STEPS] > steps and code in SOUND:
+                after = armed.copy()
+                armed[:] = rules  # those that the step was taken under
+                self.add(self.released(y, self.booked(t, y, *first)))
+                armed[:] = after
+                self.on_step()
+        return code
+
+    def power(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Power of every line of the ledger at a state [W]."""
+        return self.accounts.power_at(t, y, self.dydt, self.beside)
+
+    def booked(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
+        """What the step from (t, y), with slope and supplies there, adds to every line and leaves to Newton [J]."""
+        stepper, h = self.stepper, float(self.memory[told.LAST])
+        s, total = stepper.k.shape[0], np.zeros_like(self.total)
+        a, (b, c) = (part.reshape(-1, s) for part in np.split(stepper.coefficients[: s * s + 2 * s], [s * s]))
+        k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.supply[1:]])
+        if stepper.method.kind == "linear":
+            total[:-1] = b @ self.linearly_implicit(t, y, h, a, c, k)
+            return h * total
+        for i in np.flatnonzero(b):
+            total += b[i] * self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
+        return h * total
+
+    def stage(self, t: float, y: np.ndarray, slope: np.ndarray, supply: np.ndarray) -> np.ndarray:
+        """Power of every line at a stage, and what Newton leaves there [W].
+
+        Newton ends at f + J d and not at f(t, y): supply and storage are by what the state moves by, `slope` and
+        `supply`; the rest is by f, and the difference, grad E . (f - slope) less the change of supply, is Newton's.
+        """
+        power, beside = self.power(t, y), self.beside
+        if self.stepper.method.explicit:
+            return np.append(power, 0.0)
+        at = int(self.model.layout["supply"])
+        beside[at : at + supply.size] = supply
+        change = self.accounts.power_by(t, y, slope, beside) - power
+        for lines in (self.supplied, self.rates):
+            power[lines] += change[lines]
+        return np.append(power, change[self.supplied].sum() - change[self.rates].sum())
+
+    def linearly_implicit(self, t: float, y: np.ndarray, h: float, a, c, k) -> np.ndarray:
+        """Stages of the ledger of a Rosenbrock step, float64[s, lines]: one more equation z' = P(t, y) beside y.
+
+        w_i = g (P(U_i) + P_y h k_i + d_i h P_t + sum of C_ij w_j), see `steppers/ros.py`; P_y and P_t by differences.
+        """
+        s = len(c)
+        beyond = self.stepper.coefficients[s * s + 3 * s :]
+        big_c, late, gamma = beyond[: s * s].reshape(s, s), beyond[s * s : s * s + s], beyond[s * s + s]
+        per, eps = 1e-3 * h, 1e-3
+        slope = (4.0 * self.power(t + per, y) - 3.0 * self.power(t, y) - self.power(t + 2.0 * per, y)) / (2.0 * per)
+        w = np.zeros((s, len(self.total) - 1))
+        for i in range(1, s):
+            step = eps * h * k[i]
+            along = (self.power(t, y + step) - self.power(t, y - step)) / (2.0 * eps)
+            stage = self.power(t + c[i] * h, y + h * (a[i] @ k))
+            w[i] = gamma * (stage + along + late[i] * h * slope + big_c[i, 1:i] @ w[1:i])
+        return w
+
+    def released(self, y: np.ndarray, part: np.ndarray) -> np.ndarray:
+        """The same, but for stops that are left in this step: they lose what they have taken up and do not keep.
+
+        Where a contact stops to push, the rate of what it holds has a kink that no stage sees.
+        """
+        tables, lines = self.model.tables, self.accounts.stops
+        for (rate, loss), stop in zip(lines, tables[rec.I_STOPS], strict=True):
+            was, leaves = pressed(tables, stop, y)
+            now, left = pressed(tables, stop, self.now)
+            if leaves or left:
+                change = 0.5 * float(stop["stiffness"]) * (now - was) * (now + was)
+                part[loss] += part[rate] - change
+                part[rate] = change
+        return part
+
+    def add(self, part: np.ndarray) -> None:
+        """Add to the totals, with what rounding took off before."""
+        whole = part + self.carry
+        new = self.total + whole
+        self.carry = whole - (new - self.total)
+        self.total = new
+
+
+def pressed(tables, stop, y: np.ndarray) -> tuple[float, bool]:
+    """(how deep a stop is pressed [m], whether what presses it leaves quicker than it can follow)."""
+    (x_i, v_i), (x_j, v_j) = (motion(tables[rec.I_BODIES][stop[port]], y) for port in ("from_body", "to_body"))
+    above, below = (x_j - x_i) - stop["above"], -stop["below"] - (x_j - x_i)
+    deep, faster = (above, v_j - v_i) if above > below else (below, v_i - v_j)
+    leaves = faster < 0.0 and stop["stiffness"] * deep + stop["damping"] * faster <= 0.0
+    return max(0.0, float(deep)), bool(leaves)
+
+
+class EnergyRun(Run):
+    """A run with its ledger of energy."""
+
+    loop_type = Booked
+
+    def __init__(self, model, state, sink, progress) -> None:
+        super().__init__(model, state, sink, progress)
+        self.accounts = Accounts(model)
+        self.loop.watch(self.accounts, self.on_step)
+        self.times, self.totals, self.holdings = [self.loop.t], [self.loop.total.copy()], []
+        self.first = self.holding()
+        self.holdings.append(np.zeros_like(self.first))
+        self.lost = np.zeros(len(model.column_names))  # of columns that stop dead [J]
+        self.losses = [self.lost.copy()]
+        self.every = (self.end - self.start) / ROWS
+        self.step_times, self.step_totals = [self.loop.t], [self.loop.total.copy()]
+
+    def holding(self) -> np.ndarray:
+        return self.accounts.stored_at(self.loop.t, self.loop.now)
+
+    def on_step(self) -> None:
+        """Keep a row where one is due."""
+        self.step_times.append(self.loop.t)
+        self.step_totals.append(self.loop.total.copy())
+        if self.loop.t >= self.times[-1] + self.every or self.loop.t >= self.end:
+            self.keep()
+
+    def keep(self) -> None:
+        self.times.append(self.loop.t)
+        self.totals.append(self.loop.total.copy())
+        self.holdings.append(self.holding() - self.first)
+        self.losses.append(self.lost.copy())
+
+    def stop_columns(self, end: float) -> None:
+        """What a column that stops dead had in it is dissipated."""
+        columns = self.model.tables[rec.I_COLUMNS]
+        before = [self.kinetic(row) for row in columns]
+        super().stop_columns(end)
+        self.lost += [was - self.kinetic(row) for was, row in zip(before, columns, strict=True)]
+
+    def kinetic(self, row) -> float:
+        flow, rho = row["flow"] + self.loop.now[row["y"]], self.model.case.properties.density
+        return float(0.5 * flow * flow * row["length"] / (rho * row["area"]))

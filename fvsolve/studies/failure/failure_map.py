@@ -1,0 +1,206 @@
+"""A failure map: methods against steps, or against a key, each square run for real. Knows cases; leaves the verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.studies.failure.columns import Columns, columns, default_schemes
+from fvsolve.studies.failure.converged import Converged, converged
+from fvsolve.studies.failure.eigen_limit import LINEAR_TWIN, greatest_step, spectrum
+from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
+from fvsolve.studies.failure.watched import watched
+from fvsolve.studies.outcome import Told
+from fvsolve.studies.points import Points
+
+METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
+TOLERANCE = 0.02  # mean error over the range of a probe
+MOST_IMPLICIT = 50_000  # steps
+ROWS = 1000
+
+
+@dataclass(frozen=True)
+class Square:
+    """One run of the map; `limit` is the greatest stable step [s] by eigenvalues, None where there was no spectrum."""
+
+    scheme: str
+    method: str
+    column: int
+    step: float | None
+    courant: float | None
+    verdict: str
+    measures: Measures
+    halved_error: float | None
+    limit: float | None
+
+
+@dataclass(frozen=True)
+class FailureMap:
+    """key : what changes along the columns ("step" [s] or a key of the case); values : the columns.
+
+    squares : schemes x methods x columns, in that order; reference : what errors are measured against; doubt : how
+    far its check is from it; limited : the schemes whose limits are those of their weights in smooth flow
+    """
+
+    case: str
+    key: str
+    values: tuple
+    schemes: tuple[str, ...]
+    methods: tuple[str, ...]
+    squares: tuple[Square, ...]
+    tolerance: float
+    reference: str
+    doubt: float
+    wave_rate: float | None
+    limited: tuple[str, ...]
+
+    def row(self, scheme: str, method: str) -> list[Square]:
+        """The squares of a method under a scheme, by column."""
+        return [one for one in self.squares if (one.scheme, one.method) == (scheme, method)]
+
+    def plain(self) -> dict:
+        """As JSON says it: SI, None where there is no number."""
+        said = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "squares"}
+        return said | {"squares": [_plain(one) for one in self.squares]}
+
+
+def failures(
+    case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
+    courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
+    key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, points: Points | None = None,
+    progress: Told | None = None,
+) -> FailureMap:  # fmt: skip
+    """Run every method, under every scheme, at every step (or value of a key), and say what became of each run.
+
+    case : a Case; schemes, methods : see `default_schemes` and METHODS; courants or steps [s] : the columns; with
+    key = (NAME, values) these are the columns, and one step, one Courant number, or else the case's own control holds.
+    tolerance : mean error over the range of a probe. Raises FvsolveError for names and numbers that are none, and
+    where the reference is no better than the tolerance asks.
+    """
+    if not (math.isfinite(tolerance) and tolerance > 0):
+        raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")
+    base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
+    across = columns(case, base, courants, steps, key)
+    schemes, methods = _known(schemes or default_schemes(case, across), methods or METHODS)
+    trials = Trials(case, base, across, tolerance, points or Points())
+    asked = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(across.sets))]
+    squares = []
+    for scheme, method, k in asked:
+        if progress:
+            progress(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
+        squares.append(trials.square(scheme, method, k))
+    limited = tuple(name for name in schemes if name in LINEAR_TWIN and across.wave_rate)
+    return FailureMap(
+        case.name, across.name, tuple(across.values), schemes, methods, tuple(squares), tolerance,
+        trials.reference(0).words, trials.doubt, across.wave_rate, limited,
+    )  # fmt: skip
+
+
+class Trials:
+    """Runs of one map: what they are measured against, and what becomes of them."""
+
+    def __init__(self, case, base: dict, across: Columns, tolerance: float, points: Points) -> None:
+        self.case, self.base, self.across, self.tolerance, self.points = case, base, across, tolerance, points
+        self.span = across.span
+        self._references: dict[int, Converged] = {}
+        self._spectra: dict[tuple, np.ndarray | None] = {}
+        self._limits: dict[tuple, float | None] = {}
+
+    @property
+    def doubt(self) -> float:
+        """The greatest of all references."""
+        return max(one.doubt for one in self._references.values())
+
+    def reference(self, k: int) -> Converged:
+        """Of column k; one for all where only the step changes. FvsolveError where it is worth too little."""
+        at = k if self.across.keys(k) else 0
+        if at not in self._references:
+            found = converged(self.case, {**self.base, **self.across.keys(k)}, self.across.stiff(k))
+            if found.doubt > self.tolerance / 2:
+                raise FvsolveError(
+                    f"the reference is no better than the runs it judges: its check is {found.doubt:.2g} of a probe's "
+                    f"range away, the tolerance is {self.tolerance:g}; give --tolerance {4 * found.doubt:.1g}, or "
+                    "more cells"
+                )
+            self._references[at] = found
+        return self._references[at]
+
+    def limit(self, scheme: str, method: str, k: int) -> float | None:
+        """The predicted greatest step [s]; None where there is no spectrum."""
+        at = scheme, k if self.across.keys(k) else 0
+        if at not in self._spectra:
+            self._spectra[at] = spectrum(self.case, {**self.base, **self.across.keys(k), "numerics.scheme": scheme})
+        found = self._spectra[at]
+        if (method, *at) not in self._limits:
+            self._limits[method, *at] = None if found is None else greatest_step(method, found, self.span)
+        return self._limits[method, *at]
+
+    def square(self, scheme: str, method: str, k: int) -> Square:
+        """One run, and where its error is too great the same by shorter steps."""
+        trial = {**self.base, **self.across.sets[k], "numerics.scheme": scheme, "numerics.method": method}
+        step, waves = trial.get("numerics.step"), self.across.wave_rate
+        limit, errors = self.limit(scheme, method, k), []
+
+        def shorter() -> Measures:
+            found = self.measure({**trial, **_shorter(self.case, trial, 2 ** (len(errors) + 1))}, k)
+            errors.append(found.error)
+            return found
+
+        if step and self.span / step > MOST_IMPLICIT and not _explicit(method):
+            one, word = Measures(f"{self.span / step:.0f} implicit steps", False), SKIPPED
+        else:
+            one = self.measure(trial, k)
+            word = verdict(one, shorter, self.tolerance)
+        courant = step * waves if step and waves else None
+        return Square(scheme, method, k, step, courant, word, one, errors[0] if errors else None, limit)
+
+    def measure(self, trial: dict, k: int) -> Measures:
+        """A run against its reference, or what was found of it before."""
+        every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # not what is read between two steps
+        reference = self.reference(k)
+
+        def make() -> dict:
+            return asdict(measured(*watched(self.case, {**trial, "output.every": every}), reference.rows))
+
+        found = self.points.get(self.case, {"study": "map", "set": trial, "reference": reference.words}, make)
+        return Measures(**{name: math.nan if value is None else value for name, value in found.items()})
+
+
+def _shorter(case, trial: dict, times: int) -> dict:
+    """The same, with steps `times` shorter; where the error rules, with as much less of it, squared."""
+    numerics = case.numerics
+    for name, factor in (("step", times), ("courant", times), ("rtol", times**2)):
+        if f"numerics.{name}" in trial:
+            return {f"numerics.{name}": trial[f"numerics.{name}"] / factor}
+    for name, factor in (("step", times), ("courant", times), ("rtol", times**2)):
+        if getattr(numerics, name) is not None:
+            return {f"numerics.{name}": getattr(numerics, name) / factor}
+    return {}
+
+
+def _explicit(method: str) -> bool:
+    from fvsolve.steppers import METHODS as KNOWN
+
+    return method not in KNOWN or KNOWN[method].explicit
+
+
+def _known(*asked: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    from fvsolve.case.sections import SCHEMES, MethodNames
+
+    for what, names, known in zip(("scheme", "method"), asked, (SCHEMES, tuple(MethodNames())), strict=True):
+        for name in names:
+            if name not in known:
+                raise FvsolveError(f'no {what} named "{name}"{did_you_mean(name, known)}')
+    return tuple(dict.fromkeys(asked[0])), tuple(dict.fromkeys(asked[1]))
+
+
+def _plain(one: Square) -> dict:
+    said = asdict(one)
+    said |= said.pop("measures")
+    limit = one.limit
+    said["limit"] = None if limit is None or math.isinf(limit) else limit
+    return said

@@ -1,0 +1,119 @@
+"""What became of a run, in one word: stable, ringing, coarse, wrong, blown up, refused. Knows rows; runs nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+STABLE, RINGING, COARSE, WRONG, BLOWN, REFUSED, SKIPPED = (
+    "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
+)  # fmt: skip
+VERDICTS = {
+    STABLE: "error within the tolerance, and smooth",
+    RINGING: "finite, but it swings from step to step, or its probes swing more than those of the reference",
+    COARSE: "error above the tolerance, but a shorter step helps",
+    WRONG: "finite, error above the tolerance, and neither half nor a quarter of the step helps",
+    BLOWN: "not finite, or three ranges of a probe beyond what the reference reaches",
+    REFUSED: "the program refused the case, or stopped by name",
+    SKIPPED: "would take too many implicit steps",
+}
+FAR = 3.0  # ranges of a probe outside the reference's span: beyond, a run has blown up
+SWINGS = 8  # changes in a row that alternate in sign: ringing
+MORE = 0.25  # of the reference's variation: what a probe may swing more
+HELPS = 0.75  # of the error is left at most where a shorter step helps
+STILL = 1e-9  # of its greatest value: a probe that moves less stands still
+
+
+@dataclass(frozen=True)
+class Measures:
+    """A run measured against the reference, in ranges of each probe, worst probe; nan where it did not finish.
+
+    error : mean distance over the rows; farthest : how far steps lie outside the reference's span
+    ringing, variation : see `ringing` and `excess`; reason : why the run ended; refused : before it began
+    """
+
+    reason: str
+    ok: bool
+    refused: bool = False
+    error: float = math.nan
+    farthest: float = math.nan
+    ringing: float = 0.0
+    variation: float = 0.0
+    steps: int = 0
+    seconds: float = math.nan
+
+
+def verdict(one: Measures, shorter: Callable[[], Measures], tolerance: float) -> str:
+    """The word for a run; `shorter()` gives the same run at half the step, then at a quarter.
+
+    It is asked only where the error is above the tolerance.
+    """
+    if one.refused or (not one.ok and "not finite" not in one.reason):
+        return REFUSED
+    if not one.ok or not one.farthest <= FAR:
+        return BLOWN
+    if one.ringing > tolerance or one.variation > MORE:
+        return RINGING
+    if one.error <= tolerance:
+        return STABLE
+    enough = max(tolerance, HELPS * one.error)
+    return COARSE if any(shorter().error <= enough for _ in range(2)) else WRONG
+
+
+def ringing(bursts: Sequence[np.ndarray], ranges: np.ndarray) -> float:
+    """The greatest amplitude, in ranges, that a probe keeps up from step to step for SWINGS steps.
+
+    bursts : float64[steps, probes] each; ranges : float64[probes]. A swing is half a change u[n+1] - u[n]; SWINGS
+    changes in a row must alternate in sign, and the least of them counts.
+    """
+    worst = 0.0
+    for burst in bursts:
+        change = np.diff(burst, axis=0) / ranges
+        if len(change) < SWINGS:
+            continue
+        turns = change[1:] * change[:-1] < 0.0
+        windows = np.lib.stride_tricks.sliding_window_view
+        alternate = windows(turns, SWINGS - 1, axis=0).all(axis=-1)
+        least = 0.5 * windows(np.abs(change), SWINGS, axis=0).min(axis=-1)
+        worst = max(worst, float(np.max(least[alternate], initial=0.0)))
+    return worst
+
+
+def excess(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray) -> float:
+    """By what part a probe varies more than the reference: (TV - TV_ref) / max(TV_ref, range), worst probe.
+
+    TV is the sum of |changes| from row to row, after each row has been replaced by the median of itself and its
+    neighbours: one row that sticks out, read within the step after a jump, is no swing.
+    rows, reference : float64[k, probes], ranges : float64[probes]
+    """
+    one, other = (np.abs(np.diff(_medians(values), axis=0)).sum(axis=0) / ranges for values in (rows, reference))
+    return float(np.max((one - other) / np.maximum(other, 1.0), initial=0.0))
+
+
+def _medians(rows: np.ndarray) -> np.ndarray:
+    return np.median([rows[:-2], rows[1:-1], rows[2:]], axis=0) if len(rows) > 2 else rows
+
+
+def ranges_of(reference: np.ndarray) -> np.ndarray:
+    """Greatest less least value of each probe; inf for one that stands still : float64[probes]."""
+    found = np.ptp(reference, axis=0)
+    return np.where(found > STILL * np.abs(reference).max(axis=0), found, np.inf)
+
+
+def measured(outcome, bursts: Sequence[np.ndarray], reference: np.ndarray) -> Measures:
+    """A run against the reference's rows : float64[k, 1 + probes], read at the run's own times."""
+    if not outcome.ok:
+        return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
+    times, rows, span = outcome.rows[:, 0], outcome.rows[:, 1:], reference[:, 1:]
+    true = np.column_stack([np.interp(times, reference[:, 0], column) for column in span.T])
+    ranges, seen = ranges_of(span), np.concatenate([rows[-1:], *bursts])
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.abs(rows - true).mean(axis=0) / ranges
+        outside = np.maximum(seen - span.max(axis=0), span.min(axis=0) - seen) / ranges
+        return Measures(
+            outcome.reason, True, False, float(error.max()), max(0.0, float(outside.max())), ringing(bursts, ranges),
+            excess(rows, true, ranges), outcome.counts["steps"], outcome.seconds,
+        )  # fmt: skip

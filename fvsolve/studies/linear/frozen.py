@@ -1,0 +1,112 @@
+"""A state to be linearised: run there, schedules held as they are at that time. Knows runs; takes no derivative."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.ends import difference_rows
+from fvsolve.kernels.schedules import schedule_value
+from fvsolve.studies.outcome import outcome, prepared
+
+LIMITED = ("muscl", "weno5")  # schemes without a derivative at a constant state
+FROZEN_AS = {"muscl": "fromm", "weno5": "upwind5"}  # what they are where all is smooth
+
+
+@dataclass(frozen=True, eq=False)
+class Frozen:
+    """A model whose schedules stand still, and a state of it.
+
+    t : time at which they were stopped [s]; y : float64[n]  deviations from the profile
+    when : the same in words, with the side of a kink or jump where there is one
+    """
+
+    model: object
+    t: float
+    y: np.ndarray
+    when: str
+
+    @property
+    def rate(self) -> np.ndarray:
+        """dy/dt there : float64[n]; zero at a state that does not move."""
+        return self.model.rhs(self.t, self.y)
+
+
+def frozen(case, set=None, at: float | None = None, before: bool = False, probes=()) -> Frozen:
+    """The state of a case at its start, or at the time `at` [s], where it is run to first.
+
+    before : at a kink or jump of a schedule, hold the value just before it; else the one just after
+    probes : names to be observed beside those of the case, first in their order
+    A case that names no scheme gets the linear one that the default is where all is smooth.
+    Raises CaseError for a case or probe that cannot be read, FvsolveError where there is no state, or no way there.
+    """
+    from fvsolve.case import load
+
+    case = load(case, dict(set or {}))
+    if "scheme" not in case.raw["numerics"] and case.numerics.scheme in FROZEN_AS:
+        case = load(case, {"numerics.scheme": FROZEN_AS[case.numerics.scheme]})
+    names = list(dict.fromkeys([*probes, *(probe.text for probe in case.probes)]))
+    last = case.numerics.end if at is None else max(case.numerics.end, float(at))
+    model = prepared(case, {"output.probes": names, "numerics.end": last})
+    if model.y_size == 0:
+        raise FvsolveError(f"{case.name} has no state: every pressure in it is given; add a pipe, tank or chamber")
+    t, y = _arrive(model, at)
+    sides = {time: jump for time, jump in model.breaks if time == t}
+    side = "before" if before else "after"
+    when = "the start" if at is None else f"t = {t:g} s"
+    when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
+    return Frozen(stopped(model, t, before), t, y, when)
+
+
+def _arrive(model, at: float | None) -> tuple[float, np.ndarray]:
+    """Time and state at `at`, by a run; the start where it is None."""
+    start = model.case.numerics.start
+    if at is None or at == start:
+        return start, np.zeros(model.y_size)
+    if not start < at < np.inf:
+        raise FvsolveError(f"at = {at:g} s is no time after the start of the case, {start:g} s")
+    numerics = model.case.numerics.model_copy(update={"end": float(at)})
+    run = outcome(replace(model, case=replace(model.case, numerics=numerics)))
+    if not run.ok:
+        raise FvsolveError(f"the case cannot be run to t = {at:g} s, to be linearised there: {run.reason}")
+    return float(at), run.y
+
+
+def stopped(model, t: float, before: bool = False):
+    """The same model with every schedule held at its value at t [s], left or right limit."""
+    tables = list(model.tables)
+    tables[rec.I_SETTINGS][0]["limit"] = t if before else np.inf
+    schedules = tables[rec.I_SCHEDULES].copy()
+    values = [schedule_value(model.tables, k, t) for k in range(len(schedules))]
+    tables[rec.I_SETTINGS][0]["limit"] = np.inf
+    for k in range(len(schedules)):
+        schedules[k] = (k, 1)
+    tables[rec.I_SCHEDULES] = schedules
+    rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]
+    tables[rec.I_PIECES] = np.array(rows).reshape(-1, 7)
+    return replace(model, tables=tuple(tables), breaks=[])
+
+
+def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
+    """The same state with a linear scheme of these weights of cells u-2 .. u+2, ends of polynomials of `degree`.
+
+    No wider than the scheme of `at`, whose pattern of the Jacobian is kept.
+    """
+    tables = list(at.model.tables)
+    tables[rec.I_SETTINGS] = tables[rec.I_SETTINGS].copy()
+    settings = tables[rec.I_SETTINGS][0]
+    settings["scheme"], settings["degree"] = rec.LINEAR, degree
+    for k, weight in enumerate(weights):
+        settings[f"w{k}"] = weight
+    settings["inside"], settings["enter"], settings["leave"] = difference_rows(weights, degree)
+    model = replace(at.model, tables=tuple(tables))
+    model.__dict__["structure"] = at.model.structure
+    return replace(at, model=model)
+
+
+def has_limiter(model) -> bool:
+    """Whether a limited scheme is at work."""
+    return model.cells > 0 and model.case.numerics.scheme in LIMITED

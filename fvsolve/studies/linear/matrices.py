@@ -1,0 +1,151 @@
+"""A and C of a frozen state, by differences that are checked. Knows models and patterns; knows no input."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import records as rec
+from fvsolve.studies.linear.frozen import Frozen
+from fvsolve.studies.linear.slopes import FINER, SMOOTH, STEPS, central, kinks, settled
+
+DENSE = 1000  # states up to which A is a full array
+LONGEST, LARGEST = 20.0, 10_000_000  # that C may take [s], entries that it may have
+DIRECTIONS = 3  # at random, along which the whole of A is tried
+
+
+def responses(model, t: float, y: np.ndarray, outputs: int) -> np.ndarray:
+    """dy/dt, then the first probes : float64[n + outputs]."""
+    dydt, out = model.evaluate(t, y)
+    if out[rec.STATUS] != rec.OK or not np.all(np.isfinite(dydt)):
+        place = f" at {model.node_names[int(out[rec.WHERE])]}" if out[rec.WHERE] >= 0 else ""
+        raise FvsolveError(
+            f"the state cannot be linearised: no flow meets what is asked{place}; every way to it is shut"
+        )
+    if outputs == 0:
+        return dydt
+    values = np.zeros(len(model.probes))
+    model.functions()[1](float(t), np.ascontiguousarray(y), out, model.handle, values)
+    return np.concatenate([dydt, values[:outputs]])
+
+
+def widths(at: Frozen) -> np.ndarray:
+    """What counts as a small deviation of each state."""
+    return np.maximum(at.model.scale, np.abs(at.y))
+
+
+def state_matrix(at: Frozen) -> tuple[Any, np.ndarray, float, np.ndarray]:
+    """(A, size of each rate, error, steps of the differences): colour by colour of the pattern of the model.
+
+    size : float64[n]  sum of |A_ij| times the small deviation of state j
+    """
+    from scipy.sparse import csc_array
+
+    model, n, width = at.model, at.model.y_size, widths(at)
+    pattern = model.structure.pattern[:n].tocsc()
+    pattern.sort_indices()
+    rows, starts = pattern.indices, pattern.indptr[:-1]
+    columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
+    for steps in (STEPS, FINER):
+        slopes, sides = entries(at, width, rows, columns, steps)
+        size = np.bincount(rows, np.abs(slopes[len(steps) // 2]), n)
+        row_size = np.where(size > 0.0, size, 1.0)[rows]
+        values, errors = settled(slopes, row_size, starts)
+        bent = kinks(sides, row_size, starts)
+        if max(np.max(errors), np.max(bent)) <= SMOOTH:
+            break
+    else:
+        what = "slope" if np.max(errors) > SMOOTH else "kink"
+        refuse(model, int(np.argmax(errors if what == "slope" else bent)), what)
+    a = csc_array((values / width[columns], rows, pattern.indptr), shape=(n, n))
+    try_directions(at, a, width, size, steps)
+    return (a if n > DENSE else a.toarray()), size, float(np.max(errors)), steps
+
+
+def entries(at: Frozen, width, rows, columns, steps) -> tuple[np.ndarray, np.ndarray]:
+    """(slopes, sides) of the entries at `rows` and `columns` : float64[steps, entries], per small deviation."""
+    structure, slopes, sides = at.model.structure, [], []
+    base = responses(at.model, at.t, at.y, 0)
+    for color in range(structure.color_count):
+        direction = np.where(structure.colors == color, width, 0.0)
+        slope, side = central(lambda y: responses(at.model, at.t, y, 0), at.y, direction, base, steps)
+        slopes.append(slope)
+        sides.append(side)
+    picked = (slice(None), structure.colors[columns], rows)
+    return np.array(slopes).transpose(1, 0, 2)[picked], np.array(sides).transpose(1, 0, 2)[picked]
+
+
+def refuse(model, j: int, what: str) -> None:
+    """Raise for a state along which there is no derivative."""
+    why = {
+        "slope": "its slope has no end there, as that of a valve at a drop of zero: give the valve "
+                 "laminar_reynolds, or linearise while it flows (--at)",
+        "kink": "its slope differs from side to side there (a tank dry or full, an end-stop just touched): choose "
+                "another time with --at",
+    }[what]  # fmt: skip
+    raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {why}")
+
+
+def try_directions(at: Frozen, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
+    """Whether A says what happens along whole directions too: raises where f is homogeneous but not linear."""
+    model, rng = at.model, np.random.default_rng(1)
+    base = responses(model, at.t, at.y, 0)
+    for _ in range(DIRECTIONS):
+        direction = width * rng.choice([-1.0, 1.0], width.size)
+        slope, _ = central(lambda y: responses(model, at.t, y, 0), at.y, direction, base, steps)
+        apart = np.abs(slope - a @ direction) / np.where(size > 0.0, size, 1.0)
+        worst = np.min(apart, axis=0)
+        if np.max(worst) > SMOOTH:
+            where = model.state_names[int(np.argmax(worst))]
+            raise FvsolveError(f"the state cannot be linearised: the rate of {where} is no linear function of small "
+                               "deviations together; choose another time with --at")  # fmt: skip
+
+
+def output_matrix(at: Frozen, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
+    """(C, error), state by state of those that an output hangs on."""
+    model, n, width = at.model, at.model.y_size, widths(at)
+    if outputs == 0:
+        return np.zeros((0, n)), 0.0
+    if n * outputs > LARGEST:
+        raise too_large(n, outputs)
+    latest, base = time.monotonic() + LONGEST, responses(model, at.t, at.y, outputs)
+    slopes = np.zeros((len(steps), n, outputs))
+    for j in seen(at, outputs, base[n:], width):
+        if time.monotonic() > latest:
+            raise too_large(n, outputs)
+        direction = np.zeros(n)
+        direction[j] = width[j]
+        slopes[:, j] = central(lambda y: responses(model, at.t, y, outputs), at.y, direction, base, steps)[0][:, n:]
+    size = np.sum(np.abs(slopes[len(steps) // 2]), axis=0)
+    row_size = np.tile(np.where(size > 0.0, size, 1.0), n)
+    values, errors = settled(slopes.reshape(len(steps), -1), row_size, np.arange(n) * outputs)
+    return values.reshape(n, outputs).T / width, float(np.max(errors))
+
+
+def too_large(n: int, outputs: int) -> FvsolveError:
+    """What to say of a C that is not found."""
+    return FvsolveError(f"C of {n} states and {outputs} outputs is too large, or takes longer than {LONGEST:g} s: ask "
+                        "for fewer --outputs, or give the pipes fewer cells, --set links.NAME.cells=100")  # fmt: skip
+
+
+def seen(at: Frozen, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
+    """States that move some output, found by halves: of a half that moves none by one bit none does."""
+    rng, n = np.random.default_rng(2), width.size
+    direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]
+    halves = [(0, n)]
+    while halves:
+        low, high = halves.pop()
+        part = np.zeros(n)
+        part[low:high] = direction[low:high]
+        ends = (responses(at.model, at.t, at.y + sign * part, outputs)[n:] for sign in (1.0, -1.0))
+        if all(np.array_equal(end, base) for end in ends):
+            continue
+        if high - low == 1:
+            yield low
+        else:
+            middle = (low + high) // 2
+            halves += [(middle, high), (low, middle)]

@@ -1,0 +1,137 @@
+"""Eigenvalues of a linearised case: poles, in the energy norm. Knows matrices and norms; steps nothing."""
+
+from __future__ import annotations
+
+import csv
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.model.energy import EnergyForm
+
+MANY = 1500  # states up to which all eigenvalues are found; beyond, some by ARPACK
+SOME = 20  # eigenvalues that ARPACK is asked for at each place
+RIM = 5  # places, from straight up to straight left: the lower half mirrors the upper one
+RESTARTS, LONGEST = 12, 10.0  # of ARPACK at each place; at all of them together [s]
+ZERO = 1e-10  # of the greatest modulus: an eigenvalue, or a real part, below is round-off
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Eigenvalues [1/s], those nearest zero first, and which of them these are, in words."""
+
+    values: np.ndarray
+    complete: bool
+    said: str
+
+    def poles(self) -> list[dict]:
+        """One row for each real pole and each pair: s, |s| / 2 pi [Hz], damping -Re s / |s|, 1 / |Re s| [s]."""
+        found = []
+        for s in self.values[self.values.imag >= 0.0]:
+            size = abs(s)
+            found.append({
+                "real": float(s.real), "imaginary": float(s.imag), "pair": bool(s.imag > 0.0),
+                "frequency": float(size / (2.0 * np.pi)), "damping": float(0.0 - s.real / size) if size > 0.0 else None,
+                "time_constant": float(1.0 / abs(s.real)) if s.real != 0.0 else None,
+            })  # fmt: skip
+        return found
+
+
+def poles_of(a: Any, form: EnergyForm) -> Spectrum:
+    """Eigenvalues of A in the energy norm, those of idle motions among them."""
+    form = form.fitting(a)
+    found = spectrum(form.seen(a))
+    if form.idle.shape[1] == 0:
+        return found
+    idle = np.linalg.eigvals(form.idle_rows @ (a @ form.idle))
+    values = tidy(np.concatenate([found.values, idle]))
+    said = f"all {values.size}" if found.complete else f"{found.said}, and {idle.size} of motions that store no energy"
+    return Spectrum(values, found.complete, said)
+
+
+def spectrum(e: Any) -> Spectrum:
+    """Eigenvalues of a matrix : float64[n, n] or sparse; all up to 1500 states, else some by ARPACK in 10 s.
+
+    Raises FvsolveError where ARPACK finds none.
+    """
+    n = e.shape[0]
+    if n <= MANY:
+        from scipy.linalg import eigvals
+
+        values = eigvals(e if isinstance(e, np.ndarray) else e.toarray(), check_finite=False)
+        return Spectrum(tidy(values), True, f"all {n}")
+    reach = radius(e)
+    rim = [reach * np.exp(1j * angle) for angle in np.linspace(0.5 * np.pi, np.pi, RIM)]
+    latest = time.monotonic() + LONGEST
+    each = [near(e, place, latest) for place in (1e-6 * reach, *rim)]
+    values = np.concatenate(each)
+    if not values.size:
+        raise FvsolveError(
+            f"ARPACK found no eigenvalue of {n} states in time; up to {MANY} states all are found: fewer cells, "
+            "--set links.NAME.cells=100"
+        )
+    digits = 9 - int(np.log10(np.abs(values).max()))
+    kept = tidy(np.unique(np.round(np.concatenate([values, values.conj()]), digits)))
+    on_rim = sum(part.size > 0 for part in each[1:])
+    zero = "those nearest 0" if each[0].size else "none near 0 converged"
+    others = f"nearest {on_rim} of {RIM} places" if on_rim else f"none of {RIM} places converged"
+    where = f"{zero}; on the rim |s| = {reach:.4g} 1/s {others}"
+    return Spectrum(kept, False, f"{kept.size} of {n}: {where}; by ARPACK")
+
+
+def radius(e: Any) -> float:
+    """The spectral radius [1/s], about: the mean growth of a vector that is multiplied again and again."""
+    v, sizes = np.random.default_rng(1).standard_normal(e.shape[0]), []
+    for _ in range(200):
+        v = e @ (v / np.linalg.norm(v))
+        sizes.append(np.linalg.norm(v))
+    return float(np.exp(np.mean(np.log(sizes[100:]))))
+
+
+def near(e: Any, place: complex, latest: float = np.inf) -> np.ndarray:
+    """Some eigenvalues of a sparse matrix, nearest a place; none where ARPACK does not converge, or not by `latest`."""
+    from scipy.sparse import eye_array
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
+
+    kind = complex if isinstance(place, complex) else float
+    e, start = e.astype(kind), np.random.default_rng(1).standard_normal(e.shape[0]).astype(kind)
+    if time.monotonic() > latest:
+        return np.zeros(0)
+    factors = splu((e - place * eye_array(e.shape[0])).tocsc())
+
+    def solve(v: np.ndarray) -> np.ndarray:
+        if time.monotonic() > latest:
+            raise TimeoutError
+        return factors.solve(v.astype(kind))
+
+    inverse = LinearOperator(e.shape, matvec=solve, dtype=kind)
+    try:
+        return eigs(e, SOME, sigma=place, OPinv=inverse, ncv=3 * SOME, maxiter=RESTARTS, v0=start,
+                    return_eigenvectors=False)  # fmt: skip
+    except ArpackNoConvergence as error:
+        return error.eigenvalues
+    except TimeoutError:
+        return np.zeros(0)
+
+
+def tidy(values: np.ndarray) -> np.ndarray:
+    """Nearest zero first; what is round-off beside the greatest is zero, as are such real and imaginary parts."""
+    values = np.asarray(values, dtype=complex)
+    floor = ZERO * np.max(np.abs(values), initial=0.0)
+    real, imaginary = (np.where(np.abs(part) <= floor, 0.0, part) for part in (values.real, values.imag))
+    values = real + 1j * imaginary
+    return values[np.lexsort((-values.imag, -values.real, np.round(np.abs(values), 12)))]
+
+
+def write_poles(path: Path, poles: list[dict]) -> None:
+    """A CSV of poles."""
+    names = {"real": "real [1/s]", "imaginary": "imaginary [1/s]", "pair": "pair", "frequency": "frequency [Hz]",
+             "damping": "damping", "time_constant": "time constant [s]"}  # fmt: skip
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        made = csv.writer(file)
+        made.writerow(names.values())
+        made.writerows([pole[name] for name in names] for pole in poles)

@@ -1,0 +1,109 @@
+"""One run of a study: a case with some keys changed, and what came of it. Knows runs; knows no question."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fvsolve.errors import CaseError
+from fvsolve.run import model_of
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How a run ended and what it holds, in SI; a refused one has only its reason.
+
+    y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
+    counts : steps, rejections, rhs, ...; seconds : stepping alone, nothing compiled [s]; processor : its CPU time [s]
+    """
+
+    reason: str
+    ok: bool = False
+    refused: bool = False
+    t: float = float("nan")
+    y: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))
+    probes: tuple[str, ...] = ()
+    counts: dict[str, int] = field(default_factory=dict)
+    seconds: float = float("nan")
+    processor: float = float("nan")
+    model: object = None
+
+    @property
+    def cell_updates(self) -> int:
+        """Calls of the rates times cells (or states, without cells): a cost that no machine changes."""
+        return self.counts.get("rhs", 0) * max(1, self.model.cells or self.model.y_size)
+
+
+class Rows:
+    """The sink of a study's run: its rows in SI, nothing else."""
+
+    def __init__(self) -> None:
+        self.blocks: list[np.ndarray] = []
+
+    def rows(self, t, values) -> None:
+        """Keep probe rows: t float64[k] [s], values float64[k, probes] [SI]."""
+        self.blocks.append(np.column_stack([t, values]))
+
+    def field(self, t: float, frame: dict) -> None:
+        """Not kept."""
+
+    def checkpoint(self, state, extra: dict) -> None:
+        """Not kept."""
+
+    def end(self, summary) -> None:
+        """Nothing to close."""
+
+
+def prepared(case, set: Mapping | None = None):
+    """The model of a case with keys changed, without frames; what `outcome` takes. Raises CaseError."""
+    from fvsolve.case import load
+
+    return model_of(load(case, {**(set or {}), "output.fields": 0}))
+
+
+def outcome(
+    case, set: Mapping | None = None, y: np.ndarray | None = None, best_of: int = 1, run: Callable | None = None
+) -> Outcome:
+    """Run a case (or a model) with keys changed; a case that is refused is an outcome too.
+
+    y : float64[n]  the state to start from, in place of no deviation from the profile
+    best_of : runs, of which the quickest counts; from the second on everything is compiled and in the cache
+    run : what makes the run of (model, state, sink, progress), `solve.Run` if left out
+    """
+    try:
+        model = prepared(case, set) if not hasattr(case, "tables") else case
+    except CaseError as error:
+        return Outcome(refusal(error), refused=True)
+    found = [_once(model, y, run) for _ in range(best_of)]
+    return min(found, key=lambda one: one.seconds)
+
+
+def refusal(error: CaseError) -> str:
+    """Why a case was refused, in one line: every fault with its place, one that many places share with the first."""
+    first = {fault.message: fault.place for fault in reversed(error.faults)}
+    return f"refused: {'; '.join(f'{place}: {message}' for message, place in reversed(first.items()))}"
+
+
+def _once(model, y, run) -> Outcome:
+    from fvsolve.solve import initial_state
+    from fvsolve.solve.solve import Run
+
+    state, sink = initial_state(model), Rows()
+    if y is not None:
+        state.y[:] = y
+    made = (run or Run)(model, state, sink, None)
+    summary = made.go()
+    if summary.reason.startswith("interrupted"):  # a run ends cleanly at Ctrl-C; a study ends with it
+        raise KeyboardInterrupt
+    rows = np.concatenate([np.empty((0, 1 + len(model.probes))), *sink.blocks])
+    names = tuple(probe.text for probe in model.case.probes)
+    return Outcome(
+        summary.reason, summary.ok, False, summary.t, made.loop.now.copy(), rows, names, summary.counts,
+        summary.seconds, made.processor, model,
+    )  # fmt: skip
+
+
+Told = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress

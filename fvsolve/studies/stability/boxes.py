@@ -1,0 +1,92 @@
+"""Whether a polynomial in two variables is nowhere negative in a box, proved in whole numbers. Knows no method.
+
+In Bernstein's basis a polynomial lies between its least and its greatest coefficient, and those at the corners are
+its values there; halving the box draws the coefficients towards the values (Lane and Riesenfeld 1981). Coefficients
+are whole multiples of 2^-BITS of the largest one, rounded down, so that what is proved of them holds of the polynomial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+
+BITS = 400
+MOST_BOXES = 400  # after that many the question is left open
+
+Matrix = Sequence[Sequence[int]]  # g[m][i] of x^m y^i
+
+
+def value(g: Matrix, x: Fraction, y: Fraction) -> Fraction:
+    """sum g[m][i] x^m y^i."""
+    total = Fraction(0)
+    for row in reversed(g):
+        inner = Fraction(0)
+        for one in reversed(row):
+            inner = inner * y + one
+        total = total * x + inner
+    return total
+
+
+def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction] | str | None:
+    """None where g >= 0 for all low <= x <= high, 0 <= y <= 1; else a point where g < 0, or "open" if undecided."""
+    boxes, seen = [(_bernstein(g, low, high), low, high, Fraction(0), Fraction(1))], 0
+    while boxes:
+        b, x0, x1, y0, y1 = boxes.pop()
+        if all(one >= 0 for one in b.flat):
+            continue
+        for corner, x, y in ((b[0, 0], x0, y0), (b[0, -1], x0, y1), (b[-1, 0], x1, y0), (b[-1, -1], x1, y1)):
+            if corner < 0 and value(g, x, y) < 0:
+                return x, y
+        seen += 1
+        if seen > MOST_BOXES:
+            return "open"
+        if _bends(b) >= _bends(b.T):
+            one, two = _halves(b)
+            middle = (x0 + x1) / 2
+            boxes += [(one, x0, middle, y0, y1), (two, middle, x1, y0, y1)]
+        else:
+            one, two = _halves(b.T)
+            middle = (y0 + y1) / 2
+            boxes += [(one.T, x0, x1, y0, middle), (two.T, x0, x1, middle, y1)]
+    return None
+
+
+def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
+    """Coefficients on low..high x 0..1, rounded down; positive factors are left out."""
+    a = np.array([[Fraction(one) for one in row] for row in g], dtype=object)
+    for k in range(a.shape[0] - 1):  # x = low + s: Horner's scheme, again and again
+        for m in range(a.shape[0] - 2, k - 1, -1):
+            a[m] = a[m] + low * a[m + 1]
+    width, power = high - low, Fraction(1)
+    for m in range(a.shape[0]):
+        a[m], power = a[m] * power, power * width
+    a = _to_bernstein(_to_bernstein(a).T).T
+    largest = max(abs(one) for one in a.flat) or Fraction(1)
+    scaled = [(one.numerator << BITS) * largest.denominator // (one.denominator * largest.numerator) for one in a.flat]
+    return np.array(scaled, dtype=object).reshape(a.shape)
+
+
+def _to_bernstein(a: np.ndarray) -> np.ndarray:
+    """From powers to Bernstein's basis along the first axis: b_j = sum_i C(j, i) / C(n, i) a_i."""
+    n = a.shape[0] - 1
+    return np.array([sum(Fraction(comb(j, i), comb(n, i)) * a[i] for i in range(j + 1)) for j in range(n + 1)])
+
+
+def _halves(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients on both halves of the first axis (de Casteljau), rounded down."""
+    left, right, now = [b[0]], [b[-1]], b
+    for _ in range(b.shape[0] - 1):
+        now = (now[:-1] + now[1:]) >> 1
+        left.append(now[0])
+        right.append(now[-1])
+    return np.array(left, dtype=object), np.array(right[::-1], dtype=object)
+
+
+def _bends(b: np.ndarray) -> int:
+    """How far the coefficients are from a straight line along the first axis, over the whole degree."""
+    if b.shape[0] < 3:
+        return 0
+    return max(abs(one) for one in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2

@@ -1,0 +1,414 @@
+"""The Courant limit of linear advection on a uniform periodic grid, exactly (von Neumann). Knows schemes and methods.
+
+A wave of phase theta a cell is multiplied by R(nu z(theta)) a step, R the method's stability function, z the scheme's
+symbol, nu the Courant number. With R = N / D and t = sin^2(theta / 2), E(nu, t) = |D|^2 - |N|^2 is a polynomial with
+rational coefficients; a Courant number is stable where E >= 0 for all t. Factors nu^a and t^p are divided out, so
+that waves of any length, however slowly they grow, are decided alike; at t = 0 what is left decides the longest.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers.analysis.stability import a_stable
+from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
+from fvsolve.steppers.exact.polynomial import Polynomial, sign
+from fvsolve.steppers.exact.sturm import count_roots, odd_part
+from fvsolve.steppers.tableau import METHODS, Method, method_named
+from fvsolve.studies.stability.boxes import negative_point, value
+from fvsolve.studies.stability.symbol import WEIGHTS, real_part, square, symbol, weights_of
+
+RAYS = 240  # waves whose roots are looked at first
+ZOOMS, ZOOM_RAYS = 9, 17
+MARGIN = Fraction(1, 10**9)  # of the limit, left on both sides of it by the proof
+TURNS = 8  # of a search that a proof may send back
+ALGEBRAIC_DIGITS = 30  # that an algebraic number is taken to
+BEYOND, SOME = 1.01, 0.5  # times the limit, and where there is none: where growth is quoted
+THOUSANDFOLD = 1e3
+SEEN = 1e-8  # |R| - 1 that floating point finds to seven digits
+SLOW_WAVES, SLOW_ZOOMS = 24, 6
+EVERY, LONGEST, SHORTEST, BETWEEN, GROWS = "all", "longest", "shortest", "between", "grows"
+
+
+@dataclass(frozen=True)
+class Edge:
+    """An end of a stable range: its Courant number and the wave that sets it, by t = sin^2(theta / 2) and in words."""
+
+    courant: float
+    t: Fraction = Fraction(0)
+    wave: str = ""
+
+    @property
+    def theta(self) -> float:
+        """Phase a cell [rad]."""
+        return 2 * math.asin(math.sqrt(self.t))
+
+
+EVERYTHING = [(Edge(0.0), Edge(math.inf))]
+
+
+@dataclass(frozen=True)
+class AdvectionLimit:
+    """Which Courant numbers of a uniform periodic grid are stable.
+
+    limit : the greatest Courant number all below which are stable; 0 where there is none, inf without end;
+    theta [rad a cell], wave : of the waves that set it, None where nothing does; stable : ranges (low, high) of stable
+    Courant numbers, more than one where stability comes back; proved : whether each range is proved in exact numbers
+    to one part in 10^9; digits : of a published tableau, None where its numbers are exact; courant, growth, steps : the
+    Courant number asked for, else 1 % above the limit (0.5 where it is 0), the greatest |R| - 1 there, 0 where it is
+    stable, and the steps to a thousandfold.
+    """
+
+    scheme: str
+    method: str
+    limit: float
+    theta: float | None
+    wave: str | None
+    stable: tuple[tuple[float, float], ...]
+    proved: bool
+    digits: int | None
+    courant: float | None
+    growth: float | None
+    steps: float | None
+
+    def plain(self) -> dict:
+        """As JSON says it: None for infinity."""
+        found = asdict(self)
+        found["limit"] = _finite(self.limit)
+        found["stable"] = [[low, _finite(high)] for low, high in self.stable]
+        return found
+
+
+def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
+    """The exact Courant limit of a linear scheme and a method, and the growth at `courant`.
+
+    Raises FvsolveError for names that are none, and for schemes that are not linear.
+    """
+    return limit_of(weights_of(scheme), scheme, method, courant)
+
+
+def advection_limits(
+    schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
+) -> list[AdvectionLimit]:
+    """Rows of the table, schemes inside methods; None for all of them."""
+    if courant is not None and not (math.isfinite(courant) and courant > 0):
+        raise FvsolveError(f"courant = {courant:g}: wanted a positive number")
+    schemes = list(dict.fromkeys(schemes or WEIGHTS))
+    for name in schemes:
+        weights_of(name)
+    named = [method_named(name).name for name in methods] if methods else [m.name for m in METHODS.values()]
+    return [advection_limit(scheme, name, courant) for name in dict.fromkeys(named) for scheme in schemes]
+
+
+def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
+    """The same for any face weights of cells u-2 .. u+2 that add up to one."""
+    known = method_named(method)
+    gaps, proved = _gaps(tuple(weights), *_rational(method), _is_a_stable(known))
+    edge = gaps[0][1] if gaps and gaps[0][0].courant == 0 else None
+    limit = edge.courant if edge else 0.0
+    stable = tuple((low.courant, high.courant) for low, high in gaps)
+    if courant is None and math.isfinite(limit):
+        courant = limit * BEYOND or SOME
+    growth = steps = None
+    if courant is not None:
+        still = any(low <= courant <= high for low, high in stable)
+        growth, fastest = (0.0, 0.0) if still else growth_of(weights, method, courant)
+        steps = math.log(THOUSANDFOLD) / math.log1p(growth) if growth > 0 else None
+    theta, wave = (None, None) if math.isinf(limit) else (edge.theta, edge.wave) if edge else (fastest, GROWS)
+    return AdvectionLimit(scheme, known.name, limit, theta, wave, stable, proved, known.digits, courant, growth, steps)
+
+
+def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple[float, float]:
+    """(greatest |R(nu z(theta))| - 1, its theta) at a Courant number nu; by fractions where floats would not see it."""
+    r = _function(method)
+    theta = np.linspace(0.0, np.pi, 4001)
+    for _ in range(6):
+        size = np.abs(r(courant * symbol(weights, theta)))
+        at = int(np.argmax(size))
+        best, most = float(theta[at]), float(size[at]) - 1
+        theta = np.linspace(theta[max(at - 1, 0)], theta[min(at + 1, theta.size - 1)], 201)
+    return (most, best) if most > SEEN else _slow_growth(weights, method, Fraction(courant))
+
+
+def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) -> tuple[float, float]:
+    """The same in fractions, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)), on few waves, closer and closer."""
+    (r, _), a, q = _rational(method), real_part(weights), square(weights)
+    theta = [k * math.pi / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
+    for _ in range(SLOW_ZOOMS):
+        found = []
+        for x in theta:
+            t = _dyadic(math.sin(x / 2) ** 2, 60)
+            up, down = (_modulus(p, courant * a(t), courant**2 * q(t)) for p in (r.numerator, r.denominator))
+            found.append(float((up - down) / down))
+        at = int(np.argmax(found))
+        low, high = theta[max(at - 1, 0)], theta[min(at + 1, len(theta) - 1)]
+        best, most = theta[at], found[at]
+        theta = [low + (high - low) * k / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
+    return most / (1 + math.sqrt(1 + most)), best
+
+
+def _modulus(p: Polynomial, real: Fraction, size: Fraction) -> Fraction:
+    """|p(s)|^2 of s with that real part and that |s|^2: sum_jk p_j p_k |s|^2k Re(s^(j-k))."""
+    cosines = [Fraction(1), real]
+    while len(cosines) <= p.degree:
+        cosines.append(2 * real * cosines[-1] - size * cosines[-2])
+    terms = (
+        (1 if j == k else 2) * p.coefficients[j] * p.coefficients[k] * size**k * cosines[j - k]
+        for j in range(p.degree + 1)
+        for k in range(j + 1)
+    )
+    return sum(terms, Fraction(0))
+
+
+# ---- the polynomial E
+
+
+def _function(method: str) -> StabilityFunction:
+    return _known(method_named(method))
+
+
+@functools.cache
+def _known(method: Method) -> StabilityFunction:
+    return stability_function(method)
+
+
+@functools.cache
+def _is_a_stable(method: Method) -> bool:
+    return a_stable(_known(method))
+
+
+def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
+    """R with fractions alone, and the relative size below which a coefficient of E is rounding."""
+    known, r = method_named(method), _function(method)
+    parts = (*r.numerator.coefficients, *r.denominator.coefficients)
+    exact = all(isinstance(x, Fraction) for x in parts)
+    digits = known.digits - 2 if known.digits else ALGEBRAIC_DIGITS
+    tolerance = Fraction(0) if exact and not known.digits else Fraction(1, 10**digits)
+    if exact:
+        return r, tolerance
+    up, down = (Polynomial(_fraction(x) for x in p.coefficients) for p in (r.numerator, r.denominator))
+    return StabilityFunction(up, down), tolerance
+
+
+def _fraction(x) -> Fraction:
+    if isinstance(x, Fraction):
+        return x
+    low, high = x.bracket()
+    return (low + high) / 2
+
+
+def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction) -> list[list[int]]:
+    """A positive multiple of E without the factors that all its terms share: whole coefficients of nu^m t^i.
+
+    E = sum_jk (d_j d_k - n_j n_k) nu^(j+k) Re(z^j conj(z)^k);
+    Re(z^j conj(z)^k) = |z|^2k c_j-k, c_0 = 1, c_1 = Re z, c_m+1 = 2 Re z c_m - |z|^2 c_m-1.
+    """
+    size = max(r.numerator.degree, r.denominator.degree)
+    pairs = (r.denominator, 1), (r.numerator, -1)
+    a, q = real_part(weights), square(weights)
+    c, powers = [Polynomial([1]), a], [Polynomial([1])]
+    for _ in range(2 * size):
+        c.append(2 * a * c[-1] - q * c[-2])
+        powers.append(powers[-1] * q)
+    found = []
+    for m in range(2 * size + 1):
+        row, doubt = Polynomial([]), Polynomial([])
+        for k in range(max(0, m - size), m // 2 + 1):
+            one = powers[k] * c[m - 2 * k]
+            parts = [s * _at(p, k) * _at(p, m - k) * (1 if 2 * k == m else 2) for p, s in pairs]
+            row = row + sum(parts) * one
+            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, one.coefficients)) if tolerance else doubt
+        found.append(_chopped(row, doubt, tolerance))
+    return _reduced(found)
+
+
+def _at(p: Polynomial, k: int) -> Fraction:
+    return p.coefficients[k] if k <= p.degree else Fraction(0)
+
+
+def _chopped(p: Polynomial, doubt: Polynomial, tolerance: Fraction) -> Polynomial:
+    return Polynomial(x if abs(x) > tolerance * _at(doubt, i) else Fraction(0) for i, x in enumerate(p.coefficients))
+
+
+def _reduced(rows: list[Polynomial]) -> list[list[int]]:
+    """In whole numbers, without nu^a and the factor in t that all terms share; empty where nothing is left.
+
+    That factor is zero where z is: at t = 0, and at t = 1 for central differences. Where it changes its sign between,
+    E does at every nu, which a term -1 says.
+    """
+    while rows and rows[0].degree < 0:
+        rows = rows[1:]
+    while rows and rows[-1].degree < 0:
+        rows = rows[:-1]
+    if not rows:
+        return []
+    common = Polynomial([])
+    for p in sorted((p for p in rows if p.degree >= 0), key=lambda p: p.degree):
+        common = common.gcd(p)
+    if _signs(common) == {-1, 1}:
+        return [[-1]]
+    common = common if 1 in _signs(common) else -common
+    rows = [p // common for p in rows]
+    wide = max(p.degree for p in rows) + 1
+    whole = math.lcm(*(x.denominator for p in rows for x in p.coefficients))
+    return [[int(_at(p, i) * whole) for i in range(wide)] for p in rows]
+
+
+def _signs(p: Polynomial) -> set[int]:
+    """The signs that p takes on 0 < t < 1, but for its zeros, decided."""
+    changes = odd_part(p) if p.degree > 0 else p
+    for end in (0, 1):
+        while changes.degree > 0 and changes(Fraction(end)) == 0:
+            changes = changes // Polynomial([-end, 1])
+    if changes.degree > 0 and count_roots(changes, Fraction(0), Fraction(1)):
+        return {-1, 1}
+    return {sign(p(t)) for t in (Fraction(k, 64) for k in range(1, 64))} - {0}
+
+
+# ---- where it is negative
+
+
+def _gaps(weights: tuple, r: StabilityFunction, tolerance: Fraction, left_half_plane: bool):
+    """(stable ranges as pairs of edges, whether they are proved)."""
+    if left_half_plane and 1 not in _signs(real_part(weights)):
+        return EVERYTHING, True
+    return _gaps_of(weights, r.numerator.coefficients, r.denominator.coefficients, tolerance)
+
+
+@functools.cache
+def _gaps_of(weights: tuple, numerator: tuple, denominator: tuple, tolerance: Fraction):
+    g = _e_polynomial(weights, StabilityFunction(Polynomial(numerator), Polynomial(denominator)), tolerance)
+    if not g:
+        return EVERYTHING, True
+    rays = {_dyadic(math.sin(k * math.pi / (2 * RAYS)) ** 2, 24) for k in range(RAYS + 1)}
+    gaps: list = []
+    for _ in range(TURNS):
+        gaps = _candidates(g, sorted(rays))
+        found = [_refuted(g, low.courant, high.courant) for low, high in gaps]
+        points = [one for one in found if isinstance(one, tuple)]
+        if not points:
+            return gaps, not any(found) and _fails_outside(g, gaps, rays)
+        for _, t in points:
+            rays |= {t, *(min(t * Fraction(k, 8), Fraction(1)) for k in (4, 6, 7, 9, 10, 16))}
+    return [gap for gap, one in zip(gaps, found, strict=True) if not isinstance(one, tuple)], False
+
+
+def _refuted(g, low: float, high: float):
+    """What `negative_point` says of the range, less a margin at its finite ends."""
+    start = Fraction(low) * (1 + MARGIN)
+    if math.isfinite(high):
+        return negative_point(g, start, Fraction(high) * (1 - MARGIN))
+    middle = max(start, Fraction(1))
+    found = negative_point(g, start, middle) if start < middle else None
+    far = negative_point(g[::-1], Fraction(0), 1 / middle) if found is None else found
+    return (1 / far[0], far[1]) if isinstance(far, tuple) and found is None and far[0] else far
+
+
+def _fails_outside(g, gaps, rays) -> bool:
+    """Whether some wave grows just outside of each end, and at every small step where no range starts at 0, decided."""
+    if (not gaps or gaps[0][0].courant > 0) and not any(_falls(g, t) for t in rays):
+        return False
+    ends = [(low, 1 - MARGIN) for low, _ in gaps if low.courant > 0]
+    ends += [(high, 1 + MARGIN) for _, high in gaps if math.isfinite(high.courant)]
+    return all(value(g, Fraction(edge.courant) * factor, edge.t) < 0 for edge, factor in ends)
+
+
+def _falls(g, t: Fraction) -> bool:
+    """Whether the polynomial at t is negative for all small nu > 0."""
+    return next((x < 0 for x in _on(g, t) if x), False)
+
+
+def _candidates(g, rays: list[Fraction]):
+    """Stable ranges as the rays show them, their ends sharpened between the rays."""
+    unstable = sorted(one for t in rays for one in _negative(_on(g, t)))
+    gaps, at = [], 0.0
+    for low, high in [*unstable, (math.inf, math.inf)]:
+        if low > at * (1 + 1e-9):
+            gaps.append((at, low))
+        at = max(at, high)
+    return [one for low, high in gaps if (one := _sharpened(g, rays, low, high))]
+
+
+def _sharpened(g, rays, low: float, high: float):
+    """The same range with its ends as edges; None where it closes."""
+    inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
+    start = _edge(g, rays, inside, -1) if low > 0 else Edge(0.0)
+    end = _edge(g, rays, inside, 1) if math.isfinite(high) else Edge(math.inf)
+    return (start, end) if start.courant < end.courant else None
+
+
+def _edge(g, rays: list[Fraction], inside: float, side: int) -> Edge:
+    """The end of the stable range around `inside`: the nearest change of sign over all t, by zooming in."""
+
+    def reach(t: Fraction) -> float:
+        ranges = _negative(_on(g, t))
+        if side > 0:
+            return min((max(low, inside) for low, high in ranges if high > inside), default=math.inf)
+        return -max((min(high, inside) for low, high in ranges if low < inside), default=0.0)
+
+    ends = reach(Fraction(0)), reach(Fraction(1))
+    all_of = [reach(t) for t in rays]
+    at = int(np.argmin(all_of))
+    best, where = float(all_of[at]), rays[at]
+    low, high = rays[max(at - 1, 0)], rays[min(at + 1, len(rays) - 1)]
+    for _ in range(ZOOMS):
+        points = [low + (high - low) * Fraction(k, ZOOM_RAYS - 1) for k in range(ZOOM_RAYS)]
+        found = [reach(t) for t in points]
+        k = int(np.argmin(found))
+        if found[k] < best:
+            best, where = float(found[k]), points[k]
+        low, high = points[max(k - 1, 0)], points[min(k + 1, ZOOM_RAYS - 1)]
+        low, high = _dyadic(low, 60), _dyadic(high, 60)
+    close = [abs(one - best) <= 1e-11 * abs(best) for one in (*ends, *all_of)]
+    if all(close):
+        return Edge(abs(best), Fraction(1), EVERY)
+    for is_close, t, wave in ((close[0], Fraction(0), LONGEST), (close[1], Fraction(1), SHORTEST)):
+        if is_close:
+            return Edge(abs(best), t, wave)
+    return Edge(abs(best), where, BETWEEN)
+
+
+def _dyadic(x, bits: int) -> Fraction:
+    return Fraction(round(x * (1 << bits)), 1 << bits)
+
+
+def _on(g, t: Fraction) -> np.ndarray:
+    """Coefficients in nu at t, each the nearest float to the exact one."""
+    powers = [1]  # of both terms of t, so that all stays whole
+    for _ in range(len(g[0]) - 1):
+        powers.append(powers[-1] * t.denominator)
+    found = []
+    for row in g:
+        total = 0
+        for one, power in zip(reversed(row), powers, strict=True):
+            total = total * t.numerator + one * power
+        found.append(total)
+    largest = max(map(abs, found))
+    return np.array([x / largest for x in found]) if largest else np.zeros(1)
+
+
+def _negative(p: np.ndarray) -> list[tuple[float, float]]:
+    """Ranges of nu > 0 where the polynomial is negative."""
+    if not p.any():
+        return []
+    roots = np.roots(p[::-1])
+    real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-7 * np.abs(roots)) & (roots.real > 1e-13)])
+    ends = [0.0, *map(float, real), math.inf]
+    found = []
+    for low, high in zip(ends, ends[1:], strict=False):
+        inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
+        if high > low and np.polyval(p[::-1], inside) < 0:
+            joined = found and found[-1][1] == low
+            found[-1:] = [(found[-1][0], high)] if joined else [*found[-1:], (low, high)]
+    return found
+
+
+def _finite(x: float) -> float | None:
+    return None if math.isinf(x) else x

@@ -1,0 +1,169 @@
+"""Courant limits of limited schemes on a periodic grid: frozen weights, bounds, real runs. Knows no exact limit.
+
+A limited scheme has no derivative at a constant state: its weights go with the solution. What can be said: the exact
+limits of the linear schemes that it is where its switches stand still; for slopes, up to which Courant number total
+variation cannot grow, r / (1 + phi / 2) with phi the greatest slope in differences (1 for minmod, 2 for the others)
+and r the method's SSP radius (Harten 1983); and where real runs grow, from three starts, in more and more steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.model.schemes import LIMITERS
+from fvsolve.steppers.analysis.facts import analyse
+from fvsolve.steppers.tableau import method_named
+from fvsolve.studies.stability.grid import AdvectionLimit, limit_of
+from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
+from fvsolve.studies.stability.symbol import WEIGHTS, Weights
+
+CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
+CLOSE = 1e-3  # of a measured limit: it does not hang on the Courant number smoothly
+SMALLEST = 0.3  # Courant number that is tried, where no bound says that less cannot fail
+RATIO = 1.02  # of the next: what fails may pass again at a greater one
+METHODS = ("euler", "ssp-rk2", "ssp-rk3", "rk4")  # by default
+LOOKS = 25  # at the norm during a run
+FALLS = 0.05  # of the limit between the fewest and the most steps, more than an exponential explains: not sharp
+SEED = 1
+
+
+def _weights(*sixths: int) -> Weights:
+    return tuple(Fraction(x, 6) for x in sixths)
+
+
+FLAT, MEAN = {"upwind": WEIGHTS["upwind"]}, {"fromm": WEIGHTS["fromm"]}
+STEEP = {"twice behind": _weights(0, -6, 12, 0, 0), "twice ahead": _weights(0, 0, 0, 6, 0)}
+FROZEN: dict[str, dict[str, Weights]] = {  # what limited schemes are where their switches stand still
+    "minmod": FLAT | {name: WEIGHTS[name] for name in ("linear-upwind", "central")},
+    "van-leer": FLAT | MEAN | STEEP,
+    "monotonized-central": FLAT | MEAN | STEEP,
+    "weno5": {
+        "upwind5": WEIGHTS["upwind5"],
+        "stencil behind": _weights(2, -7, 11, 0, 0),
+        "upwind3": WEIGHTS["upwind3"],
+        "stencil ahead": _weights(0, 0, 2, 5, -1),
+    },
+}
+STEEPEST = {"minmod": 1, "van-leer": 2, "monotonized-central": 2}
+LIMITED = ("muscl", "weno5")
+
+
+@dataclass(frozen=True)
+class LimitedLimit:
+    """What is known of a limited scheme with a method.
+
+    frozen : limits of the linear schemes by name; monotone : up to which Courant number total variation cannot grow,
+    None where nothing is known; measured : by start, the least Courant number found to fail in steps[i] steps (None:
+    none up to 20); least : over the starts; sharp : False where it falls by more than 5 % from the fewest to the most
+    steps, None where nothing failed.
+    """
+
+    scheme: str
+    limiter: str | None
+    method: str
+    frozen: dict[str, AdvectionLimit]
+    monotone: float | None
+    cells: int
+    steps: tuple[int, ...]
+    measured: dict[str, tuple[float | None, ...]]
+
+    @property
+    def least(self) -> tuple[float | None, ...]:
+        """Over the starts, for each count of steps."""
+        columns = zip(*self.measured.values(), strict=True)
+        return tuple(min((x for x in column if x is not None), default=None) for column in columns)
+
+    @property
+    def sharp(self) -> bool | None:
+        first, last = self.least[0], self.least[-1]
+        return None if first is None or last is None else last >= (1 - FALLS) * first
+
+    def plain(self) -> dict:
+        found = asdict(self) | {"least": self.least, "sharp": self.sharp}
+        found["frozen"] = {name: one.plain() for name, one in self.frozen.items()}
+        return found
+
+    def flat(self) -> dict:
+        """As one row of a table."""
+        found = {"scheme": self.scheme, "limiter": self.limiter, "method": self.method, "monotone": self.monotone}
+        found |= {"cells": self.cells, "sharp": self.sharp}
+        for start, row in self.measured.items():
+            found |= {f"{start}, {n} steps": x for n, x in zip(self.steps, row, strict=True)}
+        return found
+
+
+def limited_limits(
+    schemes: Sequence[str] = LIMITED, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
+    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+) -> list[LimitedLimit]:  # fmt: skip
+    """Limited schemes, muscl with each limiter, and explicit methods; runs of `steps`, 10 and 100 times as many.
+
+    Raises FvsolveError for names that are none, implicit methods, and a circle or a run that is too short.
+    """
+    check_size(cells, steps)
+    named = [method_named(name) for name in methods or METHODS]
+    implicit = [one.name for one in named if not one.explicit]
+    if implicit:
+        raise FvsolveError(f"{implicit[0]} is implicit: limited schemes are measured with explicit methods")
+    kinds = [(name, limiter) for name in schemes for limiter in (LIMITERS if name == "muscl" else (None,))]
+    pairs = [(*kind, one.name) for one in dict.fromkeys(named) for kind in kinds]
+    found = []
+    for scheme, limiter, method in pairs:
+        progress(len(found), len(pairs), f"{scheme} {limiter or ''} with {method}")
+        found.append(limited_limit(scheme, limiter, method, cells, steps))
+    return found
+
+
+def limited_limit(
+    scheme: str, limiter: str | None, method: str, cells: int = CELLS, steps: int = STEPS
+) -> LimitedLimit:
+    """One limited scheme and method."""
+    name = limiter or scheme
+    counts = tuple(n * steps for n in TIMES)
+    return LimitedLimit(
+        scheme, limiter, method_named(method).name,
+        {branch: limit_of(weights, branch, method) for branch, weights in FROZEN[name].items()},
+        monotone_limit(name, method), cells, counts,
+        {start: tuple(measured(scheme, limiter, method, u, n) for n in counts) for start, u in starts(cells).items()},
+    )  # fmt: skip
+
+
+def monotone_limit(limiter: str, method: str) -> float | None:
+    """The Courant number up to which total variation cannot grow; None where nothing is known."""
+    radius = analyse(method).ssp_radius
+    return radius / (1 + STEEPEST[limiter] / 2) if limiter in STEEPEST and radius > 0 else None
+
+
+def starts(cells: int) -> dict[str, np.ndarray]:
+    """Fields of mean zero: one wave, a front up and down, noise."""
+    j = np.arange(cells)
+    noise = np.random.default_rng(SEED).standard_normal(cells)
+    found = {"wave": np.sin(2 * np.pi * j / cells), "front": np.where(j < cells // 2, 1.0, -1.0), "noise": noise}
+    return {name: u - u.mean() for name, u in found.items()}
+
+
+def measured(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
+    """The least Courant number found at which the L2 norm of a real run grows past the threshold within the steps."""
+    circle = Circle(scheme, method, start.size, limiter or "minmod")
+    smallest = monotone_limit(limiter or scheme, method) or SMALLEST
+    return first_failure(lambda courant: _growth(circle, start, courant, steps), CLOSE, smallest, RATIO)
+
+
+def _growth(circle: Circle, start: np.ndarray, courant: float, steps: int) -> float:
+    """log10 of the greatest norm seen in a run over that of its start; inf once past the threshold."""
+    u, most, done = start, 0.0, 0
+    for k in range(1, LOOKS + 1):
+        count, done = steps * k // LOOKS - done, steps * k // LOOKS
+        u = circle.run(u, courant, count) if count else u
+        if u is None:
+            return math.inf
+        most = max(most, float(np.linalg.norm(u) / np.linalg.norm(start)))
+        if most > THRESHOLD:
+            return math.inf
+    return math.log10(most) if most > 0 else -math.inf

@@ -1,0 +1,125 @@
+"""Growth of a small deviation in real runs of the compiled program, against the same threshold. Knows runs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from fvsolve.model.energy import EnergyForm
+from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.steppers import orders as told
+from fvsolve.studies.linear.frozen import Frozen
+from fvsolve.studies.stability.bracket import RISE, Limit, halved
+from fvsolve.studies.stability.growth import STEPS, THRESHOLD, looked_at
+
+SMALL = 10.0 ** -np.arange(6.0, 16.0)  # greatest deviation at the start, in units of what counts as a small one
+STAGES = 10.0  # times as far as states, at most, the stages of a step reach
+RANDOM = 2  # starts at random, beside the one that is predicted to grow most
+BELOW = (0.3, 0.6, 0.85)  # of the predicted limit: steps that are to be safe, tried too
+LONGEST = 20.0  # that measuring may take [s]
+WIDEN, DEEPEN = 12, 40  # times 1.3 up and down, to find both ends of a bracket
+
+
+class Runs:
+    """Real runs of a frozen model by one method at fixed steps; growth of the difference of two runs.
+
+    form : the energy norm; worst : float64[r]  a start in its coordinates, tried beside two at random
+    small : greatest deviation at the start, in units of what counts as a small one; if None, and `a` is the derivative
+    of the rates, the one whose rates are nearest to a times it at the start and when it has grown to the threshold
+    """
+
+    def __init__(self, at: Frozen, method: str, form: EnergyForm, worst=None, steps: int = STEPS,
+                 threshold: float = THRESHOLD, small: float | None = None, a=None) -> None:  # fmt: skip
+        self.at, self.method, self.form, self.tried = at, method, form, 0.0
+        self.steps, self.threshold = steps, threshold
+        rng = np.random.default_rng(7)
+        starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM, form.size))]
+        shapes = [self.shaped(start) for start in starts]
+        self.starts = [y * (small or self.linear_width(y, a)) for y in shapes]
+        self.looks = looked_at(self.steps)
+        self.strides = np.diff([0, *self.looks]).astype(float)
+        self.still = not np.any(at.rate)
+        self.structure = at.model.structure
+        self.latest = time.monotonic() + LONGEST
+
+    def shaped(self, start: np.ndarray) -> np.ndarray:
+        """A start in the energy norm as a deviation of the states, the greatest of which counts as just small."""
+        y = self.form.back @ start
+        return y / np.max(np.abs(y) / self.at.model.scale)
+
+    def linear_width(self, y: np.ndarray, a) -> float:
+        """How large the deviation may be, to stay linear until it has grown, and to stand out from round-off.
+
+        Grown, it may have any shape, and all its energy in one state; stages of a step reach further still.
+        """
+        base, rng = self.at.rate, np.random.default_rng(11)
+        grown = self.at.model.scale * rng.choice([-1.0, 1.0], y.size)
+        reach = STAGES * self.threshold * np.sqrt(y.size)
+
+        def apart(z: np.ndarray, width: float) -> float:
+            change = self.at.model.rhs(self.at.t, self.at.y + width * z) - base
+            slope = a @ z
+            return float(np.max(np.abs(change / width - slope))) / (np.max(np.abs(slope)) or 1.0)
+
+        return float(min(SMALL, key=lambda width: max(apart(y, width), apart(grown, reach * width))))
+
+    def loop(self, y: np.ndarray, h: float) -> Loop:
+        """A run from a state, at a fixed step."""
+        model = self.at.model
+        changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
+        numerics = model.case.numerics.model_copy(update=changes)
+        made = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
+        made.now[:] = y
+        made.memory[told.T] = self.at.t
+        made.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
+        return made
+
+    def growth(self, h: float) -> tuple[float, int]:
+        """(greatest growth over all starts, after how many steps); a run that breaks off: infinite."""
+        size, at = 1.0, 0
+        for start in self.starts:
+            runs = [self.loop(self.at.y + start, h)] + ([] if self.still else [self.loop(self.at.y, h)])
+            first = np.linalg.norm(self.form.forth @ start)
+            for n, more in zip(self.looks, self.strides, strict=True):
+                if time.monotonic() > self.latest:
+                    raise TimeoutError
+                if any(run.run(more) != told.CHUNK for run in runs):
+                    return np.inf, n
+                apart = runs[0].now - (self.at.y if self.still else runs[1].now)
+                here = float(np.linalg.norm(self.form.forth @ apart)) / first
+                if not here <= self.threshold:
+                    return here if here > self.threshold else np.inf, n
+                if here > size:
+                    size, at = here, n
+        return size, at
+
+    def fails(self, h: float) -> bool:
+        """Whether some run grows beyond the threshold."""
+        self.tried = max(self.tried, h)
+        return self.growth(h)[0] > self.threshold
+
+    def limit(self, guess: float) -> Limit:
+        """The greatest safe step by bisection around a guess, once smaller ones are known to be safe."""
+        for part in BELOW:
+            if self.fails(part * guess):
+                return self.below(part * guess)
+        high = guess
+        for _ in range(WIDEN):
+            if self.fails(high * 1.03):
+                return halved(self.fails, high / RISE if self.safe(high / RISE) else BELOW[-1] * guess, high * 1.03)
+            high *= RISE
+        return Limit(np.inf, np.inf)
+
+    def safe(self, h: float) -> bool:
+        """Whether no run fails."""
+        return not self.fails(h)
+
+    def below(self, high: float) -> Limit:
+        """The limit below a step that fails; nan where none is found."""
+        for _ in range(DEEPEN):
+            if self.safe(high / RISE):
+                return halved(self.fails, high / RISE, high)
+            high /= RISE
+        return Limit(np.nan, high)

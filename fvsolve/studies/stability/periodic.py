@@ -1,0 +1,166 @@
+"""Where real runs of a periodic pipe grow: predicted wave by wave, and measured. Knows the package's own stepper.
+
+Failure: the L2 norm of some start grows more than THRESHOLD-fold within n steps. On a circle the matrix of a step is
+normal, so the greatest growth over all starts is max_k |R(nu z(theta_k))|^n, theta_k = 2 pi k / cells: exactly. The
+same growth is measured from one impulse, whose waves are all of one size: max_k |u_k(n)| / |u_k(0)| of its run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.handle import make_handle
+from fvsolve.model.schemes import scheme_settings
+from fvsolve.steppers import orders as told
+from fvsolve.steppers.analysis.facts import analyse
+from fvsolve.steppers.ode import watchers
+from fvsolve.steppers.stepper import Stepper
+from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.tableau import METHODS, method_named
+from fvsolve.studies.stability.symbol import WEIGHTS, symbol, weights_of
+
+THRESHOLD = 1e3
+CELLS, STEPS = 100, 1000
+SMALLEST, LARGEST, RATIO = 0.05, 20.0, 1.1  # Courant numbers that are tried in turn
+CLOSE = 1e-8  # of the limit
+NO_END = 1e300
+SMALL = 1e-18  # WENO's, against values of one
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One pair on a circle of cells: least Courant number that fails, predicted and measured; None where none does."""
+
+    scheme: str
+    method: str
+    cells: int
+    steps: int
+    predicted: float | None
+    measured: float | None
+
+    @property
+    def ratio(self) -> float | None:
+        """Predicted over measured."""
+        return self.predicted / self.measured if self.predicted and self.measured else None
+
+    def plain(self) -> dict:
+        return asdict(self) | {"ratio": self.ratio}
+
+
+class Circle:
+    """Linear advection on a circle of cells by one scheme and one method; a run is one call of compiled code."""
+
+    def __init__(self, scheme: str, method: str, cells: int, limiter: str = "minmod") -> None:
+        self.tables = _tables(scheme, limiter, cells)
+        self.stepper = Stepper(method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells))
+        self.handle, self.functions = make_handle(self.tables), (*watchers(), _rhs())
+
+    def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
+        """The cells after so many steps at a Courant number; None where they do not stay finite."""
+        stepper = self.stepper
+        stepper.memory[:], stepper.orders[told.CONTROL] = 0.0, told.FIXED_STEP
+        stepper.orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = courant, NO_END, NO_END
+        stepper.orders[[told.END, told.BUDGET]] = 2.0 * courant * (steps + 1), steps
+        stepper.flags[[told.PHASE, told.BEHIND]] = told.FRESH, 0
+        stepper.y[stepper.flags[told.NOW]] = start
+        code = stepper.call(*self.functions, self.handle, told.WHERE + 1, stepper.none)
+        if code != told.CHUNK:
+            return None
+        return stepper.y[stepper.flags[told.NOW]].copy()
+
+
+def measured_limits(
+    schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
+    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+) -> list[Measured]:  # fmt: skip
+    """Predicted and measured limits of linear schemes and explicit methods, all of them by default.
+
+    Raises FvsolveError for names that are none, and for a circle or a run that is too short.
+    """
+    check_size(cells, steps)
+    schemes = list(dict.fromkeys(schemes or WEIGHTS))
+    named = [method_named(name) for name in methods] if methods else list(METHODS.values())
+    pairs = [(scheme, one.name) for one in dict.fromkeys(named) if one.explicit for scheme in schemes]
+    for scheme in schemes:
+        weights_of(scheme)
+    found = []
+    for scheme, method in pairs:
+        progress(len(found), len(pairs), f"{scheme} with {method}")
+        found.append(measured_limit(scheme, method, cells, steps))
+    return found
+
+
+def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = STEPS) -> Measured:
+    """One pair: the least Courant number at which growth passes the threshold, predicted and measured alike."""
+    predicted = first_failure(lambda courant: predicted_growth(scheme, method, cells, steps, courant))
+    circle = Circle(scheme, method, cells)
+    measured = first_failure(lambda courant: measured_growth(circle, cells, steps, courant))
+    return Measured(scheme, method, cells, steps, predicted, measured)
+
+
+def predicted_growth(scheme: str, method: str, cells: int, steps: int, courant: float) -> float:
+    """log10 of the greatest |R(nu z(theta_k))|^n over the waves of the circle."""
+    theta = 2 * np.pi * np.arange(cells // 2 + 1) / cells
+    r = analyse(method).stability_function
+    return steps * math.log10(np.abs(r(courant * symbol(weights_of(scheme), theta))).max())
+
+
+def measured_growth(circle: Circle, cells: int, steps: int, courant: float) -> float:
+    """log10 of the greatest growth of a wave in a run from one impulse; inf where it does not stay finite."""
+    start = np.zeros(cells)
+    start[0] = 1.0
+    end = circle.run(start, courant, steps)
+    return math.inf if end is None else math.log10(np.abs(np.fft.rfft(end)).max())
+
+
+def first_failure(
+    growth: Callable[[float], float], close: float = CLOSE, smallest: float = SMALLEST, ratio: float = RATIO
+) -> float | None:
+    """The least Courant number whose growth (log10) passes the threshold, to `close`; tried upward, then halved."""
+    low, high = 0.0, smallest
+    while growth(high) <= math.log10(THRESHOLD):
+        low, high = high, high * ratio
+        if high > LARGEST:
+            return None
+    while high - low > close * high:
+        middle = (low + high) / 2
+        if growth(middle) <= math.log10(THRESHOLD):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def check_size(cells: int, steps: int) -> None:
+    """Raises FvsolveError for a circle or a run that says nothing."""
+    if cells < 6:
+        raise FvsolveError(f"cells = {cells}: wanted 6 or more, the widest scheme reaches over 5 cells")
+    if steps < 10:
+        raise FvsolveError(f"steps = {steps}: wanted 10 or more, failure is growth over many steps")
+
+
+def _tables(scheme: str, limiter: str, cells: int) -> tuple:
+    """The tables of a model that has nothing but the scheme's settings, a pipe's small number and scratch."""
+    found = {name: np.zeros(1, dtype) for name, dtype in rec.RECORDS.items()}
+    found |= {name: np.zeros(1, np.int64 if name == "integers" else float) for name in rec.ARRAYS}
+    found |= {name: np.zeros((1, 1)) for name in rec.MATRICES}
+    found["scratch"] = np.zeros(2 * cells + 7)
+    scheme_settings(found["settings"][0], scheme, limiter)
+    found["pipes"]["noise"] = SMALL
+    return tuple(found[name] for name in rec.TABLES)
+
+
+def _rhs():
+    from numba import types
+
+    from fvsolve.kernels.periodic import rhs_periodic
+    from fvsolve.steppers.signatures import compiled_as
+
+    v = types.float64[::1]
+    return compiled_as(rhs_periodic, (types.float64, v, v, v, types.int64[::1]))

@@ -1,0 +1,249 @@
+"""Where a case fails: the greatest safe step, predicted, measured on real runs, and beside it what bounds say.
+
+Knows cases, matrices and runs; draws nothing. Failure: max over n <= N of ||R(h J)^n|| > 1e3 in the energy norm.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.model.energy import EnergyForm, energy_form
+from fvsolve.steppers import automatic, method_named
+from fvsolve.steppers.methods import AUTO
+from fvsolve.studies.linear.frozen import LIMITED, Frozen, frozen, reweighted
+from fvsolve.studies.linear.linearise import Linear, linearised
+from fvsolve.studies.linear.spectrum import Spectrum, spectrum
+from fvsolve.studies.points import Points
+from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
+from fvsolve.studies.stability.carried import LONGEST, VECTORS
+from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD, predicted, system
+from fvsolve.studies.stability.measured import LONGEST as RUNNING
+from fvsolve.studies.stability.measured import Runs
+from fvsolve.studies.stability.misled import notes
+from fvsolve.studies.stability.row import Row, read
+
+AUTOMATIC = (
+    f"auto begins with {automatic.EXPLICIT}, of which its row is; a run goes on with {automatic.IMPLICIT} where that "
+    "is cheaper, which its row does not say"
+)
+VISIBLE = 1e-3  # of a small deviation: what limited schemes are tried with, above what WENO takes for round-off
+LONGER = 10  # times as many steps, for Euler with a limiter
+NEVER = (10.0, 100.0)  # steps over 1 / ||J|| that are run where none is predicted to fail
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Rows of a study, what is to be said of it; sides : scheme -> what makes its linear system, on first use."""
+
+    case: str
+    rows: tuple[Row, ...]
+    said: tuple[str, ...]
+    sides: dict[str, Callable[[str], Side]] = field(repr=False)
+
+    def side(self, scheme: str) -> Side:
+        """The linear system with a linear scheme among those asked for."""
+        return self.sides[scheme](scheme)
+
+    def plain(self) -> dict:
+        """As JSON says it."""
+        return {"case": self.case, "rows": [row.plain() for row in self.rows], "said": self.said}
+
+
+class Side:
+    """A case with one linear scheme about its state: J in the energy norm, and what does not hang on the method."""
+
+    def __init__(self, at: Frozen) -> None:
+        self.at = at
+        self.linear: Linear = linearised(at)
+        self.whole = energy_form(at.model, at.y)
+        self.form: EnergyForm = self.whole.fitting(self.linear.a)
+        self.e = self.form.seen(self.linear.a)
+
+    @property
+    def idle(self) -> list[str]:
+        """States that move without any energy."""
+        return [self.at.model.state_names[i] for i in np.flatnonzero(np.any(self.whole.idle, axis=1))]
+
+    @cached_property
+    def spectrum(self) -> Spectrum:
+        """Eigenvalues."""
+        return spectrum(self.e)
+
+    @cached_property
+    def field(self) -> np.ndarray:
+        """Boundary of the field of values."""
+        return field_of_values(self.e)
+
+    @property
+    def rate(self) -> float:
+        """Greatest wave rate [1/s]; 0 without cells."""
+        return float(self.at.model.wave_rates.max(initial=0.0))
+
+
+def stability(
+    case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, at: float | None = None,
+    before: bool = False, steps: int = STEPS, threshold: float = THRESHOLD, set=None, folder: Path | None = None,
+    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+) -> Stability:  # fmt: skip
+    """One row for each scheme and method, those of the case if None, about its start or the state at `at` [s].
+
+    Finished rows are kept in `folder` and reused. Raises CaseError, and FvsolveError for a state that cannot be
+    linearised or counts of steps that say nothing.
+    """
+    from fvsolve.case import load
+
+    if steps < 10 or not threshold > 1.0:
+        raise FvsolveError(f"steps = {steps}, threshold = {threshold:g}: wanted at least 10 steps and growth above 1")
+    case = load(case, dict(set or {}))
+    schemes = list(dict.fromkeys(schemes or [case.numerics.scheme]))
+    asked = list(methods or [case.numerics.method])
+    methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
+    said = (AUTOMATIC,) if AUTO in asked else ()
+    points, found = Points(folder), []
+    makers = {scheme: Maker(case, scheme, at, before, steps, threshold) for scheme in schemes}
+    for scheme, make in makers.items():
+        for method in methods:
+            progress(len(found), len(schemes) * len(methods), f"{scheme} with {method}")
+            extra = {"study": "stability", "scheme": scheme, "method": method, "at": at,
+                     "before": before, "steps": steps, "threshold": threshold}  # fmt: skip
+            found.append(read(points.get(case, extra, lambda make=make, method=method: make.row(method).plain())))
+    return Stability(case.name, tuple(found), said, {name: make.side for name, make in makers.items()})
+
+
+class Maker:
+    """Rows of one scheme; what they share is made once, on first use."""
+
+    def __init__(self, case, scheme: str, at: float | None, before: bool, steps: int, threshold: float) -> None:
+        self.case, self.scheme, self.time, self.before = case, scheme, at, before
+        self.steps, self.threshold = steps, threshold
+        self.states: dict[str, Frozen] = {}
+        self.sides: dict[str, Side] = {}
+
+    def at(self, scheme: str) -> Frozen:
+        """The state with a scheme."""
+        if scheme not in self.states:
+            self.states[scheme] = frozen(self.case, {"numerics.scheme": scheme}, self.time, self.before)
+        return self.states[scheme]
+
+    def side(self, scheme: str) -> Side:
+        """The linear system of a scheme."""
+        if scheme not in self.sides:
+            self.sides[scheme] = Side(self.at(scheme))
+        return self.sides[scheme]
+
+    def frozen_side(self, name: str, weights: tuple[float, ...], degree: int) -> Side:
+        """The linear system with the weights of the limited scheme standing still; same cells, same state."""
+        if name not in self.sides:
+            wide = replace(self.at("upwind5"), y=self.at(self.scheme).y)
+            self.sides[name] = Side(reweighted(wide, weights, degree))
+        return self.sides[name]
+
+    def row(self, name: str) -> Row:
+        """The row of a method."""
+        method = method_named(name)
+        if self.scheme in LIMITED and self.at(self.scheme).model.cells:
+            return self.limited(method)
+        side = self.side(self.scheme)
+        one = system(method, side.e, self.steps, self.threshold)
+        limit = predicted(one)
+        grown = one.growth(limit.fails) if np.isfinite(limit.fails) else None
+        worst = grown and grown.start
+        runs = Runs(side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a)
+        row = self.bounded(side, method) | {"predicted": limit.step}
+        if grown:
+            where, share = place(side.form, grown.end)
+            row |= {"growth": grown.size, "after": grown.steps, "where": where, "share": share}
+        row |= measure(runs, limit.step, one.size, row["left_out"])
+        found = Row(**row)
+        return Row(**row | {"notes": tuple(notes(found, side, one))})
+
+    def bounded(self, side: Side, method) -> dict:
+        """What is known without a power: names, sizes, bounds."""
+        model, left_out = side.at.model, {}
+        values = side.spectrum
+        row = {
+            "scheme": self.scheme, "method": method.name, "when": side.at.when,
+            "states": model.y_size, "steps": self.steps, "threshold": self.threshold, "rate": side.rate,
+            "eigenvalues": region_limit(method, values.values),
+            "greatest_real": float(values.values.real.max(initial=0.0)),
+        }  # fmt: skip
+        if not values.complete:
+            left_out["eigenvalues"] = f"the limit may be lower, from {values.said}"
+        if model.y_size <= WIDE:
+            row["field_of_values"] = region_limit(method, side.field)
+        else:
+            left_out["field_of_values"] = f"{model.y_size} states; it is computed up to {WIDE}"
+        if model.cells:
+            from fvsolve.studies.stability.grid import advection_limit
+
+            row["von_neumann"] = advection_limit(self.scheme, method.name).limit / side.rate
+        if model.y_size > DENSE:
+            left_out["squaring"] = f"{model.y_size} states: predicted by {VECTORS} vectors carried along"
+        return row | {"left_out": left_out}
+
+    def limited(self, method) -> Row:
+        """The row of a limited scheme: limits with its weights frozen, and the measured one."""
+        at = self.at(self.scheme)
+        numerics = at.model.case.numerics
+        from fvsolve.studies.stability.limited import FROZEN
+
+        frozen_as = FROZEN["weno5" if self.scheme == "weno5" else numerics.limiter]
+        found, starts, latest = {}, {}, time.monotonic() + LONGEST
+        for name, weights in frozen_as.items():
+            cells = sum(weight != 0 for weight in weights)
+            degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")  # of the ends
+            side = self.frozen_side(name, tuple(map(float, weights)), degree)
+            one = system(method, side.e, self.steps, self.threshold, latest)
+            limit = predicted(one)
+            found[name] = limit.step
+            if 0.0 < limit.step < np.inf:
+                starts[limit.step] = one.growth(limit.fails).start
+        guess = sorted(starts)[len(starts) // 2] if starts else np.inf  # between the flat and the steep ones
+        runs = Runs(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, VISIBLE)
+        row = {
+            "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
+            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": found, "left_out": {},
+        }  # fmt: skip
+        row |= measure(runs, guess, float(np.abs(side.spectrum.values).max(initial=0.0)), row["left_out"])
+        if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
+            longer = Runs(at, method.name, side.form, starts.get(guess), LONGER * self.steps, self.threshold, VISIBLE)
+            row["longer"] = measure(longer, row["measured"], 0.0, row["left_out"], "longer").get("measured", np.nan)
+        return Row(**row | {"notes": tuple(notes(Row(**row), side, None))})
+
+
+def place(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
+    """(part with most of the energy of a unit vector, its share)."""
+    shares: dict[str, float] = {}
+    for part, root in zip(form.parts, form.rows @ (form.back @ end), strict=True):
+        shares[part] = shares.get(part, 0.0) + float(root**2)
+    part = max(shares, key=shares.get)
+    return part, shares[part]
+
+
+def measure(runs: Runs, guess: float, size: float, left_out: dict[str, str], what: str = "measured") -> dict:
+    """The measured limit around a guess; where it is not found in time, why, in `left_out`."""
+    try:
+        return measured(runs, guess, size)
+    except TimeoutError:
+        left_out[what] = f"real runs of {runs.at.model.y_size} states take longer than {RUNNING:g} s"
+        return {}
+
+
+def measured(runs: Runs, guess: float, size: float) -> dict:
+    """The measured limit around a guess; where none is predicted, two long steps that are to be safe."""
+    if np.isfinite(guess) and guess > 0.0:
+        found = runs.limit(guess)
+        return {"measured": found.step, "measured_up_to": found.fails if np.isfinite(found.fails) else runs.tried}
+    if guess == 0.0 or size == 0.0:
+        return {}
+    for factor in NEVER:
+        if runs.fails(factor / size):
+            return {"measured": runs.below(factor / size).step, "measured_up_to": factor / size}
+    return {"measured": np.inf, "measured_up_to": NEVER[-1] / size}

@@ -1,0 +1,196 @@
+"""Gas over fluid against closed forms, energy integrals and SciPy: bladders, air vessels, losses by direction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from truth.scenes import AMBIENT, RHO, WATER, area, reservoir, scene
+
+import fvsolve
+from fvsolve.model.sparsity import sparsity
+from fvsolve.studies.energy.energy import energy
+
+TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
+LENGTH, DIAMETER, BORE = 20.0, 0.1, area(0.1)
+P0, GAS, N = 6e5, 0.05, 1.3
+INERTIA = RHO * LENGTH / BORE  # of the column, dp = INERTIA dq/dt
+
+
+def vessel(**more) -> dict:
+    return {"type": "accumulator", "volume": 0.1, "gas_volume": GAS, "exponent": N, **more}
+
+
+def swing(flow: float, end: float, numerics=TIGHT, law="linear", probes=("a.gas_pressure", "c.flow"), **more) -> dict:
+    """A rigid column between a reservoir and a vessel, which starts with a flow."""
+    links = {"c": {"type": "rigid-column", "from": "lake", "to": "a", "length": LENGTH, "diameter": DIAMETER,
+                   "initial_flow": flow}}  # fmt: skip
+    nodes = {"lake": reservoir(P0), "a": vessel(**more)}
+    return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
+
+
+def model_of(case):
+    return fvsolve.build(fvsolve.load(case))
+
+
+@pytest.mark.parametrize("law, near", [("linear", 1e-7), ("log", 1e-3)])
+def test_a_small_oscillation_has_its_closed_period(law, near):
+    """omega^2 = n p0 A / (rho L V0); under `log` the fluid in the vessel gives way too."""
+    model = model_of(swing(0.0, 1.0, law=law))
+    found = np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag.max()
+    assert found == pytest.approx(math.sqrt(N * P0 / (INERTIA * GAS)), rel=near)
+
+
+@pytest.mark.parametrize("n", [1.0, 1.2, 1.4])
+def test_a_large_oscillation_turns_where_its_energy_is_gas_energy(n):
+    """INERTIA q0^2 / 2 is the work on the gas less that of the reservoir, in both extremes."""
+    q0 = 0.05
+    result = fvsolve.run(swing(q0, 5.0, exponent=n) | {"output": {"every": 0.001, "probes": ["a.gas_pressure"]}})
+
+    def left(volume):
+        gas = math.log(GAS / volume) if n == 1.0 else ((GAS / volume) ** (n - 1.0) - 1.0) / (n - 1.0)
+        return P0 * GAS * gas + P0 * (volume - GAS) - 0.5 * INERTIA * q0**2
+
+    turns = [brentq(left, 1e-3, GAS, xtol=1e-15), brentq(left, GAS, 1.0, xtol=1e-15)]
+    extremes = [P0 * (GAS / volume) ** n for volume in turns]
+    greatest, least = result["a.gas_pressure"].max(), result["a.gas_pressure"].min()
+    assert (greatest, least) == pytest.approx(extremes, rel=2e-6)  # of rows every millisecond
+
+
+def test_losses_by_direction_follow_scipy():
+    """dp = K rho v |v| / 2 on the throat, K_in and K_out; SciPy at 1e-12 without the laminar width at zero."""
+    k_in, k_out, throat = 2.0, 9.0, area(0.05)
+    connection = {"diameter": 0.05, "loss_in": k_in, "loss_out": k_out}
+    result = fvsolve.run(swing(0.04, 6.0, connection=connection))
+    first = result["a.gas_pressure"][0]
+
+    def rates(t, y):
+        q, v = y
+        loss = (k_in if q > 0 else k_out) * RHO * q * abs(q) / (2 * throat**2)
+        return (P0 - first * (GAS / v) ** N - loss) / INERTIA, -q
+
+    exact = solve_ivp(rates, (0, 6.0), [0.04, GAS], t_eval=result.t, rtol=1e-12, atol=1e-14)
+    assert result["c.flow"] == pytest.approx(exact.y[0], abs=1e-8)
+    assert result["a.gas_pressure"] == pytest.approx(first * (GAS / exact.y[1]) ** N, rel=1e-7)
+
+
+def filled(law: str, q: float = 1e-3, end: float = 40.0, **more) -> dict:
+    """An inflow into a vessel, against whatever its pressure is."""
+    nodes = {"in": {"type": "inflow", "flow": q}, "a": vessel(initial_pressure=P0, **more)}
+    links = {"gap": {"type": "valve", "from": "in", "to": "a", "area": 0.01}}
+    return scene(nodes, links, end, TIGHT, ("a.pressure", "a.gas_volume"), 1.0, fluid=WATER | {"law": law})
+
+
+@pytest.mark.parametrize("n", [1.0, 1.4])
+def test_filling_squeezes_the_gas_by_its_law(n):
+    result = fvsolve.run(filled("linear", exponent=n))
+    assert result["a.pressure"] == pytest.approx(P0 * (GAS / (GAS - 1e-3 * result.t)) ** n, rel=1e-9)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-14
+
+
+def test_under_log_the_fluid_in_the_vessel_is_squeezed_too():
+    """rho(p) (room - V) is the mass that was there and came in."""
+    result = fvsolve.run(filled("log"))
+    beta = WATER["bulk_modulus"]
+
+    def rho(p):
+        return RHO * math.exp((p - AMBIENT) / beta)
+
+    def volume(t):
+        mass = rho(P0) * (0.1 - GAS) + RHO * 1e-3 * t
+        return brentq(lambda v: rho(P0 * (GAS / v) ** N) * (0.1 - v) - mass, 1e-4, 0.1, xtol=1e-16)
+
+    exact = np.array([volume(t) for t in result.t])
+    assert result["a.gas_volume"] == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_a_bladder_empties_and_fills_again_where_its_precharge_says(law):
+    """Below the precharge the neck bears the pressure; both switches are events, and SciPy goes the same way."""
+    case = swing(-0.04, 2.5, law=law, gas_volume=None, precharge=5e5, probes=["a.pressure", "c.flow", "a.gas_volume"])
+    del case["nodes"]["a"]["gas_volume"]
+    result = fvsolve.run(case)
+    stiff, whole = WATER["bulk_modulus"] / (0.01 * 0.1), 0.1
+    gas = whole * (5e5 / P0) ** (1 / N)
+
+    def pressure(v):
+        return P0 * (gas / v) ** N if v < whole else 5e5 - stiff * (v - whole)
+
+    def rates(t, y):
+        return (P0 - pressure(y[1])) / INERTIA, -y[0]
+
+    exact = solve_ivp(rates, (0, 2.5), [-0.04, gas], t_eval=result.t, rtol=1e-10, atol=1e-14, max_step=1e-4)
+    texts = [event["what"] for event in result.summary["events"]]
+    assert texts[:2] == ["is empty", "holds fluid again"] and len(texts) in (2, 3)
+    first, last = (event["time"] for event in result.summary["events"][:2])
+    away = (law == "linear") | (result.t < first) | (result.t > last)  # a bounce of 5 ms, other under another law
+    assert result["c.flow"][away] == pytest.approx(exact.y[0][away], abs=0.04 * (1e-6 if law == "linear" else 3e-3))
+
+
+def test_nothing_moves_while_nothing_changes():
+    connection = {"diameter": 0.05, "loss_in": 2.0, "loss_out": 9.0}
+    for law in ("linear", "log"):
+        for more in ({}, {"connection": connection}):
+            model = model_of(swing(0.0, 1.0, law=law, **more))
+            assert not model.rhs(0.0, np.zeros(model.y_size)).any()
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
+    """The gas gives back what it took; the throat dissipates; a port at the reservoir sees a passive network."""
+    connection = {"diameter": 0.05, "loss_in": 2.0, "loss_out": 9.0}
+    for more in ({"exponent": 1.0}, {"connection": connection}):
+        one = energy(swing(0.04, 3.0, {"method": "gauss-6", "step": 1e-3}, law, **more), port="lake")
+        column = sum(loss[-1] for loss in one.law.values())  # what is no energy of this law in a rigid column
+        assert abs(one.made[-1] - column) < 1e-9 * one.through and one.port.passive
+        at_start = one.at_start.get("a", one.at_start.get("a.inside"))
+        assert at_start > 0.0
+        assert all((np.diff(loss) >= -1e-9).all() for loss in one.dissipated.values())
+
+
+def test_its_energy_at_the_start_is_what_it_can_give():
+    """Isothermal gas down to ambient: p0 V0 ln(p0 / pa) less the work against ambient."""
+    from fvsolve.model.energy_start import available
+
+    model = model_of(swing(0.0, 1.0, exponent=1.0, volume=1.0))
+    volume = GAS * P0 / AMBIENT
+    exact = P0 * GAS * math.log(P0 / AMBIENT) - AMBIENT * (volume - GAS)
+    assert available(model)["a"] == pytest.approx(exact, rel=1e-9)
+
+
+def test_the_pattern_holds_every_coupling():
+    connection = {"diameter": 0.05, "loss_in": 2.0, "loss_out": 9.0}
+    model = model_of(swing(0.01, 1.0, connection=connection))
+    pattern = sparsity(model).toarray()[: model.y_size]
+    assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3]))) > 1e-9) & ~pattern)
+
+
+def test_an_empty_start_is_said():
+    case = swing(0.0, 1.0, probes=["a.pressure"])
+    case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5}
+    assert "a: empty at the start" in " ".join(model_of(case).warnings)
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        ({"gas_volume": None}, "no gas; wanted one of precharge, gas_volume"),
+        ({"precharge": 1e5}, "precharge and gas_volume are given; keep one"),
+        ({"gas_volume": 0.2}, "0.2 m3 is more than its volume of 0.1 m3"),
+        ({"gas_volume": 0.0}, "out of range"),
+        ({"exponent": 0.9}, "out of range; wanted a value of at least 1"),
+        ({"initial_pressure": 1000.0}, "vapour pressure"),
+        ({"connection": {"loss_in": 1.0}}, "loss_out is missing"),
+        ({"connection": 3.0}, "is no connection; wanted { diameter, loss_in, loss_out }"),
+    ],
+)
+def test_what_is_wrong_with_an_accumulator_is_said(wrong, said):
+    case = swing(0.0, 1.0)
+    given = case["nodes"]["a"] | wrong
+    case["nodes"]["a"] = {key: value for key, value in given.items() if value is not None}
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case)
+    assert said in str(error.value)

@@ -1,0 +1,187 @@
+"""Air valves against the textbook's four regimes by SciPy, choked filling in closed form, and a plain junction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from truth.scenes import AMBIENT, RHO, WATER, area, junction, pipe, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.model.sparsity import sparsity
+from fvsolve.studies.energy.energy import energy
+
+HEAT = 287.05 * 293.15
+LENGTH, DIAMETER = 200.0, 0.3
+INERTIA = RHO * LENGTH / area(DIAMETER)
+TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
+
+
+def bores(p: float, inlet: float, outlet: float) -> float:
+    """Mass flow of air into a chamber at p: subsonic and choked, in and out (Wylie and Streeter 1993, 7-4) [kg/s]."""
+    root = math.sqrt(HEAT)
+    if p <= AMBIENT:
+        size, r, sign = 0.6 * area(inlet) * AMBIENT / root, p / AMBIENT, 1.0
+    else:
+        size, r, sign = 0.6 * area(outlet) * p / root, AMBIENT / p, -1.0
+    if r < 0.528281787717174:
+        return sign * size * math.sqrt(1.4) * (2 / 2.4) ** (2.4 / 0.8)
+    return sign * size * math.sqrt(7 * max(0.0, r ** (2 / 1.4) - r ** (2.4 / 1.4)))
+
+
+def drained(inlet=0.05, outlet=0.05, low=AMBIENT - 0.6e5, end=6.0, numerics=TIGHT, law="linear", flow=0.05, **more):
+    """A gate shuts before an air valve, and a rigid column runs on from there."""
+    nodes = {"lake": reservoir(2e5), "v": {"type": "air-valve", "inlet": inlet, "outlet": outlet, **more}}
+    nodes["low"] = reservoir(low)
+    column = {"type": "rigid-column", "from": "v", "to": "low", "length": LENGTH, "diameter": DIAMETER}
+    gate = {"type": "valve", "from": "lake", "to": "v", "area": 0.01,
+            "opening": {"start": 0.1, "duration": 0.4, "value": [1.0, 0.0]}}  # fmt: skip
+    probes = ["v.air_pressure", "v.air_volume", "v.air_mass", "c.flow", "v.pressure"]
+    links = {"gate": gate, "c": {**column, "initial_flow": flow}}
+    return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
+
+
+def test_choked_air_comes_in_at_its_closed_rate():
+    """m grows by Cd A pa sqrt(1.4 / (R T)) (2 / 2.4)^3 while p < 0.528 pa, and p V = m R T throughout."""
+    result = fvsolve.run(drained(inlet=0.01, low=AMBIENT - 0.9e5, end=2.0))
+    p, volume, mass = (result[f"v.air_{name}"] for name in ("pressure", "volume", "mass"))
+    assert p * volume == pytest.approx(mass * HEAT, rel=1e-12)
+    choked = (p < 0.52 * AMBIENT) & (np.asarray(result.t) > 0.6)
+    t, m = np.asarray(result.t)[choked], mass[choked]
+    assert choked.sum() > 100
+    rate = 0.6 * area(0.01) * AMBIENT * math.sqrt(1.4 / HEAT) * (2 / 2.4) ** 3
+    assert m - m[0] == pytest.approx(rate * (t - t[0]), abs=1e-8)
+
+
+RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_subsonic_in_and_out_and_choked_out_follow_scipy(law):
+    """Drawn in, subsonic; squeezed by a column that comes back, and blown out, choked at last."""
+    inlet, outlet = 0.04, 0.02
+    result = fvsolve.run(drained(inlet, outlet, RETURN, law=law))
+    t = np.asarray(result.t)
+    shut = [event["time"] for event in result.summary["events"] if event["what"] == "shuts"]
+    rows = (t >= 0.6) & (t < shut[0] - 0.02)
+    first = [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")]
+
+    def rates(now, y):
+        p = y[2] * HEAT / y[1]
+        return (p - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA, y[0], bores(p, inlet, outlet)
+
+    exact = solve_ivp(rates, (t[rows][0], t[rows][-1]), first, t_eval=t[rows], rtol=1e-11, atol=1e-14, max_step=0.01)
+    p = exact.y[2] * HEAT / exact.y[1]
+    assert p.max() > 2.0 * AMBIENT and p.min() < 0.95 * AMBIENT
+    turn = int(np.argmax(exact.y[2]))  # from there on the polynomial within 1e-3 of ambient pressure has told
+    assert result["v.air_mass"][rows][:turn] == pytest.approx(exact.y[2][:turn], rel=2e-5 if law == "linear" else 3e-3)
+    near = 2e-4 if law == "linear" else 3e-3
+    assert result["v.air_mass"][rows] == pytest.approx(exact.y[2], rel=near)
+    assert result["c.flow"][rows] == pytest.approx(exact.y[0], abs=near * 0.1)
+    assert result["v.air_pressure"][rows] == pytest.approx(p, rel=5 * near)
+
+
+def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
+    result = fvsolve.run(drained(0.04, 0.04, RETURN, numerics={"method": "dormand-prince", "rtol": 1e-6}))
+    texts = [event["what"] for event in result.summary["events"]]
+    assert texts[:2] == ["opens", "shuts"] and len(texts) <= 8
+    assert texts == (["opens", "shuts"] * 4)[: len(texts)]
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_shut_it_is_a_junction_to_the_last_bit_but_rounding():
+    fall = {"time": [0.0, 0.5, 0.6], "value": [3e5, 3e5, 5e5]}
+    found = []
+    for place in (junction(), {"type": "air-valve", "inlet": 0.1, "outlet": 0.01}):
+        nodes = {"lake": reservoir(fall), "v": place, "low": reservoir(2e5)}
+        links = {"one": pipe("lake", "v", 100.0, 0.3, 1000.0, 10), "two": pipe("v", "low", 100.0, 0.3, 1000.0, 10)}
+        for link in links.values():
+            link["friction"] = {"model": "steady", "factor": 0.02}
+        found.append(fvsolve.run(scene(nodes, links, 2.0, {"method": "rk4"}, ["v.pressure", "two.flow"])))
+    assert not found[1].summary["events"]
+    for name in ("v.pressure", "two.flow"):
+        assert found[1][name] == pytest.approx(found[0][name], rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_its_energy_closes_and_its_bores_only_dissipate(law):
+    case = drained(0.04, 0.02, RETURN, numerics={"method": "dormand-prince", "rtol": 1e-8}, end=4.0, law=law)
+    one = energy(case, port="low")
+    column = sum(loss[-1] for loss in one.law.values())
+    assert abs(one.made[-1] - column) < 1e-5 * one.through and one.port.passive
+    assert (np.diff(one.dissipated["v.inside air valve"]) >= -1e-9 * one.through).all()
+
+
+def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
+    from fvsolve.kernels import records as rec
+    from fvsolve.model.energy_ledger import Accounts
+
+    model = fvsolve.build(fvsolve.load(drained(flow=0.0, low=2e5)))
+    accounts, y = Accounts(model), np.zeros(model.y_size)
+    i, j = (model.state_names.index(f"v.inside.{name}") for name in ("mass", "air"))
+    y[i], y[j] = -0.01 * 0.1, 2e-4 * 0.1
+    place = [one.place for one in accounts.held].index("v.inside")
+    device = next(one for name, _, one in model.devices if name == "v.inside")
+    row = model.tables[rec.I_DEVICES][0]
+    square = device.squares(model, None, row, np.zeros(model.y_size), None)[0]
+    small = sum(factor * y[k] for k, factor in square.items()) ** 2
+    assert accounts.stored_at(0.0, y)[place] == pytest.approx(small, rel=0.2)
+    pattern = sparsity(model).toarray()[: model.y_size]
+    assert not np.any((np.abs(model.jacobian(0.0, y)) > 1e-9) & ~pattern)
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        ({"inlet": 0.0}, "out of range"),
+        ({"outlet": None}, "outlet is missing"),
+        ({"volume": -1.0}, "out of range"),
+        ({"discharge_coefficient": 1.5}, "out of range"),
+    ],
+)
+def test_what_is_wrong_with_an_air_valve_is_said(wrong, said):
+    case = drained()
+    given = case["nodes"]["v"] | wrong
+    case["nodes"]["v"] = {key: value for key, value in given.items() if value is not None}
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case)
+    assert said in str(error.value)
+
+
+def test_a_demand_follows_the_pressure_between_none_and_all():
+    """Wagner's form with a valve before it, in all three ranges."""
+    from scipy.optimize import brentq
+
+    for given, want in ((5e5, 0.002), (2e5, 0.002), (1.2e5, 0.002)):
+        nodes = {"lake": reservoir(given)}
+        nodes["j"] = junction(want, required_pressure=AMBIENT + 2e5, minimum_pressure=AMBIENT + 0.2e5)
+        case = scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}, ["gap.flow", "j.pressure"])
+        model = fvsolve.build(fvsolve.load(case))
+
+        def drawn(p, want=want):
+            return want * min(1.0, max(0.0, (p - AMBIENT - 0.2e5) / 1.8e5)) ** 0.5
+
+        def short(p, given=given):
+            return 2e-4 * math.sqrt(2 * (given - p) / RHO) - drawn(p)
+
+        p = brentq(short, -5e5, given) if short(given - 1e-9) < 0.0 else given
+        flow, found = model.observe(0.0, np.zeros(0))
+        assert (flow, found) == pytest.approx((drawn(p), p), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        ({"required_pressure": 1e5}, "is not above the pressure of no flow"),
+        ({"required_pressure": 3e5, "minimum_pressure": 0.9e5}, "is below ambient"),
+        ({"required_pressure": 3e5, "demand": -1.0}, "none of it negative"),
+        ({"minimum_pressure": 2e5}, "says nothing without required_pressure"),
+    ],
+)
+def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
+    nodes = {"lake": reservoir(5e5), "j": {"type": "junction", "demand": 0.001, **wrong}}
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}))
+    assert said in str(error.value)

@@ -1,0 +1,433 @@
+"""Charts of accuracy against speed: their errors against closed forms, their floor, what fails, what is pasted."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from truth import rays, vessels
+from truth.scenes import (
+    AMBIENT,
+    RHO,
+    WATER,
+    area,
+    chamber,
+    junction,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    smooth_ramp,
+    smooth_step,
+    step,
+    valve,
+)
+
+import fvsolve
+from fvsolve.case.text import write
+from fvsolve.errors import FvsolveError
+from fvsolve.studies.accuracy import timing
+from fvsolve.studies.accuracy.chart import chart
+from fvsolve.studies.accuracy.distance import Distance, Track, averages, distance
+from fvsolve.studies.accuracy.files import figure, write_csv
+from fvsolve.studies.accuracy.front import curves
+from fvsolve.studies.accuracy.witnesses import Witness, judged, own_error
+from fvsolve.studies.outcome import outcome
+
+SUPPLY, HOLE, VOLUME, P0 = 5e6, 1e-6, 0.5, 1e6
+LENGTH, DIAMETER, SPEED, OPEN, PRESSURE = 300.0, 0.2, 1000.0, 4e-4, AMBIENT + 4e5
+START, DURATION, END = 0.05, 0.4, 1.3
+
+
+def pot(end=30.0, **numerics) -> dict:
+    """A chamber that fills through an orifice; its drop is a parabola in time."""
+    nodes = {"pump": reservoir(SUPPLY), "pot": chamber(VOLUME, P0)}
+    return scene(nodes, {"hole": valve("pump", "pot", HOLE)}, end, numerics, ["pot.pressure", "hole.flow"], end / 200)
+
+
+def pot_pressure(t):
+    slope = WATER["bulk_modulus"] / VOLUME * HOLE * math.sqrt(2 / RHO)
+    return SUPPLY - vessels.falling_root(SUPPLY - P0, slope, t)
+
+
+def line(opening=None, cells=40, end=END, **numerics) -> dict:
+    """Reservoir, pipe without friction, closing valve; the opening is a smooth polynomial unless given."""
+    nodes = {"lake": reservoir(PRESSURE), "gate": junction(), "out": reservoir(AMBIENT)}
+    opening = smooth_ramp(START, DURATION, 1.0, 0.0) if opening is None else opening
+    links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells), "tap": valve("gate", "out", OPEN, opening)}
+    return scene(nodes, links, end, numerics, ["gate.pressure", "tap.flow", "main.pressure@0.5"], 0.005)
+
+
+def line_rays(opening=lambda t: 1.0 - smooth_step(t, START, DURATION)) -> rays.Rays:
+    flow = OPEN * math.sqrt(2 * (PRESSURE - AMBIENT) / RHO)
+    main = rays.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, flow, PRESSURE)
+    outlets = {"gate": (lambda t: OPEN * opening(t), AMBIENT)}
+    return rays.Rays(RHO, {"main": main}, {"lake": rays.held(PRESSURE)}, outlets=outlets)
+
+
+def exact_rows(t) -> np.ndarray:
+    """Pressure at the gate, flow through the valve, pressure half way, at times t."""
+    truth = line_rays()
+    gate = np.array([truth.pressure("gate", x) for x in t])
+    opening = np.array([1.0 - smooth_step(x, START, DURATION) for x in t])
+    flow = OPEN * opening * np.sign(gate - AMBIENT) * np.sqrt(2 * np.abs(gate - AMBIENT) / RHO)
+    return np.column_stack([gate, flow, [truth.inside("main", 0.5, x)[0] for x in t]])
+
+
+def mean_error(values, exact, t) -> float:
+    """The worst column's mean over time of |difference|, over its range."""
+    off = np.abs(values - exact) / np.ptp(exact, axis=0)
+    return float(np.trapezoid(off, t, axis=0).max() / (t[-1] - t[0]))
+
+
+# errors -----------------------------------------------------------------------------------------------------------
+
+
+def test_errors_of_a_filling_chamber_are_those_against_its_parabola():
+    found = chart(pot(), methods=["rk4", "dormand-prince"], rtol=[1e-2, 1e-4, 1e-6], step=[2.0, 0.5])
+    checked = 0
+    for point in found.points:
+        run = fvsolve.run(pot(), {**point.setting.keys})
+        p = pot_pressure(run.t)
+        flow = HOLE * np.sqrt(2 * np.maximum(SUPPLY - p, 0) / RHO)
+        values = np.column_stack([run["pot.pressure"], run["hole.flow"]])
+        own = mean_error(values, np.column_stack([p, flow]), run.t)
+        laminar = 1e-5  # what rounds off the root near no drop, which the closed form has not
+        assert point.trajectory == pytest.approx(own, abs=laminar + 2 * found.floor["trajectory"])
+        last = max(
+            abs(run["pot.pressure"][-1] - p[-1]) / np.ptp(p), abs(run["hole.flow"][-1] - flow[-1]) / np.ptp(flow)
+        )
+        assert point.end == pytest.approx(last.max(), abs=10 * laminar)
+        checked += own > 10 * laminar
+    assert checked >= 2
+
+
+@pytest.fixture(scope="module")
+def closing():
+    """The chart of a smooth closure, which later tests read."""
+    return chart(line(), schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40])
+
+
+def test_errors_of_a_closing_valve_are_those_against_exact_rays(closing):
+    checked = 0
+    for point in closing.points:
+        run = fvsolve.run(line(), {**point.setting.keys})
+        values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+        own = mean_error(values, exact_rows(run.t), run.t)
+        assert point.trajectory == pytest.approx(own, abs=2 * closing.floor["trajectory"] + 1e-7)
+        checked += own > 10 * closing.floor["trajectory"]
+    assert checked >= 6
+
+
+def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
+    """Gauss points of the exact field in every cell; pressures over the range that the pipe's pressure has had."""
+    point = next(p for p in closing.points if p.setting.name == "upwind rk4" and p.setting.cells == 20)
+    ended = outcome(line(), point.setting.keys)
+    frame = ended.model.frame(ended.y, ended.model.evaluate(END, ended.y)[1])["main"]
+    truth, nodes = line_rays(), np.polynomial.legendre.leggauss(4)
+    exact = np.zeros((2, 20))
+    for i in range(20):
+        for x, w in zip(*nodes, strict=True):
+            exact[:, i] += 0.5 * w * np.array(truth.inside("main", (i + 0.5 + 0.5 * x) / 20, END))
+    times = np.linspace(0.0, END, 400)
+    seen = [truth.inside("main", x, t)[0] for x in np.linspace(0.0, 1.0, 41) for t in times]
+    span = max(seen) - min(seen)
+    p, q = frame["pressure"], frame["flow"]
+    worst = max(
+        np.mean(np.abs(p - exact[0])) / span,
+        np.mean(np.abs(q - exact[1])) / (span * area(DIAMETER) / (RHO * SPEED)),
+    )
+    assert point.end >= 0.98 * worst - 2 * closing.floor["end"]
+    rows = fvsolve.run(line(), point.setting.keys)
+    last = exact_rows(np.array([END]))[0]
+    ranges = np.ptp(exact_rows(times), axis=0)
+    at_end = np.array([rows[name][-1] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+    worst = max(worst, *(np.abs(at_end - last) / ranges))
+    assert point.end == pytest.approx(worst, rel=0.02, abs=2 * closing.floor["end"])
+
+
+def test_rows_before_and_after_a_jump_are_both_compared_and_weigh_nothing_twice():
+    t = np.array([0.0, 1.0, 1.0, 2.0])
+    exact = np.column_stack([t, [0.0, 0.0, 10.0, 10.0]])
+    off = exact.copy()
+    off[1, 1] += 1.0  # only before the jump
+    found = distance(Track(("p",), off, {}, {}), Track(("p",), exact, {}, {}))
+    assert found.trajectory == pytest.approx(0.5 * 0.1 / 2.0)
+    assert found.greatest == pytest.approx(0.1)
+    assert found.end == 0.0
+
+
+def test_every_probe_is_measured_by_its_own_range_and_one_that_stands_still_by_none():
+    t = np.linspace(0.0, 1.0, 5)
+    exact = np.column_stack([t, 1e6 + 10.0 * t, 1e-3 * t, np.full(5, 7.0)])
+    off = exact + np.array([0.0, 0.1, 2e-5, 3.0])
+    found = distance(Track(("a", "b", "c"), off, {}, {}), Track(("a", "b", "c"), exact, {}, {}))
+    assert found.worst == "b"
+    assert found.trajectory == pytest.approx(0.02)
+    assert found.overshoot == pytest.approx(0.02)
+
+
+def test_a_run_that_stopped_early_has_no_error():
+    t = np.linspace(0.0, 1.0, 5)
+    exact = np.column_stack([t, t])
+    assert math.isnan(distance(Track(("a",), exact[:3], {}, {}), Track(("a",), exact, {}, {})).trajectory)
+
+
+@pytest.mark.parametrize("fine, coarse", [(40, 10), (47, 10), (64, 48)])
+def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
+    """Cell averages of cos, exact on both grids; between edges a cubic reads their sums."""
+
+    def cells(n):
+        edges = np.linspace(0.0, 1.0, n + 1)
+        return np.diff(np.sin(2 * edges) / 2) * n
+
+    assert averages(cells(fine), coarse) == pytest.approx(cells(coarse), abs=1e-12 if fine == 40 else 1e-5)
+
+
+# floor ------------------------------------------------------------------------------------------------------------
+
+
+def _witness(name: str, shift: float, own: float) -> Witness:
+    t = np.linspace(0.0, 1.0, 11)
+    return Witness(name, Track(("a",), np.column_stack([t, t + shift]), {}, {}), Distance(own, own, own))
+
+
+def test_two_references_that_disagree_give_a_floor():
+    found = judged([_witness("rough", 0.01, 1e-4), _witness("fine", 0.0, 1e-6)])
+    assert (found.name, found.second) == ("fine", "rough")
+    assert found.floor.trajectory == pytest.approx(0.01)
+
+
+def test_references_that_agree_by_chance_have_the_floor_of_their_own_error():
+    found = judged([_witness("one", 1e-9, 3e-3), _witness("other", 0.0, 2e-3)])
+    assert found.floor.trajectory == pytest.approx(1.5 * 2e-3)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 5.0])
+def test_halvings_tell_the_error_of_a_reference(order):
+    t = np.linspace(0.0, 1.0, 11)
+    tracks = [Track(("a",), np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), {}, {}) for k in range(3)]
+    truth = Track(("a",), np.column_stack([t, t]), {}, {})
+    assert own_error(*tracks).trajectory == pytest.approx(distance(tracks[2], truth).trajectory, rel=0.05)
+
+
+def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
+    """Where fields jump, fifth-order references converge slowly and alike: rays know by how much they are off."""
+    jump = 0.0837
+    case = line(step(jump, 1.0, 0.0))
+    found = chart(case, schemes=["muscl"], methods=["ssp-rk3"], cells=[20, 40])
+    truth = line_rays(rays.step(jump, 1.0, 0.0))
+    run = fvsolve.run(case, {"numerics.scheme": "muscl", "numerics.method": "ssp-rk3", "links.main.cells": 40})
+    gate = np.array([truth.pressure("gate", t) for t in run.t])
+    twice = np.flatnonzero(np.diff(run.t) == 0)
+    gate[twice] = truth.pressure("gate", jump - 1e-9)
+    own = mean_error(run["gate.pressure"][:, None], gate[:, None], run.t)
+    [point] = [one for one in found.points if (one.setting.scheme, one.setting.cells) == ("muscl", 40)]
+    assert point.trajectory >= own - found.floor["trajectory"]
+    assert found.floor["trajectory"] < 0.5 * own
+
+
+@pytest.mark.parametrize("shape", ["smooth", "kinked"])
+def test_an_exact_solution_judges_where_the_case_names_one(shape):
+    """The same errors come out against finer runs, as far as the floor of those allows."""
+    opening = {"smooth": None, "kinked": {"time": [0.1, 0.3], "value": [1.0, 0.0]}}[shape]
+    given = {"schemes": ["upwind5"], "methods": ["rk4"], "cells": [10, 20]}
+    runs = chart(line(opening), **given)
+    exact = chart({**line(opening), "exact": {"name": "rays"}}, **given)
+    assert exact.reference == 'exact solution "rays"'
+    assert "exact" not in runs.reference
+    assert exact.floor["trajectory"] <= runs.floor["trajectory"]
+    for one, other in zip(exact.points, runs.points, strict=True):
+        assert one.trajectory == pytest.approx(other.trajectory, abs=runs.floor["trajectory"])
+        assert one.end == pytest.approx(other.end, abs=2 * runs.floor["end"])
+
+
+def test_a_chart_whose_references_are_no_better_than_its_runs_is_refused():
+    with pytest.raises(FvsolveError, match="two references .* disagree by .* larger --rtol"):
+        chart(pot(), methods=["dormand-prince"], rtol=[1e-12, 1e-13])
+
+
+def test_no_overshoot_is_claimed_that_the_references_cannot_tell(tmp_path):
+    """Upwind at Courant 1 carries a slow closure exactly through equal cells: it leaves the range of the blurred
+    reference, not that of the rays."""
+    nodes = {"lake": reservoir(AMBIENT + 1e6), "gate": junction(), "out": reservoir(AMBIENT)}
+    links = {
+        "main": pipe("lake", "gate", 600.0, 0.3, 1200.0, 25),
+        "tap": valve("gate", "out", 1.2e-3, ramp(0.25, 1.7, 1.0, 0.0)),
+    }
+    case = scene(nodes, links, 6.0, {}, ["gate.pressure", "tap.flow", "main.pressure@0.5"], 0.005)
+    given = {"schemes": ["upwind", "upwind5"], "methods": ["euler", "rk4"], "cells": [25, 50]}
+    found = chart(case, **given, folder=tmp_path)
+    points = [json.loads(text) for text in (tmp_path / "points.jsonl").read_text().splitlines()]
+    raw = [one["found"]["overshoot"] for one in points if "overshoot" in one["found"]]
+    floor, *blur = raw[:3]  # of upwind euler
+    assert "exact" not in found.reference and min(blur) > 1e-3 and found.floor["overshoot"] == floor > max(blur)
+    assert [one.overshoot for one in found.curves()["upwind euler"]] == [0.0, 0.0]
+    exact = chart(case | {"exact": {"name": "rays"}}, **given, folder=tmp_path / "exact")
+    points = [json.loads(text) for text in (tmp_path / "exact" / "points.jsonl").read_text().splitlines()]
+    true = [one["found"]["overshoot"] for one in points if "upwind" == one["of"].get("keys", {}).get("numerics.scheme")]
+    assert len(true) == 4 and max(true) < 1e-6 and exact.reference == 'exact solution "rays"'
+
+
+def test_nothing_is_claimed_below_the_floor(closing):
+    assert all(row.target >= closing.floor["trajectory"] for row in closing.front)
+    with pytest.raises(FvsolveError, match="below the floor"):
+        chart(line(), schemes=["upwind5"], methods=["rk4"], cells=[10, 20], target=1e-9)
+
+
+# what fails -------------------------------------------------------------------------------------------------------
+
+
+def stiff() -> dict:
+    """A thimble between two orifices: its rate is far above 1 / step."""
+    nodes = {"pump": reservoir(SUPPLY), "pot": chamber(1e-6, P0), "sump": reservoir(AMBIENT)}
+    links = {"in": valve("pump", "pot", HOLE), "out": valve("pot", "sump", HOLE)}
+    return scene(nodes, links, 1e-2, {}, ["pot.pressure"], 1e-4)
+
+
+def test_failed_runs_are_in_list_table_and_picture(tmp_path):
+    found = chart(stiff(), methods=["rk4", "dormand-prince"], rtol=[1e-3, 1e-6], step=[2e-3, 1e-30, 1e-6])
+    by_step = {point.setting.size: point for point in found.points if point.setting.method == "rk4"}
+    assert not by_step[2e-3].ok and ("not finite" in by_step[2e-3].reason or "wrong" in by_step[2e-3].reason)
+    assert not by_step[1e-30].ok and by_step[1e-30].reason.startswith("refused: ")
+    assert by_step[1e-6].ok
+    assert [point.setting.size for point in found.failed] == [2e-3, 1e-30]
+    write_csv(found, tmp_path / "chart.csv")
+    lines = list(csv.DictReader((tmp_path / "chart.csv").open()))
+    assert len(lines) == len(found.points)
+    assert [line["reason"].split(":")[0] for line in lines if line["ok"] == "0"][1:] == ["refused"]
+    drawn = [one for one in figure(found).axes[0].lines if one.get_markerfacecolor() == "none"]
+    assert sum(len(one.get_xdata()) for one in drawn) == 1  # the refused one spent nothing
+    assert not any(row.name == "rk4" and row.target < 1e-2 for row in found.front if row.by_updates is None)
+
+
+def test_a_run_that_costs_too_much_is_given_up_and_so_are_the_finer_ones_of_its_curve(monkeypatch, capsys):
+    """A thimble of a microlitre for ten seconds: millions of explicit steps, whatever the tolerance."""
+    monkeypatch.setattr(timing, "LIMIT", 0.3)
+    case = stiff()
+    case["nodes"]["pot"] = chamber(1e-9, P0)
+    case["numerics"]["end"], case["output"]["every"] = 10.0, 0.1
+    case["nodes"]["pump"] = reservoir(smooth_ramp(1.0, 5.0, SUPPLY, 0.8 * SUPPLY))
+    found = chart(case, methods=["dormand-prince", "rodas-5p"], rtol=[1e-2, 1e-4, 1e-6])
+    first, *finer = found.curves()["dormand-prince"]
+    assert not first.ok and first.reason.startswith("given up after 0.") and first.steps > 1000
+    assert 0.3 < first.seconds < 2.0
+    assert all(not one.ok and "rtol 0.01 was given up" in one.reason and one.steps == 0 for one in finer)
+    assert all(one.ok for one in found.curves()["rodas-5p"])
+
+
+def test_a_failed_point_is_no_proof_for_finer_targets():
+    found = chart(stiff(), methods=["rk4", "dormand-prince"], rtol=[1e-3, 1e-6], step=[2e-3])
+    assert found.front and "rk4" not in {row.name for row in found.front}
+
+
+# the front --------------------------------------------------------------------------------------------------------
+
+
+def test_the_front_names_the_cheapest_curve_by_updates_and_the_default_beside_it(closing):
+    assert closing.default == "weno5 rk4"
+    assert "weno5 rk4" in closing.curves()
+    row = next(row for row in closing.front if row.target == pytest.approx(1e-3))
+    fine = {name: [p for p in points if p.trajectory <= 1e-3] for name, points in curves(closing.points).items()}
+    assert row.by_updates == "upwind5 rk4"
+    assert row.updates <= min(point.updates for points in fine.values() for point in points)
+    if fine["weno5 rk4"]:
+        assert row.default_updates <= fine["weno5 rk4"][0].updates
+
+
+def test_work_and_errors_of_a_chart_are_the_same_every_time(closing):
+    again = chart(line(), schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40])
+    keys = ("trajectory", "greatest", "end", "rhs", "updates", "steps")
+    assert [[getattr(p, key) for key in keys] for p in again.points] == [
+        [getattr(p, key) for key in keys] for p in closing.points
+    ]
+    assert all(point.updates == point.rhs * point.setting.cells for point in again.points)
+
+
+def test_pasted_lines_reach_the_target(tmp_path):
+    """The lines as text into the file, run, and measured against exact rays."""
+    target = 3e-3
+    case = line(cells=37)
+    found = chart(case, schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40], target=target)
+    numerics, _, others = "\n".join(found.aim.lines()).partition("\n\n")
+    case["numerics"] = {"end": END}
+    ((name, table),) = tomllib.loads(others)["links"].items()
+    case["links"][name] |= table
+    file = tmp_path / "pasted.toml"
+    file.write_text(write(case).replace("[numerics]\n", f"[numerics]\n{numerics}\n"))
+    run = fvsolve.run(file)
+    values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+    own = mean_error(values, exact_rows(run.t), run.t)
+    assert own <= target
+    assert own == pytest.approx(found.aim.point.trajectory, abs=2 * found.floor["trajectory"] + 1e-7)
+    assert own > target / 30  # and not by waste
+
+
+def test_pipes_that_state_no_cells_are_given_a_cell_time(tmp_path):
+    case = line()
+    del case["links"]["main"]["cells"]
+    found = chart(case, schemes=["upwind5"], methods=["rk4"], cells=[10, 40], target=1e-2)
+    case["numerics"] = {"end": END, **tomllib.loads("\n".join(found.aim.lines()))}
+    run = fvsolve.run(case)
+    assert run.case.links["main"].cells == found.aim.point.setting.cells
+    values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+    assert mean_error(values, exact_rows(run.t), run.t) <= 1e-2
+
+
+# going on, and bad input ------------------------------------------------------------------------------------------
+
+
+def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
+    def stop(done, total, what):
+        if done == 5:
+            raise KeyboardInterrupt
+
+    given = {"methods": ["auto"], "rtol": [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7], "folder": tmp_path}
+    with pytest.raises(KeyboardInterrupt):
+        chart(pot(), progress=stop, **given)
+    found = chart(pot(), **given)
+    assert found.reused == 5  # the floor and four points
+    again = chart(pot(), **given)
+    assert again.reused == 7 and again.compile_seconds == 0.0
+    assert again.points == found.points  # their times are stored with them
+
+
+def test_a_case_in_which_nothing_moves_has_no_chart():
+    with pytest.raises(FvsolveError, match="every probe stands still"):
+        chart(line(end=0.04), schemes=["upwind5"], methods=["rk4"], cells=[10, 20])
+
+
+def test_where_a_chamber_holds_explicit_steps_back_references_are_implicit():
+    """Errors against them are those against an explicit run as fine."""
+    case = line(smooth_ramp(0.02, 0.2, 1.0, 0.5, 101), end=0.4)
+    case["nodes"]["gate"] = chamber(1e-2)
+    found = chart(case, schemes=["upwind5"], methods=["rodas-5p"], cells=[10, 20])
+    assert "rodas-5p" in found.reference + found.second and "radau-iia-5" in found.reference + found.second
+    names = ("gate.pressure", "tap.flow", "main.pressure@0.5")
+    fine = {"numerics.scheme": "upwind5", "numerics.method": "rk4", "links.main.cells": 80}
+    explicit = fvsolve.run(case, fine)
+    for point in found.points:
+        run = fvsolve.run(case, point.setting.keys)
+        off = mean_error(
+            np.column_stack([run[name] for name in names]), np.column_stack([explicit[name] for name in names]), run.t
+        )
+        assert point.trajectory == pytest.approx(off, rel=0.1, abs=2 * found.floor["trajectory"])
+
+
+@pytest.mark.parametrize(
+    "case, given, said",
+    [
+        (line, {"schemes": ["upwnd"]}, 'no scheme upwnd; did you mean "upwind"'),
+        (line, {"methods": ["rk5"]}, "no method rk5"),
+        (line, {"rtol": [1e-3]}, "has pipes.*--cells"),
+        (pot, {"cells": [10]}, "no pipe.*rtol or step"),
+        (pot, {"schemes": ["muscl"]}, "no pipe.*rtol or step"),
+    ],
+)
+def test_a_resolution_that_the_case_has_not_is_named(case, given, said):
+    with pytest.raises(FvsolveError, match=said):
+        chart(case(), **given)

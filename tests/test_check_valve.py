@@ -1,0 +1,174 @@
+"""Check valves: when they shut in closed form, scenes that could chatter, a disc that shuts late against SciPy."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from truth import discs
+from truth.scenes import GRAVITY, RHO, SHARP, SMOOTH, WATER, area, chamber, junction, lake, pipe, reservoir, scene
+
+import fvsolve
+from fvsolve.studies.energy.energy import energy
+
+FRICTION = {"model": "steady", "factor": 0.02}
+CASES = Path(__file__).parent.parent / "cases"
+
+
+def check(start, end, flow_area=0.02, **more):
+    return {"type": "check-valve", "from": start, "to": end, "area": flow_area, "discharge_coefficient": 1.0, **more}
+
+
+def column(numerics):
+    """A rigid column that a reservoir pushes through a check valve until the reservoir falls at 1 s."""
+    nodes = {"pump": reservoir({"time": [0.0, 1.0], "value": [3e5, 1e5], "kind": "step"}), "a": junction()}
+    nodes["town"] = reservoir(2e5)
+    links = {"check": check("pump", "a"),
+             "way": {"type": "rigid-column", "from": "a", "to": "town", "length": 20.0, "diameter": 0.2,
+                     "friction": {"model": "none"}}}  # fmt: skip
+    return scene(nodes, links, 4.0, numerics, ["check.flow"], 0.1)
+
+
+def column_shuts():
+    """dM/dt = (A / L)(dP - M^2 / G) from sqrt(G 1e5): then M = sqrt(G D) tan(...), zero at this time."""
+    g = 2.0 * RHO * 0.02**2  # before and behind alike, the drop is 1e5 Pa
+    return 1.0 + math.pi / 4.0 * math.sqrt(g / 1e5) * 20.0 / area(0.2)
+
+
+@pytest.mark.parametrize("method, order", [("improved-euler", 2), ("rk4", 4)])
+def test_the_time_of_shutting_converges_with_the_order_of_the_method(method, order):
+    errors = []
+    for step in (0.04, 0.02, 0.01):
+        result = fvsolve.run(column({"method": method, "step": step}))
+        (event,) = result.summary["events"]
+        errors.append(abs(event["time"] - column_shuts()))
+        after = result["check.flow"][result.t > event["time"]]
+        assert event["what"] == "shuts" and not after.any()  # exactly none
+    assert math.log2(errors[0] / errors[2]) / 2.0 == pytest.approx(order, abs=0.4)
+
+
+def test_under_error_control_it_shuts_on_time():
+    result = fvsolve.run(column({"method": "dormand-prince", "rtol": 1e-11}))
+    assert [e["time"] for e in result.summary["events"]] == pytest.approx([column_shuts()], abs=1e-8)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_at_a_jump_it_stops_the_flow_at_once(law):
+    """The reservoir falls by more than Z M0: the flow is gone within the step, and Joukowsky's head behind it."""
+    nodes = {"pump": reservoir({"time": [0.0, 0.1], "value": [6e5, 1e5], "kind": "step"}), "a": junction()}
+    nodes["town"] = reservoir(5.9e5)
+    links = {"check": check("pump", "a", 0.005), "main": pipe("a", "town", 100.0, 0.3, 1000.0, 20)}
+    result = fvsolve.run(
+        scene(nodes, links, 0.25, SHARP, ["check.flow", "a.pressure"], 0.01, fluid={**WATER, "law": law})
+    )
+    first = math.sqrt(2.0 * RHO * 0.005**2 * 1e4)
+    after = (result.t > 0.1) & (result.t < 0.29)
+    assert not result["check.flow"][after].any()
+    near = 1e-12 if law == "linear" else 5e-3
+    assert result["a.pressure"][after] == pytest.approx(5.9e5 - 1000.0 / area(0.3) * first, rel=near)
+
+
+SWING = {"time": [0.0, 0.5, 2.0, 2.5], "value": [50.0, 10.0, 10.0, 60.0]}
+HARD = {
+    "two in series": ({"a": junction(), "m": junction(), "b": junction()},
+                      {"one": check("a", "m"), "two": check("m", "b")}),
+    "two in parallel": ({"a": junction(), "b": junction()}, {"one": check("a", "b"), "two": check("a", "b", 0.01)}),
+    "against each other": ({"a": junction(), "b": junction()}, {"one": check("a", "b"), "two": check("b", "a", 0.01)}),
+    "between chambers": ({"a": chamber(0.01), "b": chamber(0.02)}, {"one": check("a", "b", 0.001)}),
+    "spring loaded": ({"a": junction(), "b": junction()}, {"one": check("a", "b", cracking_pressure=2e4)}),
+    "on a slope": ({"a": junction(elevation=5.0), "b": junction(elevation=9.0)}, {"one": check("a", "b")}),
+}  # fmt: skip
+WAYS = [
+    ("linear", SMOOTH), ("linear", {"method": "rodas-5p", "rtol": 1e-5}), ("log", SMOOTH),
+]  # fmt: skip
+
+
+def hard(name, law, numerics, head=SWING, end=3.0):
+    nodes, links = HARD[name]
+    nodes = {"pump": lake(head), "town": lake(40.0), **nodes}
+    if name == "on a slope":
+        nodes = {k: {"elevation": 0.0, **node} for k, node in nodes.items()}
+    ways = {"up": pipe("pump", "a", 60.0, 0.2, 1000.0, 10, friction=FRICTION),
+            "down": pipe("b", "town", 90.0, 0.2, 1000.0, 15, friction=FRICTION)}  # fmt: skip
+    probes = [f"{link}.flow" for link in links]
+    return scene(nodes, {**ways, **links}, end, numerics, probes, 0.01, fluid={**WATER, "law": law})
+
+
+@pytest.mark.parametrize("name", HARD)
+@pytest.mark.parametrize("law, numerics", WAYS, ids=["explicit", "rosenbrock", "log"])
+def test_hard_scenes_end_with_few_events_and_no_flow_backwards(name, law, numerics):
+    result = fvsolve.run(hard(name, law, numerics))
+    assert result.ok, result.reason
+    assert 1 <= len(result.summary["events"]) <= 40
+    scale = max(np.ptp(result[probe]) for probe in result.probes)
+    for probe in result.probes:
+        assert result[probe].min() >= -1e-9 * scale
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("name", ["two in series", "between chambers"])
+def test_at_rest_it_rests(name):
+    result = fvsolve.run(hard(name, "linear", SMOOTH, 40.0, 1.0))
+    assert all(not np.ptp(result[probe]) for probe in result.probes) and result.summary["events"] == []
+
+
+@pytest.mark.parametrize("head, shut", [(58.0, False), (30.0, True)])
+def test_steady_states_find_which_are_shut(head, shut):
+    """Two ways to a town that a lake feeds too: the check valve of the lower pump is shut, the other open."""
+    nodes = {"low": lake(head), "high": lake(60.0), "a": junction(), "b": junction(), "town": junction(0.02)}
+    nodes["lake"] = lake(45.0)
+    links = {"one": check("low", "a"), "two": check("high", "b")}
+    for k, (i, j) in enumerate([("a", "town"), ("b", "town"), ("town", "lake")]):
+        links[f"p{k}"] = pipe(i, j, 200.0, 0.2, 1000.0, 5, friction={"model": "steady", "factor": 0.02})
+    model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, SMOOTH)))
+    heads = {name: node["head"] for name, node in model.checks["nodes"].items()}
+    assert (heads["a"] > head) == shut and heads["b"] < 60.0
+    assert not model.rhs(0.0, np.zeros(model.y_size)).any()
+
+
+def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
+    weight, z = RHO * GRAVITY, 1200.0 / area(0.3)
+    head = lambda t: 101325.0 + weight * np.interp(t, [0.5, 1.0], [30.3, 10.0])  # noqa: E731
+    g, far = 2.0 * RHO * (0.61 * 0.05) ** 2, 101325.0 + weight * 30.0
+    t, (x, m, _), events = discs.slam(head, g, z, 1.0, far, 2e3, 0.2, 4.5, [0.5, 1.0])
+    result = fvsolve.run(CASES / "check-valve-slam.toml", set={"links.main.cells": 240})
+    found, slammed = [e["time"] for e in result.summary["events"]], events[1][0]
+    assert found[: len(events)] == pytest.approx([e[0] for e in events], abs=1e-4)
+    before, after = result.t < slammed - 0.05, (result.t > slammed + 1e-3) & (result.t < 5.0)
+    assert result["check.opening"][before] == pytest.approx(np.interp(result.t, t, x)[before], abs=5e-4)
+    assert result["check.flow"][before] == pytest.approx(np.interp(result.t, t, m)[before], abs=0.1)  # l/s
+    assert result["check.flow"].min() < -1.0 and not result["check.flow"][after].any()
+
+
+@pytest.mark.parametrize("disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}])
+def test_a_disc_half_open_at_the_start_does_not_move(disc):
+    case = hard("spring loaded", "linear", SMOOTH, 50.0, 0.5)
+    case["links"]["one"] = {**case["links"]["one"], **disc, "overpressure": 2e5}
+    result = fvsolve.run(case)
+    assert np.ptp(result["one.flow"]) == 0.0 and result["one.flow"][0] > 0.0 and result.summary["events"] == []
+
+
+def test_shut_or_open_it_gives_nothing_out():
+    found = energy(hard("two in series", "linear", {"method": "rodas-5p", "rtol": 1e-7}))
+    for name in ("one", "two"):
+        assert found.dissipated[f"{name} check valve"][-1] > 0.0 and np.all(
+            np.diff(found.dissipated[f"{name} check valve"]) >= -1e-6
+        )
+
+
+@pytest.mark.parametrize(
+    "more, text",
+    [
+        ({"cracking_pressure": -1.0}, "at least 0"),
+        ({"time_constant": 0.1}, "overpressure is missing"),
+        ({"overpressure": 1e4}, "wants a time_constant"),
+        ({"time_constant": 0.0, "overpressure": 1e4}, "above 0"),
+    ],
+)
+def test_bad_check_valves_are_refused(more, text):
+    case = hard("two in series", "linear", {})
+    case["links"]["one"] = {**case["links"]["one"], **more}
+    with pytest.raises(fvsolve.CaseError, match=text):
+        fvsolve.load(case)

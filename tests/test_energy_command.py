@@ -1,0 +1,271 @@
+"""`fvsolve energy`: what it prints and writes, its JSON, its faults; and that ordinary runs know nothing of it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from fvsolve.cli import main
+
+CASE = """
+schema = 1
+[fluid]
+name = "user"
+density = 1000.0
+bulk_modulus = 2.2e9
+viscosity = 1e-3
+vapor_pressure = 2300.0
+[nodes.lake]
+type = "reservoir"
+head = 50.0
+[nodes.gate]
+type = "junction"
+[nodes.air]
+type = "reservoir"
+pressure = "0 barg"
+[links.main]
+type = "pipe"
+from = "lake"
+to = "gate"
+length = "600 m"
+diameter = "300 mm"
+wave_speed = 1200.0
+friction = { model = "steady", factor = 0.02 }
+cells = 20
+[links.tap]
+type = "valve"
+from = "gate"
+to = "air"
+area = 0.002
+opening = { start = 0.1, duration = 0.5, value = [1.0, 0.2] }
+[numerics]
+end = 2.0
+scheme = "muscl"
+method = "ssp-rk3"
+courant = 0.8
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "hammer.toml"
+    path.write_text(CASE)
+    return str(path)
+
+
+@pytest.fixture
+def told(monkeypatch, capsys, tmp_path):
+    """Run `fvsolve energy ...` here: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str):
+        monkeypatch.setattr(sys, "argv", ["fvsolve", "energy", *arguments])
+        with pytest.raises(SystemExit) as left:
+            main()
+        said = capsys.readouterr()
+        return left.value.code or 0, said.out, said.err
+
+    return run
+
+
+def test_the_ledger_is_printed_and_written_row_by_row(told, case, tmp_path):
+    code, out, _ = told(case, "--port", "lake")
+    assert code == 0
+    assert "passive over this run" in out
+    assert "the numbers dissipate" in out
+    folder = tmp_path / "runs" / "hammer.energy"
+    with open(folder / "energy.csv", newline="") as file:
+        header, *rows = csv.reader(file)
+    table = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+    assert header[0] == "t [s]"
+    parts = {what: sum(one for name, one in table.items() if name.startswith(what + " "))
+             for what in ("supplied", "stored", "dissipated", "scheme")}  # fmt: skip
+    left = parts["supplied"] - parts["stored"] - parts["dissipated"]
+    assert table["remainder [J]"] == pytest.approx(left, abs=1e-9)
+    assert table["remainder [J]"] == pytest.approx(parts["scheme"] + table["step [J]"], abs=1e-8)
+    assert table["t [s]"][-1] == 2.0
+    assert (folder / "energy.png").stat().st_size > 10_000
+    assert (folder / "energy.svg").read_text().startswith("<?xml")
+
+
+def test_its_json_has_the_documented_keys_and_nothing_beside_it(told, case):
+    code, out, err = told(case, "--json", "--port", "gate")
+    said = json.loads(out)
+    assert (code, err) == (0, "")
+    page = open("/".join([*__file__.split("/")[:-2], "docs", "energy.md"]), encoding="utf-8").read()
+    for key in [*said, *said["port"]]:
+        assert f"`{key}`" in page, key
+    total = sum(said["supplied"].values()) - sum(said["stored"].values()) - sum(said["dissipated"].values())
+    assert said["remainder"] == pytest.approx(total, abs=1e-8)
+    assert said["port"]["passive"]
+    assert set(said["at_start"]) == {"main"}
+
+
+def test_pairs_are_run_and_tabled(told, case, tmp_path):
+    code, out, _ = told(case, "--scheme", "upwind,upwind5", "--method", "ssp-rk3,euler", "--json")
+    rows = json.loads(out)["pairs"]
+    assert code == 0
+    assert [(row["scheme"], row["method"]) for row in rows] == [
+        ("upwind", "ssp-rk3"), ("upwind", "euler"), ("upwind5", "ssp-rk3"), ("upwind5", "euler")]  # fmt: skip
+    assert [row["creates"] for row in rows] == [False, False, False, True]
+    assert (tmp_path / "runs" / "hammer.energy" / "pairs.csv").read_text().count("\n") == 5
+    kept = tmp_path / "runs" / "hammer.energy" / "points.jsonl"
+    before = kept.read_text()
+    code, out, _ = told(case, "--method", "euler", "--scheme", "upwind5")
+    assert kept.read_text() == before
+    assert "create energy in this run: upwind5 with euler" in out
+
+
+def test_without_a_case_it_says_what_schemes_and_methods_claim(told):
+    code, out, _ = told("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4", "--json")
+    said = json.loads(out)
+    assert code == 0
+    assert {one["scheme"]: one["passive"] for one in said["schemes"]} == {
+        "upwind": True, "fromm": True, "upwind5": False}  # fmt: skip
+    code, out, _ = told("--scheme", "upwind,fromm,upwind5", "--method", "euler,gauss-4")
+    assert "create energy at every step: fromm with euler" in out
+    assert "upwind5: create energy at pipe ends" in out
+
+
+@pytest.mark.parametrize(
+    "arguments, fault",
+    [
+        (["--port", "gat"], 'no port named "gat"'), (["--scheme", "upwnd"], 'did you mean "upwind"'),
+        (["--method", "rk5"], "methods are euler, improved-euler"), (["--scheme", "quik"], "schemes are linear-upwind"),
+        (["--method", "rk5"], 'no method named "rk5"'), (["--set", "nodes.lake.hed=3"], "unknown key"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_named(told, case, arguments, fault):
+    code, out, err = told(case, *arguments)
+    assert code == 2
+    assert fault in err
+    assert not out
+
+
+TANKS = """
+[fluid]
+name = "user"
+density = 1000.0
+bulk_modulus = 2.2e9
+viscosity = 1e-3
+vapor_pressure = 2300.0
+[nodes]
+a = { type = "tank", area = 2.0, level = 3.0 }
+b = { type = "tank", area = 0.7, level = 0.5 }
+[links.way]
+type = "valve"
+from = "a"
+to = "b"
+area = 0.01
+[numerics]
+end = 20.0
+"""
+
+
+@pytest.fixture
+def tanks(tmp_path):
+    path = tmp_path / "tanks.toml"
+    path.write_text(TANKS)
+    return str(path)
+
+
+def test_methods_that_were_refused_are_given_no_verdict_and_a_way_out_that_works(told, tanks):
+    code, out, _ = told(tanks, "--method", "euler,rk4")
+    assert code == 2
+    assert "weno5 with euler, weno5 with rk4: refused: numerics.method: each estimates no error" in out
+    assert "none of them ran" in out
+    assert "creates energy in this run" not in out
+    way_out = out.partition("--set ")[2].split()[0]
+    code, out, _ = told(tanks, "--method", "euler,implicit-euler", "--set", way_out)
+    assert code == 0
+    assert "create energy in this run: weno5 with euler\n" in out
+    code, out, _ = told(tanks, "--method", "euler,auto")
+    assert code == 0
+    assert 'weno5 with euler: refused: numerics.method: method "euler" estimates no error' in out
+    assert "none of those that ran creates energy in this run" in out
+    code, out, _ = told(tanks, "--method", "euler", "--json")
+    assert code == 2
+    assert "estimates no error" in json.loads(out)["pairs"][0]["reason"]
+
+
+@pytest.mark.parametrize("given", [["--port", "lake"], ["--set", "numerics.end=1"], ["--out", "there"]])
+def test_what_asks_about_a_run_is_refused_by_name_without_a_case(told, given):
+    code, out, err = told(*given)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"{given[0]}: only with a case")
+
+
+def test_without_a_case_auto_is_said_to_be_two_methods(told):
+    code, _, err = told("--method", "auto")
+    assert code == 2
+    assert "changes between dormand-prince and rodas-5p" in err
+
+
+def test_a_case_without_ports_says_that_it_has_none(told, tanks):
+    code, _, err = told(tanks, "--port", "a")
+    assert code == 2
+    assert err.strip().endswith("wanted a reservoir, an inflow or a junction, and this case has none")
+
+
+PLACES = {
+    '{ type = "tank", area = 2.0, level = 3.0 }': '{ type = "reservoir", pressure = "50 barg" }',
+    '{ type = "tank", area = 0.7, level = 0.5 }': '{ type = "chamber", volume = 0.02, initial_pressure = "5 barg" }',
+    "area = 0.01": "area = 1e-6",
+}
+
+
+def test_what_newton_leaves_is_told_beside_the_verdict(told, tmp_path):
+    text = TANKS
+    for old, new in PLACES.items():
+        text = text.replace(old, new)
+    (tmp_path / "pot.toml").write_text(text)
+    step = ["--set", "numerics.step=0.01"]
+    code, out, _ = told("pot.toml", "--set", "numerics.method=gauss-4", *step)
+    assert code == 0
+    assert "J, what Newton leaves: " in out
+    assert "that passed: rounding" in out
+    code, out, _ = told("pot.toml", "--set", "numerics.method=rk4", *step)
+    assert "Newton" not in out
+
+
+@pytest.mark.parametrize(
+    "asked, goes_on",
+    [(["--set", "numerics.method=rk4"], "the same command starts anew"),
+     (["--method", "rk4,heun"], "interrupted after 0 of 2 points; the same command goes on")],
+)  # fmt: skip
+def test_ctrl_c_ends_with_130_and_promises_nothing_that_is_not_there(tanks, tmp_path, asked, goes_on):
+    run = [sys.executable, "-m", "fvsolve", "energy", tanks, *asked, "--set", "numerics.step=1e-5", "--set",
+           "numerics.end=1e5"]  # fmt: skip
+    left = subprocess.Popen(run, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while left.poll() is None and not (tmp_path / "runs" / "tanks.energy").exists():
+        time.sleep(0.05)
+    time.sleep(0.5)
+    left.send_signal(signal.SIGINT)
+    out, err = left.communicate(timeout=60)
+    assert left.returncode == 130
+    assert "--resume" not in out + err
+    assert "interrupted" in out + err
+    assert goes_on in out + err
+    assert not (tmp_path / "runs" / "tanks.energy" / "points.jsonl").exists()
+
+
+def test_a_run_that_blows_up_is_shown_with_what_it_created(told, case):
+    code, out, _ = told(case, "--set", "numerics.courant=3", "--json")
+    said = json.loads(out)
+    assert code == 1
+    assert "not finite" in said["reason"]
+    assert said["verdict"] == "the numbers create energy"
+
+
+def test_an_ordinary_run_loads_nothing_of_it(case):
+    code = (f"import sys, fvsolve; fvsolve.run({case!r}); "
+            "print([name for name in sys.modules if 'energy' in name and name.startswith('fvsolve')])")  # fmt: skip
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "[]"

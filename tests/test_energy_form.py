@@ -1,0 +1,116 @@
+"""The energy norm in which growth is measured: springs between bodies, motions that store nothing, moving chambers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from truth.scenes import scene
+
+from fvsolve.model.energy import energy_form, form_of
+from fvsolve.steppers import method_named, stability_function
+from fvsolve.studies.linear.frozen import frozen
+from fvsolve.studies.linear.linearise import linearised
+from fvsolve.studies.stability.bounds import numerical_abscissa
+from fvsolve.studies.stability.growth import Dense, predicted
+from fvsolve.studies.stability.stability import stability
+
+MASS, DAMPING = 10.0, 1000.0
+
+
+def pair(stiffness, hold=0.0):
+    """Two masses, a spring and a damper between them, and a spring that holds the first to a frame."""
+    nodes = {name: {"type": "mass", "mass": MASS} for name in "ab"}
+    links = {"spring": {"type": "spring", "from": "a", "to": "b", "stiffness": stiffness},
+             "damper": {"type": "damper", "from": "a", "to": "b", "damping": DAMPING}}  # fmt: skip
+    if hold:
+        nodes["wall"] = {"type": "frame"}
+        links["hold"] = {"type": "spring", "from": "wall", "to": "a", "stiffness": hold}
+    return scene(nodes, links, 1.0, {"method": "rk4", "step": 1e-3})
+
+
+def by_hand(stiffness, method, steps=1000):
+    """The greatest safe step of the relative motion in its energy norm, all powers looked at."""
+    omega, rate = math.sqrt(2 * stiffness / MASS), 2 * DAMPING / MASS
+    j = np.array([[0.0, omega], [-omega, -rate]])  # of sqrt(k / 2) (x_b - x_a) and sqrt(m / 4) (v_b - v_a)
+    coefficients = [float(x) for x in stability_function(method_named(method)).numerator.coefficients]
+    low, high = 0.0, 10.0 / omega
+    while high - low > 1e-6 * high:
+        middle, power, fails = (low + high) / 2, np.eye(2), False
+        one = sum(c * np.linalg.matrix_power(middle * j, k) for k, c in enumerate(coefficients))
+        for _ in range(steps):
+            power = power @ one
+            fails = fails or np.linalg.norm(power, 2) > 1e3
+            if fails:
+                break
+        low, high = (low, middle) if fails else (middle, high)
+    return low
+
+
+def system_of(case, method, at=None, steps=1000):
+    """The linear system of a case in its energy norm."""
+    state = frozen(case, at=at)
+    return Dense(method_named(method), energy_form(state.model, state.y).seen(linearised(state).a), steps)
+
+
+@pytest.mark.parametrize("stiffness, hold", [(1e6, 0.0), (1e7, 0.1)])
+@pytest.mark.parametrize("method", ["rk4", "ssp-rk3"])
+def test_two_masses_on_a_spring_fail_where_their_relative_motion_does(stiffness, hold, method):
+    found = predicted(system_of(pair(stiffness, hold), method)).step
+    assert found == pytest.approx(by_hand(stiffness, method), rel=2e-4)
+
+
+def test_two_free_masses_are_measured_as_predicted_and_no_implicit_step_of_theirs_fails():
+    (row,) = stability(pair(1e6), methods=["rk4"], steps=300).rows
+    assert abs(row.difference) < 0.005 and row.field_of_values <= row.predicted * (1 + 1e-4)
+    assert row.field_of_values > 0.0 and row.predicted == pytest.approx(by_hand(1e6, "rk4", 300), rel=2e-4)
+    for name in ("implicit-euler", "gauss-4"):
+        assert math.isinf(predicted(system_of(pair(1e6), name)).step)
+        assert math.isinf(predicted(system_of(pair(1e7, 0.1), name)).step)
+
+
+def test_masses_that_nothing_holds_are_idle_together_and_a_held_one_is_not():
+    free, held = (frozen(pair(1e6, hold)).model for hold in (0.0, 0.1))
+    form = energy_form(free)
+    together = np.array([1.0, 0.0, 1.0, 0.0])
+    assert form.size == 3 and form.forth @ together == pytest.approx(np.zeros(3), abs=1e-9)
+    assert form.idle[:, 0] / form.idle[0, 0] == pytest.approx(together)
+    assert energy_form(held).size == 4
+    y = np.array([1e-3, 0.2, -2e-3, 0.1])
+    energy = 0.5 * 1e6 * 3e-3**2 + 0.5 * MASS * (0.2**2 + 0.1**2)
+    assert np.sum((form.forth @ y) ** 2) == pytest.approx(energy, rel=1e-12)
+    assert np.sum((form.rows @ y) ** 2) == pytest.approx(energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("at", [None, 1e-3])
+def test_a_closed_cylinder_neither_gains_nor_loses_energy_at_rest_or_moving(at):
+    e = system_of("cases/closed-cylinder.toml", "rk4", at).e
+    assert np.max(np.abs(e + e.T)) < 1e-6 * np.max(np.abs(e)) and numerical_abscissa(e) < 1e-4
+
+
+def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
+    from scipy.sparse import csr_array
+
+    form = form_of(csr_array(np.array([[0.0, 2.0]])), ("load",), np.array([0.1, 0.5]))
+    assert form.closed(np.array([[0.0, 1.0], [0.0, -3.0]]))
+    driven = np.array([[0.0, 1.0], [5.0, -3.0]])
+    assert not form.closed(driven)
+    whole = form.fitting(driven)
+    assert np.sum((whole.forth @ [0.1, 0.0]) ** 2) == pytest.approx((2.0 * 0.5) ** 2)
+    assert np.sort(np.linalg.eigvals(whole.seen(driven))) == pytest.approx(np.sort(np.linalg.eigvals(driven)))
+
+
+def test_the_greatest_growth_is_found_at_every_power_of_a_small_system():
+    """An oscillator in a norm that is not its own: growth of Euler's steps swings as it rises."""
+    e, steps = np.array([[0.0, 1.0], [-40.0, 0.0]]), 300
+    found = predicted(Dense(method_named("euler"), e, steps)).step
+
+    def most(h):
+        power, size = np.eye(2), 0.0
+        for _ in range(steps):
+            power = power @ (np.eye(2) + h * e)
+            size = max(size, np.linalg.norm(power, 2))
+        return size
+
+    assert most(found * (1 - 1e-4)) < 1e3 < most(found * (1 + 1.2e-4))

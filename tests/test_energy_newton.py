@@ -1,0 +1,72 @@
+"""What Newton leaves of its equations is booked as such: neither as supplied nor as made by schemes and steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, WATER, chamber, reservoir, scene, valve
+
+from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.pairs import measured
+
+VOLUME, P0, P1 = 0.02, 5e5, 50e5  # over ambient
+PER = VOLUME / WATER["bulk_modulus"]
+
+
+def filled(method: str, **numerics) -> dict:
+    """A chamber that has filled through an orifice after 2 s, and then rests where the orifice has no slope."""
+    nodes = {"src": reservoir(AMBIENT + P1), "pot": chamber(VOLUME, AMBIENT + P0)}
+    return scene(nodes, {"hole": valve("src", "pot", 6e-7)}, 20.0, {"method": method, **numerics})
+
+
+@pytest.mark.parametrize("method", ["gauss-2", "gauss-4", "tr-bdf2", "radau-iia-5"])
+def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(method):
+    found = energy(filled(method, step=0.01))
+    assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)
+    assert found.stored["pot"][-1] == pytest.approx(0.5 * PER * (P1**2 - P0**2), rel=1e-6)
+    assert found.dissipated["hole"][-1] == pytest.approx(0.5 * PER * (P1 - P0) ** 2, rel=3e-5)
+    assert found.remainder == pytest.approx(found.step + found.newton, abs=1e-12 * found.through)
+    assert np.abs(found.newton).max() < 1e-8 * found.through
+    if method.startswith("gauss"):  # they conserve squares: steps leave rounding, and the verdict says so
+        assert np.abs(found.step).max() < 1e-12 * found.through
+        assert found.verdict == "rounding"
+    elif method == "radau-iia-5":
+        assert found.verdict != "the numbers create energy"
+
+
+def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
+    found = energy(filled("gauss-4", step=0.01))
+    assert found.newton_counts
+    assert list(found.numerical()) == ["step", "newton", "remainder"]
+    assert found.plain()["newton_loss"] == found.newton[-1]
+    (row,) = measured(scene_of("gauss-4"), None, ["gauss-4"])
+    assert not row["creates"]
+    assert row["newton_loss"] == found.newton[-1]
+
+
+def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
+    from fvsolve.cli import shipped
+
+    found = energy(shipped.find("three-way-junction"), {"numerics.method": "gauss-4", "numerics.end": 2.0})
+    assert np.abs(found.newton).max() > 1e-12 * found.through > 10.0 * np.abs(found.step).max()
+
+
+def test_long_steps_of_second_order_book_the_orifice_badly_where_the_state_is_exact():
+    """The mass of the chamber is a parabola in time: no error to control, and a poor sum of its powers."""
+    found = energy(filled("tr-bdf2", rtol=1e-6))
+    lost = 0.5 * PER * (P1 - P0) ** 2
+    assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)
+    assert found.dissipated["hole"][-1] == pytest.approx(1.12 * lost, rel=0.01)
+    assert found.step[-1] == pytest.approx(lost - found.dissipated["hole"][-1], rel=1e-6)
+
+
+def scene_of(method: str):
+    import fvsolve
+
+    return fvsolve.load(filled(method, step=0.01))
+
+
+@pytest.mark.parametrize("method", ["rk4", "rodas-4"])
+def test_methods_without_newton_leave_none(method):
+    found = energy(filled(method, step=0.02))
+    assert not found.newton.any()

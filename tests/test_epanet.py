@@ -1,0 +1,280 @@
+"""EPANET networks as cases: steady heads and flows against EPANET's own, no drift, and what is said of bad files."""
+
+from __future__ import annotations
+
+import math
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fvsolve
+from fvsolve.case import load
+from fvsolve.model.build import build
+
+wntr = pytest.importorskip("wntr", reason="WNTR, the extra `epanet`, is not installed")
+
+from fvsolve.epanet import import_network  # noqa: E402
+from fvsolve.epanet.importing import cell_time  # noqa: E402
+
+PACKAGE = Path(wntr.__file__).parent
+SHIPPED, BROKEN = PACKAGE / "library" / "networks", PACKAGE / "tests" / "networks_for_testing"
+NETWORKS = [("Net1", 0), ("Net2", 0), ("Net2", 31), ("Net3", 0), ("Net3", 12), ("Net6", 0), ("ky4", 0), ("ky10", 0)]
+
+# Between a pump of constant power that stands at no flow in EPANET and a shut valve: no law says what head is there.
+DEAD = {"ky10": {"O-Pump-11", "I-RV-4"}}
+
+SMALL = """[TITLE]
+Two lakes, a loop
+[JUNCTIONS]
+a 10 5 day
+b 12 3
+c 9 0
+[DEMANDS]
+c 4 day
+c 2 night
+[RESERVOIRS]
+high 60
+low 35 tide
+[PIPES]
+p1 high a 400 250 {r} 0 Open
+p2 a b 300 150 {r} 2.5 Open
+p3 b c 350 200 {r} 0 Open
+p4 a c 500 150 {r} 0 Open
+p5 c low 450 200 {r} 10 Open
+p6 b low 200 100 {r} 0 Closed
+p7 low c 100 150 {r} 0 CV
+[VALVES]
+[PATTERNS]
+day 0.5 1.5 2.0
+night 1.2 0.4
+tide 1.0 1.02
+[TIMES]
+DURATION 5:00
+PATTERN TIMESTEP 1:00
+PATTERN START 1:00
+[OPTIONS]
+UNITS LPS
+HEADLOSS {formula}
+PATTERN night
+DEMAND MULTIPLIER 1.3
+[END]
+"""
+
+
+def truth(path, hour):
+    """EPANET's own heads [m] and flows [m3/s] at an hour, as tight as it goes."""
+    network = wntr.network.WaterNetworkModel(str(path))
+    network.options.hydraulic.accuracy = 1e-5
+    network.options.hydraulic.trials = 200
+    step = network.options.time.hydraulic_timestep
+    network.options.time.duration = max(network.options.time.duration, 3600 * hour)
+    network.options.time.report_timestep = step
+    found = wntr.sim.EpanetSimulator(network).run_sim(file_prefix=str(path.parent / path.stem) + "-truth")
+    at = 3600 * hour
+    return found.node["head"].loc[at].to_dict(), found.link["flowrate"].loc[at].to_dict()
+
+
+def differences(path, hour, where):
+    """Greatest differences of heads [m] and of flows (to the largest flow), the case as checked, the names."""
+    made = import_network(path, hour)
+    case = where / "net.toml"
+    case.write_text(made.text, encoding="utf-8")
+    model = build(load(case))
+    checks = model.checks
+    copy = where / path.name
+    copy.write_bytes(path.read_bytes())
+    heads, flows = truth(copy, hour)
+    live = [name for name in made.nodes if name not in DEAD.get(path.stem, ())]
+    lost = max(abs(checks["nodes"][made.nodes[name]]["head"] - heads[name]) for name in live)
+    areas = {pipe.name: math.pi / 4 * pipe.diameter**2 for pipe in model.pipes}
+    found = {
+        name: checks["pipes"][ours]["velocity"] * areas[ours] for name, ours in made.links.items() if ours in areas
+    }
+    off = max(abs(flow - flows[name]) for name, flow in found.items()) / max(map(abs, flows.values()))
+    return lost, off, made
+
+
+@pytest.mark.parametrize("name, hour", NETWORKS, ids=[f"{name}-{hour}" for name, hour in NETWORKS])
+def test_steady_heads_and_flows_are_epanets(name, hour, tmp_path):
+    lost, off, _ = differences(SHIPPED / f"{name}.inp", hour, tmp_path)
+    assert lost < 1e-3 and off < 1e-4  # ten times closer than was asked for
+
+
+@pytest.mark.parametrize(
+    "formula, roughness, within",
+    [("H-W", 110, 1e-3), ("C-M", 0.011, 0.05), ("D-W", 0.3, 0.1)],  # other constants: docs/epanet.md
+)
+def test_every_head_loss_formula_patterns_minor_losses_and_shut_pipes(formula, roughness, within, tmp_path):
+    path = tmp_path / "in" / "small.inp"
+    path.parent.mkdir()
+    path.write_text(SMALL.format(r=roughness, formula=formula))
+    for hour in (0, 1, 4):
+        lost, off, made = differences(path, hour, tmp_path)
+        assert lost < within and off < 10 * within / 25.0
+        links = tomllib.loads(made.text)["links"]
+        assert links["p6-shut"]["opening"] == 0.0 and links["p7-check"]["type"] == "check-valve"
+
+
+def still(made):
+    """The case with tanks as lakes of their level, so that nothing has a cause to move."""
+    case = tomllib.loads(made.text)
+    for name, node in case["nodes"].items():
+        if node["type"] == "tank":
+            head = float(node["elevation"].split()[0]) + float(node["level"].split()[0])
+            case["nodes"][name] = {"type": "reservoir", "head": head}
+    return case
+
+
+@pytest.mark.parametrize("name", ["Net2", "Net3"])
+def test_without_an_event_nothing_moves_by_one_bit_and_a_closure_moves_it(name):
+    case = still(import_network(SHIPPED / f"{name}.inp"))
+    drawn = {node: float(part["demand"].split()[0]) for node, part in case["nodes"].items() if "demand" in part}
+    most = max(drawn, key=drawn.get)
+    case["nodes"][most]["demand"] = {"start": 20.0, "duration": 0.5, "value": [drawn[most] * 1e-3, 0.0]}
+    case["output"] = {"every": 0.5, "probes": [f"nodes.{node}.head" for node in list(case["nodes"])[::9]], "fields": 0}
+    case["output"]["probes"].append(f"nodes.{most}.head")
+    result = fvsolve.run(case, set={"numerics.end": 24.0, "numerics.cell_time": 0.04, "numerics.scheme": "muscl"})
+    before = np.asarray(result.t) <= 20.0
+    for probe in case["output"]["probes"]:
+        assert np.ptp(result[probe][before]) == 0.0, probe
+    assert np.ptp(result[f"nodes.{most}.head"]) > 1.0
+
+
+def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_after():
+    case = still(import_network(SHIPPED / "Net3.inp"))
+    case["links"]["335"] |= {"rated_speed": "890 rpm", "inertia": "47 kg m2", "trip": 20.0}
+    case["output"] = {"every": 0.25, "fields": 0, "probes": ["nodes.61.head", "nodes.123.head", "nodes.15.head"]}
+    set = {"numerics.end": 34.0, "numerics.cell_time": 0.04, "numerics.scheme": "muscl", "numerics.method": "ssp-rk2"}
+    result = fvsolve.run(case, set=set)
+    t = np.asarray(result.t)
+    assert all(np.ptp(result[probe][t <= 20.0]) == 0.0 for probe in case["output"]["probes"])
+    arrival = 20.0 + 13868.4 / 1200.0  # along the main from 61 to 123
+    near, far = (np.asarray(result[f"nodes.{node}.head"]) for node in ("61", "123"))
+    assert near[0] - near[t <= arrival].min() > 10.0
+    assert np.ptp(far[t <= arrival - 0.5]) < 1e-2 and far[0] - far[-1] > 5.0
+
+
+def test_a_pipe_too_short_for_a_step_is_lengthened_with_its_loss_and_said_so(tmp_path):
+    path = tmp_path / "in" / "short.inp"
+    path.parent.mkdir()
+    for formula, roughness in (("H-W", 110), ("C-M", 0.011)):
+        path.write_text(SMALL.format(r=roughness, formula=formula).replace("p3 b c 350", "p3 b c 0.5"))
+        lost, off, made = differences(path, 0, tmp_path)
+        assert lost < 0.05
+        assert tomllib.loads(made.text)["links"]["p3"]["length"] == "3 m"
+        assert ["p3"] in [names for what, names in made.notes if what.startswith("3 m long here")]
+
+
+@pytest.mark.parametrize("units, exponent", [("LPS", 0.5), ("LPS", 0.9), ("GPM", 0.9)])
+def test_emitters_draw_what_epanet_says(units, exponent, tmp_path):
+    path = tmp_path / "in" / "leaky.inp"
+    path.parent.mkdir()
+    text = SMALL.format(r=110, formula="H-W").replace("UNITS LPS", f"UNITS {units}\nEMITTER EXPONENT {exponent}")
+    path.write_text(text.replace("[VALVES]", "[EMITTERS]\nb 0.7\nc 0.2\n[VALVES]"))
+    lost, off, made = differences(path, 0, tmp_path)
+    assert lost < 2e-3 and off < 1e-3
+    assert tomllib.loads(made.text)["links"]["b-emitter"]["type"] == "leak"
+
+
+VALVES = {
+    "TCV": ("v1 a c 150 TCV 40 0", "valve"),
+    "FCV": ("v1 a c 150 FCV 5 0", "flow-control"),
+    "PRV": ("v1 a c 150 PRV 32 0", "pressure-reducing"),
+    "PSV": ("v1 a c 150 PSV 45 0", "pressure-sustaining"),
+    "PBV": ("v1 a c 150 PBV 3 0", "valve"),
+    "GPV": ("v1 a c 150 GPV g 0\n[CURVES]\ng 0 0\ng 10 2\ng 40 20", "valve"),
+}
+
+
+@pytest.mark.parametrize("kind", VALVES)
+def test_valves_of_every_kind_stand_as_epanets_do(kind, tmp_path):
+    line, word = VALVES[kind]
+    path = tmp_path / "in" / "valve.inp"
+    path.parent.mkdir()
+    text = SMALL.format(r=110, formula="H-W").replace("p4 a c 500 150 110 0 Open\n", "")
+    path.write_text(text.replace("[VALVES]", f"[VALVES]\n{line}"))
+    lost, off, made = differences(path, 0, tmp_path)
+    assert lost < 5e-3 and off < 1e-3  # EPANET takes g = 32.2 ft/s2 in minor losses
+    assert tomllib.loads(made.text)["links"]["v1"]["type"] == word
+
+
+def test_cells_grow_only_where_there_would_be_too_many():
+    assert cell_time([1e4, 2e4], 1200.0) == 0.01
+    assert cell_time([1e6], 1000.0) == 0.025
+
+
+def test_a_climb_steeper_than_the_pipe_moves_the_junction_and_no_head(tmp_path):
+    path = tmp_path / "in" / "steep.inp"
+    path.parent.mkdir()
+    path.write_text(SMALL.format(r=110, formula="H-W").replace("p3 b c 350", "p3 b c 5").replace("c 9 0", "c 0 0"))
+    lost, _, made = differences(path, 0, tmp_path)
+    assert lost < 1e-3
+    assert ["c"] in [names for what, names in made.notes if what.startswith("elevation moved")]
+
+
+FAULTS = {
+    "[PIPES]": ("[PIPES", "[PIPES"),
+    "p2 a b": ("p2 a bb", "undefined node bb"),
+    "300 150": ("300 -150", "-150"),
+    "UNITS LPS": ("UNITS FURLONGS", "FURLONGS"),
+    "[VALVES]": ("[PUMPS]\nq high b HEAD c9", "undefined curve c9"),
+    "p1 high a 400": ("p1 high a four", "four"),
+    "a 10 5 day": ("a 10 5 dusk", "undefined time pattern dusk"),
+}
+
+
+@pytest.mark.parametrize("good", FAULTS)
+def test_a_broken_file_is_told_by_its_fault(good, tmp_path, fvs):
+    bad, said = FAULTS[good]
+    path = tmp_path / "bad.inp"
+    path.write_text(SMALL.format(r=110, formula="H-W").replace(good, bad, 1))
+    code, out, err = fvs("new", "x", tmp_path / "x.toml", "--from", path)
+    assert code == 2 and said in err and "bad.inp: 1 fault" in err and out == ""
+    assert not (tmp_path / "x.toml").exists()
+
+
+def test_all_faults_that_epanet_lists_are_said_at_once(tmp_path, fvs):
+    path = tmp_path / "bad.inp"
+    text = SMALL.format(r=110, formula="H-W").replace("p2 a b", "p2 a bb").replace("500 150", "500 -150")
+    path.write_text(text)
+    code, _, err = fvs("new", "x", tmp_path / "x.toml", "--from", path)
+    assert code == 2 and "2 faults" in err and "undefined node bb" in err and "-150" in err
+
+
+@pytest.mark.parametrize("name, said", [("bad_values", "node1"), ("bad_syntax", "FOO"), ("bad_times", "0:00:00:00")])
+def test_the_broken_files_that_wntr_ships(name, said, tmp_path, fvs):
+    if not BROKEN.is_dir():
+        pytest.skip("this WNTR ships no test networks")
+    code, _, err = fvs("new", "x", tmp_path / "x.toml", "--from", BROKEN / f"{name}.inp")
+    assert code == 2 and said in err
+
+
+def test_a_network_without_a_source_or_an_hour_before_its_start(tmp_path, fvs):
+    path = tmp_path / "dry.inp"
+    path.write_text("[JUNCTIONS]\na 10 5\nb 10 5\n[PIPES]\np1 a b 100 200 100 0 Open\n[OPTIONS]\nUNITS LPS\n[END]\n")
+    code, _, err = fvs("new", "x", tmp_path / "x.toml", "--from", path)
+    assert code == 2 and "no tanks or reservoirs" in err
+    code, _, err = fvs("new", "x", tmp_path / "x.toml", "--from", SHIPPED / "Net2.inp", "--hour", "-1")
+    assert code == 2 and "0 or more" in err
+
+
+def test_the_command_writes_a_case_that_checks_and_never_writes_over_one(tmp_path, fvs):
+    to = tmp_path / "town.toml"
+    code, out, err = fvs("new", "town", to, "--from", SHIPPED / "Net2.inp", "--hour", "7", "--wave-speed", "1000 m/s")
+    assert code == 0 and str(to) in out and (tmp_path / "schema.json").exists()
+    assert load(to).links["1"].wave_speed == 1000.0
+    code, out, _ = fvs("check", to)
+    assert code == 0 and "step" in out
+    code, _, err = fvs("new", "town", to, "--from", SHIPPED / "Net2.inp")
+    assert code == 2 and "exists" in err
+    code, _, err = fvs("new", "--hour", "3")
+    assert code == 2 and "--from" in err
+
+
+def test_without_wntr_the_message_says_what_to_install(monkeypatch, tmp_path, fvs):
+    monkeypatch.setitem(sys.modules, "wntr", None)
+    code, _, err = fvs("new", "x", tmp_path / "x.toml", "--from", SHIPPED / "Net2.inp")
+    assert code == 2 and 'pip install "fvsolve[epanet]"' in err

@@ -1,0 +1,231 @@
+"""The verdicts of a failure map, on synthetic runs of each kind and on real runs whose kind is known."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, NO_FRICTION, chamber, junction, lake, pipe, reservoir, scene, step, valve
+
+from fvsolve.case import load
+from fvsolve.errors import FvsolveError
+from fvsolve.studies.failure.failure_map import failures
+from fvsolve.studies.failure.verdict import FAR, Measures, excess, ranges_of, ringing, verdict
+from fvsolve.studies.failure.watched import WINDOW, watched
+from fvsolve.studies.points import Points
+
+TOLERANCE = 0.02
+
+
+def never() -> Measures:
+    raise AssertionError("nothing shorter is asked for")
+
+
+def shorter(*errors: float):
+    left = list(errors)
+    return lambda: Measures("finished", True, error=left.pop(0), farthest=1.0)
+
+
+def found(error=0.001, farthest=0.1, **more) -> Measures:
+    return Measures("finished", True, error=error, farthest=farthest, **more)
+
+
+# synthetic runs ----------------------------------------------------------------------------------------------------
+
+
+def test_a_small_error_and_no_swing_is_stable():
+    assert verdict(found(), never, TOLERANCE) == "stable"
+
+
+def test_an_error_that_a_shorter_step_reduces_is_coarse_and_one_that_stays_is_wrong():
+    assert verdict(found(0.1), shorter(0.05), TOLERANCE) == "coarse"
+    assert verdict(found(0.1), shorter(0.09, 0.03), TOLERANCE) == "coarse"
+    assert verdict(found(0.021), shorter(0.0199), TOLERANCE) == "coarse"  # within the tolerance is enough
+    assert verdict(found(0.1), shorter(0.099, 0.099), TOLERANCE) == "wrong"
+    assert verdict(found(0.1), shorter(math.nan, math.nan), TOLERANCE) == "wrong"
+
+
+def test_what_is_not_finite_or_far_away_has_blown_up():
+    stopped = Measures("stopped: a value is not finite at main.r[3] at t = 1 s; ...", False)
+    assert verdict(stopped, never, TOLERANCE) == "blown up"
+    assert verdict(found(farthest=1.01 * FAR), never, TOLERANCE) == "blown up"
+    assert verdict(found(farthest=math.nan), never, TOLERANCE) == "blown up"
+
+
+def test_a_refused_case_and_a_run_stopped_by_name_are_refused():
+    assert verdict(Measures("refused: no such thing", False, refused=True), never, TOLERANCE) == "refused"
+    assert verdict(Measures("stopped: Newton did not converge at ...", False), never, TOLERANCE) == "refused"
+
+
+def test_swings_are_ringing_whatever_the_error():
+    for error in (0.001, 0.5):
+        assert verdict(found(error, ringing=1.01 * TOLERANCE), never, TOLERANCE) == "ringing"
+        assert verdict(found(error, variation=0.3), never, TOLERANCE) == "ringing"
+
+
+@pytest.mark.parametrize("factor", [-0.99, -0.9, -0.5])
+def test_the_amplitude_of_ringing_is_what_is_left_after_eight_changes(factor):
+    n = np.arange(40)
+    swings = 0.3 * factor**n
+    amplitude = ringing([swings[:, None]], np.ones(1))
+    assert amplitude == pytest.approx(0.5 * 0.3 * (1 - factor) * abs(factor) ** 7)
+
+
+def test_a_growing_swing_and_one_on_a_slope_ring_and_waves_noise_free_steps_and_short_swings_do_not():
+    n = np.arange(60.0)
+    assert ringing([(-1.05) ** n[:, None]], np.ones(1)) > 1.0
+    assert ringing([(0.02 * n + 0.1 * (-1) ** n)[:, None]], np.ones(1)) == pytest.approx(0.09)
+    for smooth in (np.sin(0.8 * n), np.minimum(n, 30.0), (n > 30).astype(float), np.sin(2.0 * n)):
+        assert ringing([smooth[:, None]], np.ones(1)) == 0.0
+    assert ringing([np.where(n < 7, (-1.0) ** n, 0.0)[:, None]], np.ones(1)) == 0.0
+    assert ringing([np.ones((WINDOW - 2, 1))], np.ones(1)) == 0.0
+
+
+def test_excess_counts_what_swings_beyond_the_reference_and_nothing_else():
+    t = np.linspace(0, 1, 101)[:, None]
+    square = np.floor(4 * t) % 2
+    assert excess(square, square, np.ones(1)) == 0.0
+    assert excess(0.5 * square, square, np.ones(1)) == 0.0  # less is no swing
+    assert excess(square + 5.0 * (np.arange(101) == 40)[:, None], square, np.ones(1)) == 0.0  # nor is a single row
+    assert excess(square + 0.1 * (-1.0) ** np.arange(101)[:, None], square, np.ones(1)) > 4.0
+
+
+def test_a_probe_that_stands_still_is_not_judged():
+    rows = np.array([[1.0, 5.0], [3.0, 5.0], [2.0, 5.0]])
+    assert list(ranges_of(rows)) == [2.0, math.inf]
+
+
+# real runs ---------------------------------------------------------------------------------------------------------
+
+
+def closing(**numerics) -> dict:
+    """A frictionless pipe whose valve shuts in a tenth of the wave's way there and back."""
+    nodes = {"lake": lake(60.0), "gate": junction(), "out": reservoir(AMBIENT)}
+    links = {
+        "main": pipe("lake", "gate", 600.0, 0.3, 1200.0, 60),
+        "valve": valve("gate", "out", 0.002, {"start": 0.1, "duration": 0.1, "value": [1.0, 0.0]}),
+    }
+    settings = {"scheme": "upwind5", "method": "rk4", "courant": 0.8, **numerics}
+    return scene(nodes, links, 3.0, settings, ["gate.pressure", "main.pressure@0.5"], 0.01)
+
+
+def verdicts(case: dict, **asked) -> dict[str, list[str]]:
+    (scheme,) = asked["schemes"]
+    made = failures(load(case), **asked)
+    return {method: [one.verdict for one in made.row(scheme, method)] for method in made.methods}
+
+
+def test_a_map_of_upwind_shows_the_exact_square_the_smeared_ones_and_the_limit():
+    said = verdicts(closing(), schemes=["upwind"], methods=["euler"], courants=[0.25, 0.5, 1.0, 1.1, 2.0])
+    assert said["euler"] == ["wrong", "wrong", "stable", "blown up", "blown up"]
+
+
+def test_a_linear_fifth_order_scheme_is_stable_to_its_limit_and_implicit_euler_is_coarse():
+    methods = ["rk4", "implicit-euler", "radau-iia-5"]
+    made = failures(load(closing()), ["upwind5"], methods, courants=[0.5, 1.0, 2.5])
+    said = {method: [one.verdict for one in made.row("upwind5", method)] for method in methods}
+    assert said["rk4"] == ["stable", "stable", "blown up"]
+    assert said["implicit-euler"] == ["coarse"] * 3 and said["radau-iia-5"] == ["stable"] * 3
+    limit = made.row("upwind5", "rk4")[0].limit * made.wave_rate
+    assert 1.0 < limit < 2.5
+    assert math.isinf(made.row("upwind5", "radau-iia-5")[0].limit)
+
+
+def test_central_differences_swing_behind_a_front():
+    assert verdicts(closing(), schemes=["central"], methods=["rk4"], courants=[0.5])["rk4"] == ["ringing"]
+
+
+def stiff() -> dict:
+    """Oil pressed into a small chamber through a pipe: the chamber answers in microseconds."""
+    nodes = {"pump": reservoir(2.0e6), "body": chamber(1e-6), "sump": reservoir(AMBIENT)}
+    opening = step(0.01, 1.0, 0.3)
+    links = {
+        "line": pipe("pump", "body", 50.0, 0.03, 1250.0, 20, friction=NO_FRICTION),
+        "pilot": valve("body", "sump", 1.2e-5, opening),
+    }
+    numerics = {"scheme": "upwind", "method": "rk4", "courant": 0.8}
+    return scene(nodes, links, 0.1, numerics, ["body.pressure"], 0.001)
+
+
+def test_the_trapezoidal_rule_rings_after_a_stiff_step_and_an_l_stable_method_does_not():
+    asked = {"schemes": ["muscl"], "methods": ["trapezoid", "radau-iia-5"], "steps": [5e-4]}
+    case = stiff()
+    made = failures(load(case), tolerance=0.05, **asked)
+    trapezoid, radau = made.squares
+    assert (trapezoid.verdict, radau.verdict) == ("ringing", "stable")
+    assert trapezoid.measures.ringing > 0.1 and radau.measures.ringing < 1e-6
+
+
+def test_a_key_of_the_case_may_be_the_columns_and_predicts_where_the_step_is_too_long():
+    volumes = [1e-6, 1e-4, 1e-2]
+    made = failures(
+        load(stiff()), ["upwind"], ["euler"], steps=[1e-3], key=("nodes.body.volume", volumes), tolerance=0.2
+    )
+    blown = [one.verdict == "blown up" for one in made.squares]
+    assert blown == [one.step > one.limit for one in made.squares] and any(blown) and not all(blown)
+
+
+def test_a_method_that_cannot_go_by_the_case_is_refused_with_its_reason():
+    case = closing()
+    case["numerics"] = {"end": 3.0, "scheme": "upwind5", "method": "dormand-prince", "rtol": 1e-4}
+    made = failures(load(case), ["upwind5"], ["euler"], key=("links.main.diameter", [0.3]))
+    assert made.squares[0].verdict == "refused" and "estimates no error" in made.squares[0].measures.reason
+
+
+def test_finished_squares_are_kept_and_reused(tmp_path):
+    asked = {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 1.0]}
+    first = failures(load(closing()), points=Points(tmp_path), **asked)
+    again = Points(tmp_path)
+    assert failures(load(closing()), points=again, **asked) == first
+    assert again.reused == len((tmp_path / "points.jsonl").read_text().splitlines()) > 2
+
+
+def test_what_is_watched_steps_as_any_run_does():
+    from fvsolve.studies.outcome import outcome
+
+    case = closing()
+    seen, bursts = watched(case)
+    plain = outcome(case)
+    assert np.array_equal(seen.rows, plain.rows) and np.array_equal(seen.y, plain.y)
+    assert sum(map(len, bursts)) > 100
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"schemes": ["upwnd"]}, 'did you mean "upwind"'),
+        ({"methods": ["rk5"]}, 'no method named "rk5"'),
+        ({"courants": [0.5], "steps": [0.1]}, "keep one"),
+        ({"courants": [-1.0]}, "positive"),
+        ({"courants": [0.5, 1.0], "key": ("links.main.diameter", [0.3])}, "columns"),
+        ({"tolerance": 1e-6, "methods": ["rk4"]}, "no better than the runs it judges"),
+        ({"tolerance": -1.0}, "positive"),
+        ({"key": ("numerics.step", [0.1])}, "the map sets it"),
+    ],
+)
+def test_what_cannot_be_asked_says_so(asked, said):
+    with pytest.raises(FvsolveError, match=said):
+        failures(load(closing()), **asked)
+
+
+def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeypatch, capsys):
+    from fvsolve.case import text
+    from fvsolve.cli import main
+
+    path = tmp_path / "scene.toml"
+    path.write_text(text.write(closing()))
+    command = ["fvsolve", "map", str(path), "--scheme", "upwind", "--method", "euler,rk4", "--step", "8 ms,0.02"]
+    monkeypatch.setattr(sys, "argv", [*command, "--out", str(tmp_path / "out"), "--json"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["values"] == [0.008, 0.02] and [one["method"] for one in said["squares"]] == ["euler"] * 2 + ["rk4"] * 2
+    assert all(one["courant"] == pytest.approx(120 * one["step"]) for one in said["squares"])
+    with open(tmp_path / "out" / "map.csv") as file:
+        assert [row["verdict"] for row in csv.DictReader(file)] == [one["verdict"] for one in said["squares"]]
+    assert (tmp_path / "out" / "map.png").stat().st_size > 10_000 and (tmp_path / "out" / "map.svg").is_file()

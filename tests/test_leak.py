@@ -1,0 +1,117 @@
+"""Leaks against closed forms: draining by any power, none backwards, between pipes and in networks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
+
+import fvsolve
+from fvsolve.kernels.emitters import LEAST_DROP, emitter_flow, emitter_slope
+from fvsolve.studies.energy.energy import energy
+
+TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
+
+
+def leak(start: str, coefficient: float, exponent: float = 0.5, **more) -> dict:
+    return {"type": "leak", "from": start, "coefficient": coefficient, "exponent": exponent, **more}
+
+
+@pytest.mark.parametrize("n", [0.5, 1.0, 1.5])
+def test_a_tank_drains_by_the_power_of_its_level(n):
+    """A dz/dt = -C (rho g z)^n : z^(1-n) falls linearly, at n = 1 z falls exponentially."""
+    section, level, end = 2.0, 3.0, 60.0
+    c = 0.02 / (RHO * GRAVITY * level) ** n
+    nodes = {"t": tank(section, level)}
+    result = fvsolve.run(scene(nodes, {"hole": leak("t", c, n)}, end, TIGHT, ["t.level", "hole.flow"], 1.0))
+    k, t = c * (RHO * GRAVITY) ** n / section, np.asarray(result.t)
+    exact = level * np.exp(-k * t) if n == 1.0 else (level ** (1 - n) - (1 - n) * k * t) ** (1 / (1 - n))
+    assert result["t.level"] == pytest.approx(exact, rel=1e-9)
+    assert result["hole.flow"] == pytest.approx(c * (RHO * GRAVITY * exact) ** n, rel=1e-8)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-13
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_the_steady_state_in_a_line_is_that_of_both_laws(law):
+    """What a valve brings into a dead end is what leaks there, at the elevation of the place."""
+    nodes = {"lake": lake(60.0), "a": junction(elevation=10.0), "b": junction(elevation=12.0)}
+    nodes["lake"]["elevation"] = 10.0
+    links = {"gap": valve("lake", "a", 1e-3), "line": pipe("a", "b", 100.0, 0.1, 1000.0, 10), "hole": leak("b", 2e-6)}
+    case = scene(nodes, links, 0.5, {"scheme": "muscl"}, ["hole.flow", "gap.flow"], fluid=WATER | {"law": law})
+    model = fvsolve.build(fvsolve.load(case))
+    assert not model.rhs(0.0, np.zeros(model.y_size)).any()
+
+    def drop(q):
+        return RHO * GRAVITY * (60.0 - 12.0) - RHO * (q / 1e-3) ** 2 / 2 - (q / 2e-6) ** 2
+
+    q = brentq(drop, 0.0, 1.0, xtol=1e-16)
+    assert model.observe(0.0, np.zeros(model.y_size)) == pytest.approx([q, q], rel=1e-8 if law == "linear" else 1e-3)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_nothing_comes_back_through_a_leak(law):
+    """Below ambient pressure its flow is exactly zero, and it flows again above; the mass ledger is closed."""
+    fall = {"time": [0.0, 1.0, 2.0, 3.0], "value": [2e5, 0.5e5, 0.5e5, 2e5]}
+    nodes = {"lake": reservoir(fall), "b": junction()}
+    links = {"line": pipe("lake", "b", 10.0, 0.1, 1000.0, 10), "hole": leak("b", 1e-6)}
+    probes = ["hole.flow", "b.pressure"]
+    result = fvsolve.run(scene(nodes, links, 4.0, {}, probes, 0.01, fluid=WATER | {"law": law}))
+    flow, gauge = result["hole.flow"], result["b.pressure"] - AMBIENT
+    below, above = gauge <= 0.0, gauge > LEAST_DROP
+    assert below.sum() > 50 and (flow[below] == 0.0).all()
+    assert flow[above] == pytest.approx(1e-6 * np.sqrt(gauge[above]), rel=1e-6)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("n", [0.3, 0.5, 1.0, 1.8, 2.5])
+def test_its_slope_is_bounded_without_a_jump_and_that_of_its_flow(n):
+    law = np.array([n, 0.0, 1e5, np.inf])
+    drops = np.concatenate([np.linspace(-5.0, 3 * LEAST_DROP, 1001), np.geomspace(50.0, 1e6, 50)])
+    slope = np.array([emitter_slope(law, 0, 1e-4, d) for d in drops])
+    rise = [(emitter_flow(law, 0, 1e-4, d + 1e-4) - emitter_flow(law, 0, 1e-4, d - 1e-4)) / 2e-4 for d in drops]
+    assert slope == pytest.approx(rise, rel=1e-4, abs=1e-3 * slope.max())
+    assert (slope >= 0.0).all() and slope[drops <= 0.0].max() == 0.0
+    assert np.abs(np.diff(slope[:1001])).max() < 0.02 * slope.max()
+
+
+def test_two_leaks_on_one_junction_share_what_a_valve_brings():
+    """A cluster of three laws, held by nothing but them."""
+    nodes = {"lake": reservoir(AMBIENT + 4e5), "a": junction()}
+    links = {"gap": valve("lake", "a", 1e-4), "one": leak("a", 1e-6), "two": leak("a", 1e-9, 1.2)}
+    model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {"step": 0.1}, ["a.pressure", "gap.flow"])))
+
+    def short(p):
+        return 1e-4 * math.sqrt(2 * (4e5 - p) / RHO) - 1e-6 * math.sqrt(p) - 1e-9 * p**1.2
+
+    p = brentq(short, 1.0, 4e5, xtol=1e-9)
+    assert model.observe(0.0, np.zeros(0))[0] - AMBIENT == pytest.approx(p, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_what_leaks_is_dissipated_and_the_ledger_closes(law):
+    nodes = {"t": tank(0.5, 4.0), "g": junction()}
+    links = {"line": pipe("t", "g", 10.0, 0.05, 1000.0, 10), "hole": leak("g", 1e-6)}
+    one = energy(scene(nodes, links, 0.3, {"method": "rk4", "scheme": "upwind5"}, fluid=WATER | {"law": law}))
+    assert set(one.dissipated) >= {"hole"} and one.dissipated["hole"][-1] > 0.0 and not one.supplied
+    assert one.relative < 1e-6
+
+
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        ({"coefficient": -1e-6}, "out of range; wanted a value above 0"),
+        ({"exponent": -0.5}, "out of range"),
+        ({"from": "nowhere"}, 'no place named "nowhere"'),
+        ({"to": "t"}, "unknown key"),
+        ({"from": "lake"}, "lake is a reservoir"),
+    ],
+)
+def test_what_is_wrong_with_a_leak_is_said(wrong, said):
+    nodes = {"t": tank(0.5, 4.0), "lake": reservoir(2e5)}
+    links = {"gap": valve("lake", "t", 1e-3), "hole": leak("t", 1e-6) | wrong}
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(scene(nodes, links, 1.0, {}))
+    assert said in str(error.value)

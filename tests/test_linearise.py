@@ -1,0 +1,274 @@
+"""A case as A, B, C, D: closed forms of small scenes, eigenfrequencies of pipes, runs with inputs a little off."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from truth.scenes import (
+    AMBIENT,
+    GRAVITY,
+    RHO,
+    area,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    step,
+    tank,
+    valve,
+)  # fmt: skip
+
+import fvsolve
+from fvsolve.cli import main
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.kernels import records as rec
+from fvsolve.model.energy import energy_form
+from fvsolve.solve import initial_state
+from fvsolve.solve.advance import advance, hold
+from fvsolve.studies.linear.linearise import linearise, linearised
+from fvsolve.studies.linear.spectrum import poles_of, spectrum
+
+K = 2.2e9
+TIGHT = {"method": "dormand-prince", "rtol": 1e-9}
+LINES = {"scheme": "upwind5", "method": "rk4", "courant": 0.5}
+
+
+def filling(opening=0.5, **more):
+    """A reservoir at 3 MPa fills a chamber of 2 l at 1 MPa through a valve of 10 mm2."""
+    nodes = {"pump": reservoir(3e6), "bottle": chamber(2e-3, 1e6)}
+    return scene(
+        nodes, {"v": valve("pump", "bottle", 1e-5, opening)}, 1.0, TIGHT, ["bottle.pressure", "v.flow"], **more
+    )
+
+
+def test_a_chamber_behind_an_orifice_is_as_by_hand():
+    found = linearise(filling(), ["pump.pressure", "v.opening"], ["bottle.pressure", "v.flow"])
+    mass_flow = 0.5 * 1e-5 * math.sqrt(2 * RHO * 2e6)
+    slope, stiffness = mass_flow / (2 * 2e6), K / (RHO * 2e-3)
+    assert found.states == ["bottle.mass"] and found.state_units == ["kg"]
+    assert found.a == pytest.approx(np.array([[-slope * stiffness]]), rel=1e-7)
+    assert found.b == pytest.approx(np.array([[slope, mass_flow / 0.5]]), rel=1e-7)
+    assert found.c == pytest.approx(np.array([[stiffness], [-slope * stiffness / RHO]]), rel=1e-7)
+    assert found.d == pytest.approx(np.array([[0.0, 0.0], [slope / RHO, mass_flow / 0.5 / RHO]]), rel=1e-7)
+    assert found.input_values == pytest.approx((3e6, 0.5))
+    assert found.output_values == pytest.approx((1e6, mass_flow / RHO))
+    assert (found.input_units, found.output_units) == (("Pa", "-"), ("Pa", "m3/s"))
+    assert max(found.error.values()) < 1e-6
+
+
+@pytest.mark.parametrize("opening", [0.0, 1.0])
+def test_an_opening_at_the_end_of_its_range_is_moved_to_one_side(opening):
+    found = linearise(filling(opening), ["v.opening"], ["v.flow"])
+    assert found.d[0, 0] == pytest.approx(1e-5 * math.sqrt(2 * 2e6 / RHO), rel=1e-7)
+
+
+def test_two_tanks_lose_their_difference_at_the_rate_by_hand():
+    nodes = {"high": tank(3.0, 4.0), "low": tank(1.5, 1.0)}
+    found = linearise(scene(nodes, {"hole": valve("high", "low", 0.003)}, 1.0, TIGHT))
+    slope = RHO * 0.003 * math.sqrt(2 * GRAVITY * 3.0) / (2 * 3.0)  # d mass flow / d difference of levels
+    per = np.array([1 / (RHO * 3.0), -1 / (RHO * 1.5)])
+    assert found.a == pytest.approx(slope * np.array([-per, per]), rel=1e-7)
+    poles = np.sort(np.linalg.eigvals(found.a).real)
+    assert poles == pytest.approx([-slope * (1 / 3.0 + 1 / 1.5) / RHO, 0.0], abs=1e-12)
+
+
+def test_a_rigid_column_swings_between_two_tanks_at_its_frequency():
+    nodes = {"a": tank(2.0, 3.0), "b": tank(1.0, 3.0)}
+    column = {"type": "rigid-column", "from": "a", "to": "b", "length": 40.0, "diameter": 0.5,
+              "friction": {"model": "none"}}  # fmt: skip
+    found = linearise(scene(nodes, {"c": column}, 1.0, TIGHT))
+    omega = math.sqrt(GRAVITY * area(0.5) / 40.0 * (1 / 2.0 + 1 / 1.0))
+    poles = spectrum(found.a).poles()
+    assert [p["frequency"] for p in poles] == pytest.approx([0.0, omega / (2 * math.pi)], abs=1e-9)
+    assert abs(poles[1]["damping"]) < 1e-8
+
+
+def servo(**more):
+    nodes = {"pump": reservoir(14e6), "sump": reservoir(2e5), "ground": {"type": "frame"},
+             "load": {"type": "mass", "mass": 300.0, "initial_position": 0.1}}  # fmt: skip
+    links = {
+        "spool": {"type": "spool-valve", "ports": {"P": "pump", "T": "sump", "A": "cyl.A", "B": "cyl.B"},
+                  "area": 2e-5, "position": 0.0},
+        "cyl": {"type": "cylinder", "ports": {"rod": "load", "case": "ground"}, "stroke": 0.3, "area_A": 2e-3,
+                "area_B": 1e-3, "dead_volume_A": 1e-5, "dead_volume_B": 1e-5, "initial_pressure_A": 3e6,
+                "initial_pressure_B": 6e6 - AMBIENT},
+    }  # fmt: skip
+    return scene(nodes, links, 0.1, TIGHT, ["load.position", "load.velocity"], **more)
+
+
+def test_a_shut_servo_has_the_natural_frequency_of_its_oil():
+    found = linearise(servo())
+    stiffness = K * (2e-3**2 / (1e-5 + 2e-3 * 0.1) + 1e-3**2 / (1e-5 + 1e-3 * 0.2))
+    fastest = spectrum(found.a).poles()[-1]
+    assert 2 * math.pi * fastest["frequency"] == pytest.approx(math.sqrt(stiffness / 300.0), rel=2e-3)
+
+
+def test_a_spool_at_its_middle_is_no_place_to_linearise_an_input_but_beside_it_is():
+    with pytest.raises(FvsolveError, match="spool.position = 0 is no place.*from side to side"):
+        linearise(servo(), ["spool.position"])
+    found = linearise(servo(), ["spool.position"], set={"links.spool.position": 0.1})
+    gain = 0.61 * 2e-5 * math.sqrt(2 * RHO * (14e6 - 3e6))
+    assert found.b[found.states.index("cyl.A.excess"), 0] == pytest.approx(gain, rel=1e-6)
+
+
+def line(cells, friction=None, demand=0.0, scheme="upwind5"):
+    made = pipe("top", "end", 600.0, 0.5, 1200.0, cells, **({"friction": friction} if friction else {}))
+    return scene({"top": lake(50.0), "end": junction(demand)}, {"main": made}, 1.0, {**LINES, "scheme": scheme})
+
+
+def test_an_open_shut_pipe_has_the_frequencies_of_odd_quarters_as_cells_grow():
+    errors = []
+    for cells in (10, 20, 40):
+        found = linearise(line(cells))
+        poles = poles_of(found.a, energy_form(found.at.model)).poles()
+        exact = (2 * np.arange(1, 4) - 1) * 1200.0 / (4 * 600.0)
+        errors.append(np.abs([p["frequency"] for p in poles[:3]] - exact) / exact)
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert np.all(orders > 3.9) and np.all(errors[-1] < [1e-7, 2e-6, 3e-5])
+
+
+def test_steady_friction_damps_waves_at_half_its_rate():
+    factor, demand = 0.03, 0.2
+    found = linearise(line(40, {"model": "quasi-steady", "factor": factor}, demand))
+    velocity = demand / area(0.5)
+    slowest = poles_of(found.a, energy_form(found.at.model)).poles()[0]
+    assert slowest["real"] == pytest.approx(-factor * velocity / (2 * 0.5), rel=1e-4)
+
+
+def network():
+    nodes = {"pump": reservoir(3e6), "gate": junction(), "bottle": chamber(0.05), "air": reservoir(AMBIENT)}
+    links = {
+        "main": pipe("pump", "gate", 20.0, 0.05, 1000.0, 6),
+        "v": valve("gate", "bottle", 2e-4, 0.6), "out": valve("bottle", "air", 1e-4),
+    }  # fmt: skip
+    numerics = {"scheme": "upwind5", "method": "rk4", "step": 1e-4}
+    return scene(nodes, links, 1.0, numerics, ["gate.pressure", "main.flow@0.4", "v.flow", "bottle.pressure"])
+
+
+@pytest.mark.parametrize("name, change", [("v.opening", 1e-5), ("pump.pressure", 10.0), ("gate.demand", 1e-7)])
+def test_a_small_step_of_an_input_moves_a_run_as_a_b_c_d_say(name, change):
+    outputs = ["gate.pressure", "main.flow@0.4", "v.flow", "bottle.pressure"]
+    found = linearise(network(), [name], outputs)
+    model, span = fvsolve.build(fvsolve.load(network())), 0.03
+    ends = []
+    for sign in (1.0, -1.0):
+        held = {name: found.input_values[0] + sign * change}
+        state = advance(model, initial_state(model), span, held)
+        ends.append(hold(model, held).observe(span, state.y))
+    run = (ends[0] - ends[1]) / (2 * change)
+    n = len(found.states)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n:] = found.a, found.b
+    response = found.c @ expm(span * whole)[:n, n] + found.d[:, 0]
+    assert run == pytest.approx(response, rel=2e-3, abs=2e-3 * np.max(np.abs(found.d)))
+
+
+def test_a_matches_the_models_own_jacobian_and_large_ones_are_sparse():
+    found = linearise(network())
+    model = found.at.model
+    own = model.jacobian(0.0, np.zeros(model.y_size))
+    assert np.max(np.abs(found.a - own)) < 1e-6 * np.max(np.abs(own))
+    large = linearise(line(600))
+    assert large.sparse and large.a.shape == (1200, 1200) and large.a.nnz < 12 * 1200
+    rng = np.random.default_rng(0)
+    y = rng.standard_normal(1200)
+    assert large.a @ y == pytest.approx(large.at.model.rhs(0.0, y), rel=1e-7, abs=1e-7)
+
+
+def test_a_spectrum_too_large_to_be_whole_says_which_poles_it_holds():
+    found = linearise(line(900))
+    values = poles_of(found.a, energy_form(found.at.model))
+    assert not values.complete and "of 1800" in values.said and "ARPACK" in values.said
+    exact = (2 * np.arange(1, 4) - 1) * 0.5
+    assert [p["frequency"] for p in values.poles()[:3]] == pytest.approx(exact, rel=1e-6)
+
+
+def test_the_state_at_a_jump_is_taken_just_after_it_or_just_before():
+    case = filling(step(0.003, 0.5, 0.25))
+    before, after = (linearise(case, ["v.opening"], at=0.003, before=side) for side in (True, False))
+    assert (before.input_values, after.input_values) == ((0.5,), (0.25,))
+    assert before.a[0, 0] == pytest.approx(2 * after.a[0, 0], rel=1e-6)
+    assert "just before a jump" in before.at.when and "just after a jump" in after.at.when
+    assert before.at.y == pytest.approx(after.at.y, rel=1e-12) and before.at.y[0] > 0.0
+
+
+def test_a_state_on_the_way_is_that_of_the_run():
+    case = filling()
+    found = linearise(case, at=0.002)
+    model = fvsolve.build(fvsolve.load(case))
+    state = advance(model, initial_state(model), 0.002)
+    assert found.at.y == pytest.approx(state.y, rel=1e-6)
+    drop = 3e6 - found.output_values[0]
+    assert found.a[0, 0] == pytest.approx(-0.5e-5 * math.sqrt(RHO / (2 * drop)) * K / (RHO * 2e-3), rel=1e-6)
+
+
+def test_a_limited_scheme_is_refused_and_the_way_out_is_named():
+    for scheme, way in (("muscl", "--scheme fromm"), ("weno5", "--scheme upwind5")):
+        with pytest.raises(FvsolveError, match=way):
+            linearise(line(10, scheme=scheme))
+        assert linearise(line(10, scheme=scheme), scheme="upwind").a.shape == (20, 20)
+
+
+def test_a_case_that_names_no_scheme_is_linearised_with_the_smooth_one():
+    case = line(10)
+    del case["numerics"]["scheme"]
+    found = linearise(case)
+    assert found.plain()["scheme"] == "upwind5" and np.array_equal(found.a, linearise(line(10, scheme="upwind5")).a)
+
+
+def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_bare():
+    case = scene({"a": reservoir(1e6), "b": chamber(1e-3, 1e6)}, {"v": valve("a", "b", 1e-5)}, 1.0, TIGHT)
+    found = linearise(case)
+    row = found.at.model.tables[rec.I_VALVES][0]
+    assert row["transition"] > 0.0
+    laminar = 45 / 32 * row["conductance"] / row["transition"]  # slope of the law at a drop of zero
+    assert found.a[0, 0] == pytest.approx(-laminar * K / (RHO * 1e-3), rel=1e-4)
+    row["transition"] = 0.0
+    with pytest.raises(FvsolveError, match="b.mass: its slope has no end.*drop of zero"):
+        linearised(found.at)
+
+
+@pytest.mark.parametrize(
+    "more, error, said",
+    [
+        ({"inputs": ["v.openning"]}, FvsolveError, 'did you mean "v.opening"'),
+        ({"inputs": ["x"]}, FvsolveError, "inputs are"),
+        ({"outputs": ["bottle.presure"]}, CaseError, 'did you mean "pressure"'),
+        ({"at": -1.0}, FvsolveError, "after the start"),
+    ],
+)
+def test_what_is_asked_wrongly_is_said(more, error, said):
+    with pytest.raises(error, match=said):
+        linearise(filling(), **more)
+
+
+def test_a_case_without_a_state_is_refused():
+    case = scene({"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, TIGHT)
+    with pytest.raises(FvsolveError, match="has no state"):
+        linearise(case)
+
+
+def test_the_command_writes_matrices_with_names_and_one_json_object(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["linearise", "chamber-and-orifice", "--inputs", "hole.opening", "--at", "1 s", "--json"]
+    monkeypatch.setattr(sys, "argv", ["fvsolve", *arguments])
+    leave(main)
+    found = json.loads(capsys.readouterr().out)
+    assert found["at"] == 1.0 and found["inputs"] == ["hole.opening"] and found["poles"][0]["real"] < 0.0
+    kept = np.load(tmp_path / "runs" / "chamber-and-orifice.linearise" / "linear.npz")
+    assert kept["A"].tolist() == found["A"] and kept["states"].tolist() == found["states"]
+    table = (tmp_path / "runs" / "chamber-and-orifice.linearise" / "B.csv").read_text().splitlines()
+    assert table[0] == ",hole.opening" and float(table[1].split(",")[1]) == found["B"][0][0]
+
+
+def leave(main):
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert not left.value.code

@@ -1,0 +1,195 @@
+"""The ladder of models says each scene with less, measures what that errs, and chooses the cheapest that will do."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, step, valve
+
+import fvsolve
+from fvsolve.case.text import write
+from fvsolve.errors import FvsolveError
+from fvsolve.studies import ladder
+from fvsolve.studies.accuracy.models import change_time, restated, structures
+
+LENGTH, DIAMETER, SPEED, FACTOR = 300.0, 0.2, 1000.0, 0.02
+AREA = math.pi / 4 * DIAMETER**2
+FRICTION = {"model": "steady", "factor": FACTOR}
+
+
+def shutting(duration: float, cells: int = 40, end: float = 6.0, **more) -> dict:
+    """A valve at the end of a main of 0.3 s travel time shuts to a half in `duration`."""
+    nodes = {"lake": reservoir(5e5), "gate": junction(), "out": reservoir(AMBIENT)}
+    opening = step(0.5, 1.0, 0.5) if duration == 0.0 else ramp(0.5, duration, 1.0, 0.5)
+    links = {
+        "main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells, friction=FRICTION),
+        "valve": valve("gate", "out", 0.002, opening),
+    }
+    numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
+    return scene(nodes, links, end, numerics, ["gate.pressure", "main.flow"], **more)
+
+
+def named(found, name: str, law: str = "linear"):
+    return next(one for one in found.rungs if (one.name, one.law) == (name, law))
+
+
+def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
+    slow, quick = ladder(shutting(20.0, end=25.0), target=0.01), ladder(shutting(0.0), target=0.01)
+    assert slow.cheapest.states <= 8 and named(slow, "rigid column").error < 0.01  # the quickest of the small ones
+    assert quick.cheapest.name == "full line" and named(quick, "rigid column").error > 0.1
+    assert slow.change_time == pytest.approx(20.0) and quick.change_time == 0.0
+    assert slow.travel_time == pytest.approx(LENGTH / SPEED)
+    assert "waves hardly matter" in slow.thumb[1] and "waves matter" in quick.thumb[1]
+
+
+def test_the_cheapest_is_within_the_target_and_nothing_quicker_is():
+    found = ladder(shutting(2.0), target=0.03)
+    assert found.cheapest.error <= 0.03
+    for one in found.rungs:
+        assert one.error is None or one.error > 0.03 or one.seconds >= found.cheapest.seconds
+
+
+def test_errors_are_differences_of_runs_over_the_range_of_the_richest():
+    case = shutting(2.0)
+    found = ladder(case)
+    few, full = (
+        fvsolve.run(case, {"links.main.cells": n, "fluid.law": law}) for n, law in ((4, "linear"), (40, "log"))
+    )
+    for probe, error in named(found, "4 cells").errors.items():
+        gap = few.si(probe) - full.si(probe)
+        assert error == pytest.approx(math.sqrt(np.mean(gap**2)) / np.ptp(full.si(probe)), rel=1e-9)
+    assert (found.richest.name, found.richest.law, found.richest.error) == ("full line", "log", 0.0)
+
+
+def test_a_lumped_volume_has_half_the_line_and_its_friction():
+    said = restated(fvsolve.load(shutting(2.0)), "lumped volume")
+    assert said["nodes.gate"]["type"] == "chamber" and said["links.main"]["type"] == "orifice"
+    held = 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2)  # its compressibility is the line's
+    assert said["nodes.gate"]["volume"] == pytest.approx(held)
+    assert said["links.main"]["loss_coefficient"] == pytest.approx(FACTOR * LENGTH / DIAMETER)
+
+
+def test_every_rung_starts_from_the_steady_flow_of_the_line():
+    case = fvsolve.load(shutting(2.0))
+    start = fvsolve.run(case)["main.flow"][0]
+    for rung in structures(case):
+        assert fvsolve.run(case, restated(case, rung))["main.flow"][0] == pytest.approx(start, rel=1e-6)
+
+
+def test_a_chamber_keeps_its_own_volume_beside_the_lines():
+    case = shutting(2.0)
+    case["nodes"]["gate"] = chamber(0.5)
+    lumped = restated(fvsolve.load(case), "column and volume")["nodes.gate"]["volume"]
+    assert lumped == pytest.approx(0.5 + 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2))
+
+
+def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
+    case = shutting(2.0, cells=8)
+    case["links"]["main"]["friction"] = {"model": "none"}
+    case["links"]["main"]["initial_flow"] = 0.03
+    assert "nothing is left of it" in named(ladder(case), "lumped volume").reason
+    case = shutting(2.0, cells=8)
+    case["nodes"]["gate"]["demand"] = 0.01
+    found = ladder(case)
+    assert "flow enters or leaves at gate" in named(found, "column and volume").reason
+    case["nodes"]["out"] = junction(ramp(1.0, 0.5, 0.0, 0.01))
+    case["links"]["valve"] = pipe("gate", "out", 50.0, 0.2, SPEED, 4)
+    assert "only rigid columns meet here" in named(ladder(case), "rigid column").reason
+
+
+def test_a_scene_in_which_nothing_moves_is_refused():
+    case = shutting(2.0, cells=8)
+    case["links"]["valve"]["opening"] = 1.0
+    with pytest.raises(FvsolveError, match="no probe moves"):
+        ladder(case)
+
+
+def test_a_probe_inside_the_line_is_left_out_where_there_is_no_inside():
+    case = shutting(2.0, cells=8)
+    case["output"]["probes"].append("main.pressure@0.5")
+    found = ladder(case)
+    assert set(named(found, "rigid column").errors) == {"gate.pressure", "main.flow"}
+    assert set(named(found, "2 cells").errors) == {"gate.pressure", "main.flow", "main.pressure@0.5"}
+
+
+def test_a_scene_without_pipes_has_the_laws_for_its_rungs():
+    nodes = {"pump": reservoir(1e7), "bottle": chamber(0.02, 1.1e5)}
+    case = scene(nodes, {"hole": valve("pump", "bottle", 5e-7)}, 3.0, {"rtol": 1e-8}, ["bottle.pressure"])
+    found = ladder(case, target=0.01)
+    assert [(one.name, one.law) for one in found.rungs] == [("as it is", "linear"), ("as it is", "log")]
+    assert found.strain == pytest.approx(9.89e6 / 2.2e9, rel=0.02)
+    assert named(found, "as it is").error == pytest.approx(found.strain, rel=1.0)  # of that size
+
+
+def test_laws_that_differ_beyond_what_changes_are_said_to():
+    """At 100 bar the laws differ by p/K = 0.8 % of a head; where the supply rises by 1 %, that is most of its range."""
+    fluid = WATER | {"density": 850.0, "bulk_modulus": 1.2e9}
+    nodes = {"pump": reservoir(step(0.01, 1e7, 1.01e7)), "c": chamber(2e-6), "sump": reservoir(2e5)}
+    links = {"in": valve("pump", "c", 5e-7), "out": valve("c", "sump", 5e-7)}
+    found = ladder(scene(nodes, links, 0.1, {"rtol": 1e-8}, ["pump.head", "c.pressure"], fluid=fluid))
+    assert found.strain == pytest.approx(1e5 / 1.2e9, rel=0.01) and found.cheapest.law == "log"
+    head = {
+        "linear": np.array([1e7, 1.01e7]) / 850.0,
+        "log": 1.2e9 / 850.0 * -np.expm1(-(np.array([1e7, 1.01e7]) - AMBIENT) / 1.2e9),  # int dp / rho
+    }
+    shift = head["linear"][0] - AMBIENT / 850.0 - head["log"][0]
+    assert found.apart.probe == "pump.head" and found.apart.start == pytest.approx(
+        shift / np.ptp(head["log"]), rel=0.02
+    )
+    assert f": {found.apart.start:.3g} is there from the start" in found.thumb[0]
+
+
+def test_strain_is_the_change_from_the_start_over_the_stiffness_of_the_pipe():
+    case = shutting(2.0, cells=8)
+    p = fvsolve.run(case, {"fluid.law": "log"}).si("gate.pressure")
+    found = ladder(case)
+    assert found.strain == pytest.approx(np.max(np.abs(p - p[0])) / (RHO * SPEED**2))
+    assert found.apart.error == pytest.approx(named(found, "full line").error)
+
+
+def test_bodies_alone_are_one_rung_under_their_own_law():
+    nodes = {"m": {"type": "mass", "mass": 2.0, "initial_position": 0.1}, "wall": {"type": "frame"}}
+    links = {"s": {"type": "spring", "from": "m", "to": "wall", "stiffness": 200.0}}
+    for law in ("linear", "log"):
+        found = ladder(scene(nodes, links, 1.0, {}, fluid=WATER | {"law": law}))
+        assert [(one.name, one.law, one.error) for one in found.rungs] == [("as it is", law, 0.0)]
+        assert found.thumb == [] and found.apart is None
+
+
+def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
+    (tmp_path / "line.toml").write_text(write(shutting(2.0, end=2000.0, every=1.0)))
+    script = """if True:
+        import os, signal, sys
+        from fvsolve.cli import main
+        from fvsolve.solve.solve import Run
+        Run.pause = lambda self, spent: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
+        main()"""
+    command = [sys.executable, "-c", script, "chart", "line.toml", "--models"]
+    left = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert left.returncode == 130 and "none of them is kept" in left.stderr and "Traceback" not in left.stderr
+
+
+def test_what_means_nothing_to_the_ladder_is_refused_by_name(fvs):
+    code, _, err = fvs("chart", "gradual-closure", "--models", "--scheme", "weno5", "--step", "1e-3")
+    assert code == 2 and err.startswith("--scheme, --step: not with --models")
+
+
+def test_the_quickest_change_is_the_range_over_the_steepest_slope():
+    model = fvsolve.build(fvsolve.load(shutting(2.0)))
+    assert change_time(model) == pytest.approx(2.0)
+    still = shutting(2.0)
+    still["links"]["valve"]["opening"] = 1.0
+    assert change_time(fvsolve.build(fvsolve.load(still))) == math.inf
+
+
+def test_the_command_names_the_cheapest(fvs, tmp_path):
+    code, out, _ = fvs("chart", "gradual-closure", "--models", "--target", "0.05", "--json")
+    said = json.loads(out)
+    assert code == 0 and said["cheapest"]["error"] <= 0.05 and said["target"] == 0.05
+    code, out, _ = fvs("chart", "gradual-closure", "--models", "--target", "0.05")
+    assert code == 0 and f"cheapest within 0.05: {said['cheapest']['name']}" in out

@@ -1,0 +1,70 @@
+"""What a pump refuses, and how it says so."""
+
+from __future__ import annotations
+
+import pytest
+from truth.scenes import junction, lake, pipe, pump, scene, step
+
+import fvsolve
+from fvsolve.errors import CaseError
+
+ONE = {"flow": [0.1], "head": [50.0]}
+
+
+def faults(more=None, **keys) -> str:
+    links = {"pump": pump("sump", "out", **keys), "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5), **(more or {})}
+    case = scene({"sump": lake(0.0), "out": junction(), "top": lake(20.0)}, links, 1.0, {})
+    with pytest.raises(CaseError) as caught:
+        fvsolve.build(fvsolve.load(case))
+    return str(caught.value)
+
+
+FOUND = [
+    ({}, "wanted one of curve, power, suter"),
+    ({"curve": ONE, "power": 1e4}, "curve and power are given; keep one"),
+    ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 55.0]}}, "curve.head[1]: 55.0 comes after 50.0; the head must fall"),
+    ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 50.0]}}, "the head must fall as the flow rises"),
+    ({"curve": {"flow": [0.0, 0.1, 0.1], "head": [50.0, 40.0, 30.0]}}, "flows out of order: 0.1 comes after 0.1"),
+    ({"curve": {"flow": [0.0], "head": [50.0]}}, "one point must have a flow and a head above 0"),
+    ({"curve": {"flow": [], "head": []}}, "is no list; wanted a list of values"),
+    ({"curve": {"flow": [0.0, 0.1], "head": [50.0]}}, "1 values for 2 flows"),
+    ({"curve": {"coefficients": [50.0]}}, "fall to 0 at some flow"),
+    ({"curve": {"coefficients": [50.0, 100.0, -5000.0]}}, "the head rises at a flow of 0 m3/s"),
+    ({"curve": ONE, "trip": 1.0}, "trip: wants the inertia of all that turns with the shaft"),
+    ({"curve": ONE, "inertia": 2.0}, 'inertia: wants rated_speed, for example "1480 rpm"'),
+    ({"curve": ONE, "inertia": -2.0, "rated_speed": 150.0}, "inertia: -2.0 is out of range; wanted a value above 0"),
+    ({"curve": ONE, "inertia": "2 kg", "rated_speed": 150.0}, "is a mass; wanted a moment of inertia"),
+    ({"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": -1.0}, "-1 s lies before the start at 0 s"),
+    ({"curve": ONE, "speed": -1.0}, "speed: -1.0 is out of range"),
+    ({"curve": ONE, "efficiency": 1.2}, "efficiency: 1.2 is out of range"),
+    ({"curve": ONE, "efficiency": {"flow": [0.0], "efficiency": [0.0]}}, "wanted one above 0 at a flow above 0"),
+    ({"curve": ONE, "efficiency": 0.8, "shaft_power": {"flow": [0.1], "power": [1e4]}}, "keep one"),
+    ({"curve": ONE, "check_valve": 1}, "check_valve: 1 is neither true nor false"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0}}, "wanted table, or head and torque"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial"}}, 'did you mean "radial-35"?'),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": [1.0] * 5, "torque": [1.0] * 5}}, "wanted 9 or more"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": [1.0] * 9, "torque": [1.0] * 8 + [2.0]}},
+     "x = 2 pi is x = 0 again"),
+    ({"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"},
+      "shaft_power": {"flow": [0.1], "power": [1.0]}}, "the torque is that of suter"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("keys, message", FOUND, ids=[message[:30] for _, message in FOUND])
+def test_a_fault_of_a_pump(keys, message):
+    assert message in faults(**keys)
+
+
+def test_all_faults_come_at_once():
+    said = faults(curve={"flow": [0.1, 0.1], "head": [40.0, 50.0]}, trip=1.0, speed=-1.0)
+    for part in ("flows out of order", "the head must fall", "wants the inertia", "out of range"):
+        assert part in said
+
+
+def test_faults_of_torques():
+    motor = {"motor": {"type": "torque", "to": "pump.shaft", "torque": 1.0}}
+    assert "pump.shaft has no inertia" in faults(motor, curve=ONE)
+    held = {"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": step(0.5, 0.0, 1.0)["time"][1]}
+    assert "is held by its motor until it trips" in faults(motor, **held)
+    wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
+    assert "a hydraulic place, and this port of a torque a rotational one" in faults(wet, curve=ONE)

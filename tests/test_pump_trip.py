@@ -1,0 +1,256 @@
+"""Pumps that trip: run-down of the shaft, columns, pipes, four quadrants, energy; against SciPy at 1e-12."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pytest import approx
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from truth.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, area, junction, lake, pipe, pump, scene, step
+
+import fvsolve
+from fvsolve.parts.suter_tables import SUTER_TABLES
+from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.linear.linearise import linearise
+
+ONE = {"flow": [0.1], "head": [50.0]}
+OMEGA, INERTIA, EFFICIENCY = 150.0, 2.0, 0.8
+SHAFT = {"curve": ONE, "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY}
+TORQUE = RHO * GRAVITY * 0.1 * 50.0 / EFFICIENCY / OMEGA  # at the rated point
+BORE, LENGTH, FACTOR = 0.3, 500.0, 0.02
+SECTION = area(BORE)
+TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
+SUTER = {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"}}
+FOUR = {**SUTER, "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY}
+WH, WB = (np.array(row) for row in SUTER_TABLES["radial-35"])
+
+
+def head(n, q):
+    """The one-point curve: 4/3 of its head at no flow, none at twice its flow; a parabola backwards too."""
+    return 50.0 / 3.0 * (4.0 * n * n - q * abs(q) / 0.01)
+
+
+def torque(n, q):
+    """Linear in the flow up to four times the rated one, n^2 (2 + q / (n q_rated)) / 3; held beyond and backwards."""
+    return TORQUE * n * n * (2.0 + min(max(q / (n * 0.1), 0.0), 4.0)) / 3.0 if n > 0.0 else 0.0
+
+
+def suter(table, n, q):
+    v = q / 0.1
+    return (n * n + v * v) * np.interp(math.pi + math.atan2(v, n), np.linspace(0, 2 * math.pi, len(table)), table)
+
+
+def column(lift: float, end: float, probes, numerics=None, **keys) -> dict:
+    nodes = {"sump": lake(0.0), "out": junction(), "top": lake(lift)}
+    rigid = {"type": "rigid-column", "from": "out", "to": "top", "length": LENGTH, "diameter": BORE}
+    rigid["friction"] = {"model": "steady", "factor": FACTOR}
+    return scene(nodes, {"pump": pump("sump", "out", **keys), "main": rigid}, end, numerics or TIGHT, probes, 0.05)
+
+
+def column_truth(lift, n0, q0, trip, end, head=head, torque=torque, check=False):
+    """(t, n, q) of pump, rigid column and lakes after a trip, by SciPy."""
+    loss = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * SECTION**2)
+
+    def rate(t, y):
+        n, q = y
+        dq = GRAVITY * SECTION / LENGTH * (head(n, q) - lift - loss * q * abs(q))
+        return [-torque(n, q) / (INERTIA * OMEGA), dq]
+
+    stop = lambda t, y: y[1]  # noqa: E731
+    stop.terminal, stop.direction = check, -1
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True, "events": stop}
+    return solve_ivp(rate, (trip, end), [n0, q0], **options)
+
+
+def operating_flow(lift, f=lambda q: head(1.0, q)):
+    loss = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * SECTION**2)
+    return brentq(lambda q: f(q) - lift - loss * q * q, 1e-3, 0.25, xtol=1e-15)
+
+
+def test_a_lone_shaft_runs_down_as_one_over_time():
+    """At no flow the torque is T0 n^2: 1 / n = 1 + T0 (t - trip) / (J omega)."""
+    nodes = {"sump": lake(0.0), "top": lake(100.0)}
+    keys = {**SHAFT, "trip": 1.0, "check_valve": True}
+    result = fvsolve.run(scene(nodes, {"pump": pump("sump", "top", **keys)}, 10.0, TIGHT, ["pump.speed", "pump.flow"]))
+    exact = 1.0 / (1.0 + 2.0 / 3.0 * TORQUE / (INERTIA * OMEGA) * np.maximum(result.t - 1.0, 0.0))
+    assert result["pump.speed"] == approx(exact, rel=1e-9)
+    assert not result["pump.flow"].any() and not result.summary["events"]
+
+
+@pytest.mark.parametrize("check", [False, True])
+def test_pump_column_and_lakes_follow_scipy(check):
+    lift, end = 30.0, 6.0
+    case = column(lift, end, ["pump.speed", "pump.flow", "pump.torque"], **SHAFT, trip=1.0, check_valve=check)
+    result = fvsolve.run(case)
+    q0 = operating_flow(lift)
+    truth = column_truth(lift, 1.0, q0, 1.0, end, check=check)
+    before, after = result.t <= 1.0, (result.t > 1.0) & (result.t <= truth.t[-1])
+    assert result["pump.flow"][before] == approx(q0, rel=1e-12) and np.ptp(result["pump.flow"][before]) == 0.0
+    n, q = truth.sol(result.t[after])
+    assert result["pump.speed"][after] == approx(n, rel=1e-8)
+    assert result["pump.flow"][after] == approx(q, abs=2e-8)  # the curve is straight below 1e-5 of its last flow
+    assert result["pump.torque"][after] == approx([torque(*one) for one in zip(n, q, strict=True)], rel=1e-7)
+    if check:
+        events = result.summary["events"]
+        assert [event["what"] for event in events] == ["check valve shuts"]
+        assert events[0]["time"] == approx(truth.t_events[0][0], abs=1e-8)
+        assert not result["pump.flow"][result.t > truth.t[-1]].any()
+    else:
+        assert result["pump.flow"][-1] < -0.05
+        assert [mark["what"] for mark in result.summary["marks"]] == ["outside its curve"]
+
+
+def test_four_quadrants_follow_scipy_into_turbining():
+    """The table is straight between its values, so its corners bound what any method can reach."""
+    lift, end = 30.0, 12.0
+    result = fvsolve.run(column(lift, end, ["pump.speed", "pump.flow", "pump.head"], **FOUR, trip=1.0))
+    heads = lambda n, q: 50.0 * suter(WH, n, q)  # noqa: E731
+    q0 = operating_flow(lift, lambda q: heads(1.0, q))
+    assert result["pump.flow"][0] == approx(q0, rel=1e-11)
+    truth = column_truth(lift, 1.0, q0, 1.0, end, heads, lambda n, q: TORQUE * suter(WB, n, q))
+    after = result.t > 1.0
+    n, q = truth.sol(result.t[after])
+    assert n[-1] < -0.8 and q[-1] < -0.04  # it turns and flows backwards
+    assert result["pump.speed"][after] == approx(n, abs=1e-7)
+    assert result["pump.flow"][after] == approx(q, abs=1e-8)
+    assert not result.summary["marks"]
+
+
+def test_the_published_table_is_the_rated_point_where_it_should_be():
+    assert len(WH) == len(WB) == 89 and WH[0] == WH[-1] and WB[0] == WB[-1]
+    assert suter(WH, 1.0, 0.1) == approx(1.0) and suter(WB, 1.0, 0.1) == approx(1.0)
+
+
+SPEED, FAR = 1000.0, 1000.0  # of waves, and how far the lake lies
+
+
+def line(lift: float, end: float, numerics, probes, cells: int = 100, **keys) -> dict:
+    nodes = {"sump": lake(0.0), "out": junction(), "top": lake(lift)}
+    main = pipe("out", "top", FAR, BORE, SPEED, cells, friction=NO_FRICTION)
+    return scene(nodes, {"pump": pump("sump", "out", **keys), "main": main}, end, numerics, probes, 0.02)
+
+
+def test_a_pump_that_stops_at_once_makes_the_joukowsky_drop():
+    """Against a C- line from the lake: -b q|q| = lift + (a / g A) (q - q0), exact at Courant 1."""
+    lift, rise = 40.0, SPEED / (GRAVITY * SECTION)
+    case = line(lift, 2.9, SHARP, ["out.head", "pump.flow"], curve=ONE, speed=step(1.0, 1.0, 0.0))
+    result = fvsolve.run(case)
+    q0 = math.sqrt((200.0 / 3.0 - lift) / (50.0 / 3.0 / 0.01))
+    q = brentq(lambda q: head(0.0, q) - lift - rise * (q - q0), -1.0, 1.0, xtol=1e-15)
+    during = (result.t > 1.001) & (result.t < 2.9)
+    assert result["pump.flow"][during] == approx(q, rel=1e-10)
+    assert result["out.head"][during] == approx(head(0.0, q), rel=1e-10)
+    shut = fvsolve.run(line(lift, 2.9, SHARP, ["out.head"], curve=ONE, speed=step(1.0, 1.0, 0.0), check_valve=True))
+    assert shut["out.head"][during] == approx(result["out.head"][during], rel=1e-10)  # q > 0: nothing to shut yet
+
+
+def test_trip_against_a_pipe_follows_its_characteristic():
+    """Until the wave is back from the lake H = lift + (a / g A) (q - q0), so that the shaft is one ODE."""
+    lift, rise = 40.0, SPEED / (GRAVITY * SECTION)
+    numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
+    result = fvsolve.run(line(lift, 2.9, numerics, ["pump.speed", "out.head"], 200, **SHAFT, trip=1.0))
+    q0 = math.sqrt((200.0 / 3.0 - lift) / (50.0 / 3.0 / 0.01))
+    flow = lambda n: brentq(lambda q: head(n, q) - lift - rise * (q - q0), -1.0, 1.0, xtol=1e-15)  # noqa: E731
+    rate = lambda t, y: [-torque(y[0], flow(y[0])) / (INERTIA * OMEGA)]  # noqa: E731
+    truth = solve_ivp(rate, (1.0, 2.9), [1.0], method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True)
+    after = (result.t > 1.0) & (result.t < 2.8)  # later, forerunners of the wave that comes back
+    n = truth.sol(result.t[after])[0]
+    assert result["pump.speed"][after] == approx(n, rel=1e-7)  # its torque has a corner, at four times the rated flow
+    assert result["out.head"][after] == approx([head(one, flow(one)) for one in n], abs=1e-6)
+
+
+def test_order_of_a_method_is_kept_across_the_trip():
+    probes = ["pump.flow", "pump.speed"]
+    final = []
+    for size in (0.1, 0.05, 0.025):
+        case = column(30.0, 3.0, probes, {"method": "rk4", "step": size}, **SHAFT, trip=1.0)
+        result = fvsolve.run(case)
+        final.append(np.array([result[name][-1] for name in probes]))
+    truth = column_truth(30.0, 1.0, operating_flow(30.0), 1.0, 3.0).y[::-1, -1]
+    errors = [float(np.abs(one - truth).max()) for one in final]
+    assert math.log2(errors[0] / errors[1]) == approx(4.0, abs=0.4)
+    assert math.log2(errors[1] / errors[2]) == approx(4.0, abs=0.3)
+
+
+def test_given_torques_turn_the_shaft():
+    """Balanced at the start nothing moves by a bit; then the torque falls away as a trip does."""
+    q0 = operating_flow(30.0)
+    balance = torque(1.0, q0)
+    case = column(30.0, 3.0, ["pump.speed", "pump.flow"], **SHAFT)
+    case["links"]["motor"] = {"type": "torque", "to": "pump.shaft", "torque": step(1.0, balance, 0.0)}
+    result = fvsolve.run(case)
+    assert np.ptp(result["pump.speed"][result.t <= 1.0]) == 0.0
+    truth = column_truth(30.0, 1.0, q0, 1.0, 3.0)
+    after = result.t > 1.0
+    assert result["pump.speed"][after] == approx(truth.sol(result.t[after])[0], rel=1e-8)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("check", [False, True])
+def test_energy_ledger_of_a_trip_closes(law, check):
+    """What the motor gave, less what the shaft, the water and the lakes hold, is what pump and main have lost."""
+    numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
+    case = line(40.0, 6.0, numerics, ["pump.flow"], 40, **SHAFT, trip=1.0, check_valve=check)
+    case["fluid"] = {**case["fluid"], "law": law}
+    found = energy(case)
+    assert found.ok and found.relative < 3e-4
+    q0 = math.sqrt((200.0 / 3.0 - 40.0) / (50.0 / 3.0 / 0.01))
+    if law == "linear":
+        assert found.supplied["pump"][-1] == approx(torque(1.0, q0) * OMEGA * 1.0, rel=1e-9)
+    speed = fvsolve.run({**case, "output": {"probes": ["pump.speed"]}})["pump.speed"][-1]
+    kinetic = 0.5 * INERTIA * OMEGA**2
+    assert found.at_start["pump"] == approx(kinetic)
+    assert found.stored["pump"][-1] == approx(kinetic * (speed**2 - 1.0), rel=1e-6)
+
+
+def test_energy_ledger_without_pipes_closes_with_the_step():
+    found = energy(column(30.0, 6.0, ["pump.flow"], **SHAFT, trip=1.0))
+    assert found.relative < 1e-8
+    assert min(np.diff(found.dissipated["pump"])) > 0.0
+
+
+def test_a_study_holds_the_motor_as_it_is():
+    """A trip to come is no part of a state: the shaft's pole is 0 before it, and after it that of its torque."""
+    case = column(30.0, 3.0, ["pump.speed"], **SHAFT, trip=1.0)
+    start, found = linearise(case), linearise(case, at=2.0)
+    k = start.states.index("pump.speed")
+    assert not start.a[k].any()
+    n, q = column_truth(30.0, 1.0, operating_flow(30.0), 1.0, 2.0).y[:, -1]
+    slope = (torque(n + 1e-6, q) - torque(n - 1e-6, q)) / 2e-6 / (INERTIA * OMEGA)
+    assert found.a[k, k] == approx(-slope, rel=1e-5)
+
+
+def test_torque_is_an_input():
+    case = column(30.0, 3.0, ["pump.speed"], **SHAFT)
+    case["links"]["motor"] = {"type": "torque", "to": "pump.shaft", "torque": torque(1.0, operating_flow(30.0))}
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), 1.0)
+    assert np.abs(state.y).max() < 1e-9
+    tripped = fvsolve.advance(model, fvsolve.initial_state(model), 1.0, {"motor.torque": 0.0})
+    truth = column_truth(30.0, 1.0, operating_flow(30.0), 0.0, 1.0)
+    assert tripped.y[model.state_names.index("pump.speed")] == approx(truth.y[0, -1] - 1.0, rel=1e-8)
+
+
+def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
+    """Differences of the right-hand side about a state after the trip, column by column."""
+    from fvsolve.model.sparsity import sparsity
+
+    model = fvsolve.build(fvsolve.load(line(40.0, 3.0, {}, ["pump.flow"], 6, **SHAFT, trip=0.0)))
+    rng = np.random.default_rng(1)
+    y, pattern = 1e-2 * model.scale * rng.standard_normal(model.y_size), sparsity(model).toarray()[: model.y_size]
+    for k in range(model.y_size):
+        step_y = np.zeros(model.y_size)
+        step_y[k] = 1e-3 * model.scale[k]
+        moved = model.rhs(0.5, y + step_y) != model.rhs(0.5, y - step_y)
+        assert not np.any(moved & ~pattern[:, k])
+
+
+def test_implicit_steps_follow_scipy_too():
+    case = column(30.0, 6.0, ["pump.speed", "pump.flow"], {"method": "rodas-5p", "rtol": 1e-9}, **SHAFT, trip=1.0)
+    result = fvsolve.run(case)
+    truth = column_truth(30.0, 1.0, operating_flow(30.0), 1.0, 6.0)
+    assert result.ok and result["pump.speed"][-1] == approx(truth.y[0, -1], rel=1e-7)
+    assert result["pump.flow"][-1] == approx(truth.y[1, -1], rel=1e-6)

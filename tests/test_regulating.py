@@ -1,0 +1,167 @@
+"""Valves that regulate: SciPy at 1e-12 through their stops, steady states of networks by their laws and by EPANET."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from truth import discs
+from truth.scenes import AMBIENT, GRAVITY, RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.kernels import records as rec
+from fvsolve.studies.energy.energy import energy
+
+BETA, TIME, BAND, SET = 2e7, 0.5, 1e5, 5e5
+FRICTION = {"model": "steady", "factor": 0.02}
+
+
+def regulating(kind, start, end, given, **more):
+    what = "set_flow" if kind == "flow-control" else "set_pressure"
+    return {"type": kind, "from": start, "to": end, what: given, "time_constant": TIME, **more}
+
+
+def filled(rest, numerics):
+    """A chamber that a pressure-reducing valve fills while its outlet opens and all but shuts, down to `rest`."""
+    nodes = {"lake": reservoir(1e6), "pot": chamber(2.0), "end": reservoir(1e5)}
+    opening = {"time": [1.0, 2.0, 4.0, 5.0], "value": [0.6, 1.0, 1.0, rest]}
+    links = {"prv": regulating("pressure-reducing", "lake", "pot", SET, area=6e-4, discharge_coefficient=1.0),
+             "tap": valve("pot", "end", 8e-4, opening)}  # fmt: skip
+    fluid = {**WATER, "bulk_modulus": BETA}
+    return scene(nodes, links, 12.0, numerics, ["pot.pressure", "prv.opening", "prv.flow"], 0.05, fluid=fluid)
+
+
+def through(area, drop):
+    return area * math.copysign(math.sqrt(2.0 * abs(drop) / RHO), drop)
+
+
+@pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p"])
+def test_it_follows_scipy_through_both_stops(method):
+    tight = 1e-11 if method == "dormand-prince" else 1e-8
+    result = fvsolve.run(filled(0.05, {"method": method, "rtol": tight}))
+
+    def rates(t, y, held):
+        opening = np.interp(t, [1.0, 2.0, 4.0, 5.0], [0.6, 1.0, 1.0, 0.05])
+        inward = through(6e-4 * min(max(y[1], 0.0), 1.0), 1e6 - y[0])
+        return [
+            BETA / 2.0 * (inward - through(8e-4 * opening, y[0] - 1e5)),
+            0.0 if held else (SET - y[0]) / BAND / TIME,
+        ]
+
+    start = [SET, through(8e-4 * 0.6, 4e5) / through(6e-4, 5e5)]
+    exact, events = discs.stopped(rates, lambda t, y: SET - y[0], start, [1.0, 2.0, 4.0, 5.0], result.t)
+    near = 1e-6 if method == "dormand-prince" else 1e-4
+    assert [e["time"] for e in result.summary["events"]] == pytest.approx(events, abs=near)
+    assert result["pot.pressure"] == pytest.approx(exact[0], abs=near * BAND)
+    assert result["prv.opening"] == pytest.approx(exact[1], abs=near)
+    shut = result["prv.opening"] == 0.0
+    assert shut.any() and (result["prv.opening"] == 1.0).any() and not result["prv.flow"][shut].any()
+
+
+def network(seed: int, count: int) -> dict:
+    """A random net of two lakes with some valves of all three kinds in it."""
+    rng, n = np.random.default_rng(seed), 12
+    demands = (0.0, 0.0, 0.005, 0.01)
+    nodes = {f"n{i}": junction(float(rng.choice(demands)), elevation=float(rng.uniform(0, 20))) for i in range(n)}
+    nodes |= {"high": lake(90.0), "mid": lake(60.0)}
+    ends = [("high", "n0"), ("mid", f"n{n - 1}"), *((f"n{rng.integers(0, i)}", f"n{i}") for i in range(1, n))]
+    ends += [tuple(f"n{i}" for i in rng.choice(n, 2, replace=False)) for _ in range(4)]
+    links = {f"p{k}": pipe(i, j, float(rng.uniform(100, 500)), 0.2, 1000.0, 1, friction=FRICTION)
+             for k, (i, j) in enumerate(ends)}  # fmt: skip
+    for j, k in enumerate(rng.choice(len(ends) - 2, count, replace=False) + 2):
+        way = links[f"p{k}"]
+        kind = str(rng.choice(["pressure-reducing", "pressure-sustaining", "flow-control"], p=[0.6, 0.25, 0.15]))
+        given = float(rng.uniform(0.002, 0.03)) if kind == "flow-control" else AMBIENT + float(rng.uniform(1e5, 6e5))
+        nodes[f"v{j}-in"] = junction(elevation=nodes[way["from"]]["elevation"])
+        size = {"diameter": 0.2, "loss_coefficient": 1.0}
+        links[f"v{j}"] = regulating(kind, f"v{j}-in", way["to"], given, **size)
+        way["to"] = f"v{j}-in"
+    return scene(nodes, links, 1.0, SMOOTH)
+
+
+def standing(case, model, name) -> str:
+    """As what a valve of a solved net stands, "" where its law does not hold."""
+    link, row = case["links"][name], model.tables[rec.I_VALVES][model.valve_names.index(name)]
+    nodes = model.checks["nodes"]
+    m, g = float(row["flow"]), float(row["conductance"])
+    p_i, p_j = (nodes[link[end]]["pressure"] for end in ("from", "to"))
+    drop = RHO * GRAVITY * (nodes[link["from"]]["head"] - nodes[link["to"]]["head"])
+    full, within = abs(abs(m) * m - g * drop) < 1e-3 * g + 1e-6 * m * m, m * m <= g * drop + 1e-3 * g
+    if link["type"] == "flow-control":
+        given = RHO * link["set_flow"]
+        return "active" if abs(m - given) < 1e-6 and within else "open" if full and m < given else ""
+    reducing, given = link["type"] == "pressure-reducing", link["set_pressure"]
+    beyond = (given - p_j) if reducing else (p_i - given)
+    if abs(beyond) < 1.0 and m >= -1e-6 and within:
+        return "active"
+    if m > 1e-6:
+        return "open" if full and beyond > -1.0 else ""
+    return "shut" if m > -1e-6 and (beyond < 1.0 or drop < 1.0) else ""
+
+
+@pytest.mark.parametrize("count, refused", [(1, 1), (3, 5), (6, 10)])
+def test_every_valve_of_a_random_net_obeys_its_law(count, refused):
+    """Nets that ask for flow which their valves hold back have no steady state: these alone may be refused."""
+    seen, without = set(), 0
+    for seed in range(40):
+        case = network(seed, count)
+        try:
+            model = fvsolve.build(fvsolve.load(case))
+        except fvsolve.CaseError as error:
+            assert "no steady state" in str(error)
+            without += 1
+            continue
+        found = [standing(case, model, f"v{j}") for j in range(count)]
+        assert "" not in found, (seed, found)
+        assert not model.rhs(0.0, np.zeros(model.y_size)).any(), seed
+        seen |= set(found)
+    assert seen >= {"active", "shut"} and without <= refused
+
+
+def line(kind, given, **more):
+    nodes = {"lake": lake(80.0), "a": junction(), "b": junction(), "end": lake(20.0)}
+    links = {"p1": pipe("lake", "a", 100.0, 0.3, 1000.0, 10, friction=FRICTION),
+             "v": regulating(kind, "a", "b", given, diameter=0.3, loss_coefficient=2.0, **more),
+             "p2": pipe("b", "end", 100.0, 0.3, 1000.0, 10, friction=FRICTION)}  # fmt: skip
+    return scene(nodes, links, 0.5, SMOOTH, ["v.flow", "v.opening"])
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize(
+    "kind, given", [("pressure-reducing", 4e5), ("pressure-sustaining", 7e5), ("flow-control", 0.1)]
+)
+def test_at_the_start_nothing_moves_by_one_bit(kind, given, law):
+    case = line(kind, given)
+    case["fluid"] = {**WATER, "law": law}
+    model = fvsolve.build(fvsolve.load(case))
+    assert not model.rhs(0.0, np.zeros(model.y_size)).any()
+    sensed = {"pressure-reducing": "b", "pressure-sustaining": "a"}.get(kind)
+    if sensed:
+        assert model.checks["nodes"][sensed]["pressure"] == pytest.approx(given, rel=1e-12)
+
+
+def test_one_that_throttles_dissipates():
+    found = energy(filled(0.05, {"method": "dormand-prince", "rtol": 1e-10}))
+    assert found.relative < 1e-8 and np.all(np.diff(found.dissipated["prv pressure reducing"]) > -1e-6)
+
+
+@pytest.mark.parametrize(
+    "kind, given, more, text",
+    [
+        ("pressure-reducing", "9 barg", {}, "above every source: lake has 80 m"),
+        ("pressure-sustaining", "9 barg", {}, "never open"),
+        ("pressure-reducing", "3 barg", {"time_constant": 0.0}, "above 0"),
+        ("pressure-reducing", "3 barg", {"band": -1.0}, "above 0"),
+        ("flow-control", 0.0, {}, "above 0"),
+    ],
+)
+def test_bad_set_points_are_refused(kind, given, more, text):
+    with pytest.raises(fvsolve.CaseError, match=text):
+        fvsolve.build(fvsolve.load(line(kind, given, **more)))
+
+
+def test_a_set_pressure_is_an_input():
+    model = fvsolve.build(fvsolve.load(line("pressure-reducing", 4e5)))
+    after = fvsolve.advance(model, fvsolve.initial_state(model), 0.2, {"v.set_pressure": 4.5e5})
+    assert after.y[model.state_names.index("v.opening")] > 0.0

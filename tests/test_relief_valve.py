@@ -1,0 +1,169 @@
+"""Relief valves: a plateau in closed form, SciPy at 1e-12 with either disc, their start, and bad input."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from truth import discs
+from truth.scenes import RHO, SMOOTH, WATER, chamber, junction, pipe, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.studies.energy.energy import energy
+
+AMBIENT, BETA = 101325.0, 2e7
+SOFT = {**WATER, "bulk_modulus": BETA}
+TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
+RELIEF, SET, SPAN = 4e-4, 5e5, 1e5
+DISCS = {"lag": {"time_constant": 0.05}, "swing": {"natural_frequency": 8.0, "damping_ratio": 0.1}}
+
+
+def relief(start, end, flow_area, set_pressure=SET, overpressure=SPAN, **more):
+    return {"type": "relief-valve", "from": start, "to": end, "area": flow_area, "discharge_coefficient": 1.0,
+            "set_pressure": set_pressure, "overpressure": overpressure, **more}  # fmt: skip
+
+
+def filled(numerics=TIGHT, **disc):
+    """A chamber that is filled through a valve for a while, with a relief valve on it."""
+    nodes = {"pump": reservoir(1.2e6), "pot": chamber(2.0, 3e5), "sump": reservoir(1e5)}
+    opening = {"time": [0.5, 1.0, 6.0, 7.0], "value": [0.0, 1.0, 1.0, 0.0]}
+    links = {"in": valve("pump", "pot", 5e-4, opening), "out": valve("pot", "sump", 1e-4),
+             "relief": relief("pot", "sump", RELIEF, **disc)}  # fmt: skip
+    return scene(nodes, links, 14.0, numerics, ["pot.pressure", "relief.opening", "relief.flow"], 0.05, fluid=SOFT)
+
+
+def through(area, drop):
+    return area * math.copysign(math.sqrt(2.0 * abs(drop) / RHO), drop)
+
+
+def pot(t, p, x):
+    """dp/dt of that chamber at a lift x."""
+    opening = np.interp(t, [0.5, 1.0, 6.0, 7.0], [0.0, 1.0, 1.0, 0.0])
+    q = through(5e-4 * opening, 1.2e6 - p) - through(1e-4, p - 1e5) - through(RELIEF * min(max(x, 0), 1), p - 1e5)
+    return BETA / 2.0 * q
+
+
+def lag(t, y, held):
+    return [pot(t, y[0], y[1]), 0.0 if held else ((y[0] - SET) / SPAN - y[1]) / 0.05]
+
+
+def swing(t, y, held):
+    w = 2.0 * math.pi * 8.0
+    pull = w * w * ((y[0] - SET) / SPAN - y[1]) - 0.2 * w * y[2]
+    return [pot(t, y[0], y[1]), 0.0 if held else y[2], 0.0 if held else pull]
+
+
+@pytest.mark.parametrize("kind, rates", [("lag", lag), ("swing", swing)])
+def test_a_disc_follows_scipy_through_its_stops(kind, rates):
+    result = fvsolve.run(filled(**DISCS[kind]))
+    start = [3e5, 0.0, 0.0][: 3 if kind == "swing" else 2]
+    exact, events = discs.stopped(rates, lambda t, y: (y[0] - SET) / SPAN - y[1], start, [0.5, 1, 6, 7], result.t)
+    assert result.ok and len(events) >= 2
+    assert [e["time"] for e in result.summary["events"]] == pytest.approx(events, abs=1e-7)
+    assert result["pot.pressure"] == pytest.approx(exact[0], abs=1e-6 * SPAN)
+    assert result["relief.opening"] == pytest.approx(exact[1], abs=1e-6)
+    assert result["relief.flow"][result["relief.opening"] == 0.0] == pytest.approx(0.0, abs=0.0)
+
+
+def test_without_a_disc_it_is_the_pressure_alone_that_lifts_it():
+    from scipy.integrate import solve_ivp
+
+    result = fvsolve.run(filled())
+    exact, now, p = np.zeros(result.t.size), 0.0, 3e5
+    lift = lambda p: (p - SET) / SPAN  # noqa: E731
+    for end in (0.5, 1.0, 6.0, 7.0, 14.0):
+        step = solve_ivp(lambda t, y: [pot(t, y[0], lift(y[0]))], (now, end), [p], max_step=0.02, **discs.TIGHT)
+        here = (result.t >= now) & (result.t <= end)
+        exact[here], now, p = step.sol(result.t[here])[0], end, step.y[0, -1]
+    assert result["pot.pressure"] == pytest.approx(exact, abs=1e-6 * SPAN)
+    assert result["relief.opening"] == pytest.approx(np.clip(lift(exact), 0, 1), abs=1e-6)
+    assert [e["what"] for e in result.summary["events"]][0::5] == ["opens"] and len(result.summary["events"]) <= 4
+
+
+def main(numerics, law="linear", **more):
+    """A frictionless main whose gate shuts, with a relief valve at its end."""
+    nodes = {"lake": reservoir(6e5), "end": junction(), "out": reservoir(1e5)}
+    gate = {"start": 0.1, "duration": 0.2, "value": [1.0, 0.0]}
+    links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50), "gate": valve("end", "out", 0.004, gate),
+             "relief": relief("end", "out", **{"flow_area": 0.006, "set_pressure": 9e5, **more})}  # fmt: skip
+    fluid = {**WATER, "law": law}
+    return scene(nodes, links, 1.5, numerics, ["end.pressure", "relief.flow", "relief.opening"], 0.05, fluid=fluid)
+
+
+@pytest.mark.parametrize("set_pressure, opening", [(9e5, "lifting"), (3e6, "shut"), (7e5, "full")])
+def test_the_surge_ends_where_the_characteristic_meets_the_valve(set_pressure, opening):
+    more = {"set_pressure": set_pressure} | ({"flow_area": 1e-3} if opening == "full" else {})
+    result = fvsolve.run(main(SMOOTH, **more))
+    gate, first = 2.0 * RHO * 0.004**2, math.sqrt(2.0 * RHO * 0.004**2 * 5e5)
+    wide, z = 2.0 * RHO * more.get("flow_area", 0.006) ** 2, 1000.0 / (math.pi / 4 * 0.3**2)
+    lift = lambda p: min(max((p - set_pressure) / SPAN, 0.0), 1.0)  # noqa: E731
+    balance = lambda p: first - (p - 6e5) / z - lift(p) * math.sqrt(wide * max(p - 1e5, 0.0))  # noqa: E731
+    plateau = brentq(balance, 1e5, 1e7, xtol=1e-6)
+    assert gate > 0 and result["end.pressure"][result.t > 0.4] == pytest.approx(plateau, rel=1e-9)
+    assert result["relief.opening"][-1] == pytest.approx(lift(plateau), abs=1e-9)
+    assert (result["relief.flow"][-1] == 0.0) == (opening == "shut")
+    assert abs(result.ledger["mass"]["relative"]) < 1e-14 and len(result.summary["events"]) <= 2
+
+
+def test_a_gate_that_shuts_at_once_lifts_it_to_where_it_stays():
+    """Shut, the pressure would open it fully; fully open, it would shut it: it comes to rest between, in few events."""
+    case = main(SMOOTH, flow_area=0.02)
+    case["links"]["gate"]["opening"] = {"time": [0.0, 0.1], "value": [1.0, 0.0], "kind": "step"}
+    result = fvsolve.run(case)
+    assert result.ok and 0.0 < result["relief.opening"][-1] < 1.0 and len(result.summary["events"]) <= 4
+
+
+@pytest.mark.parametrize("law, near", [("log", 1e-3)])
+def test_other_laws_lift_it_alike(law, near):
+    ours, plain = (fvsolve.run(main(SMOOTH, law=one))["relief.opening"][-1] for one in (law, "linear"))
+    assert ours == pytest.approx(plain, rel=near) and ours != plain
+
+
+def test_order_is_not_lost_at_a_located_switch():
+    """With the gate's kinks on steps, rk4 converges at fourth order through the event of the valve's opening."""
+    case = filled({"method": "rk4", "step": 0.1})
+    fine = fvsolve.run(case, set={"numerics.step": 0.1 / 32})
+    errors = [abs(fvsolve.run(case, set={"numerics.step": h})["pot.pressure"][-1] - fine["pot.pressure"][-1])
+              for h in (0.1, 0.05, 0.025)]  # fmt: skip
+    assert len(fine.summary["events"]) >= 2
+    assert np.log2(errors[0] / errors[2]) / 2.0 == pytest.approx(4.0, abs=0.5)
+
+
+@pytest.mark.parametrize("disc", [{}, *DISCS.values()], ids=["none", *DISCS])
+def test_open_at_the_start_it_says_so_and_nothing_moves(disc):
+    case = main(SMOOTH, set_pressure=3e5, flow_area=2e-3, **disc)
+    case["links"]["gate"]["opening"] = 1.0
+    model = fvsolve.build(fvsolve.load(case))
+    assert any("open at the start" in warning for warning in model.warnings)
+    rates = model.rhs(0.0, np.zeros(model.y_size))
+    assert not rates.any()
+    held = fvsolve.run(case)
+    assert np.ptp(held["end.pressure"]) == 0.0 and held.summary["events"] == []
+
+
+def test_it_dissipates_and_the_ledger_closes():
+    found = energy(filled(**DISCS["lag"]))
+    assert found.relative < 1e-9
+    assert found.dissipated["relief relief valve"][-1] > 0.0 and np.all(
+        np.diff(found.dissipated["relief relief valve"]) > -1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    "more, text",
+    [
+        ({"overpressure": -1e5}, "wanted a value above 0"),
+        ({"time_constant": 0.0}, "wanted a value above 0"),
+        ({"set_pressure": "0 bar"}, "barg"),
+        ({"time_constant": 1.0, "natural_frequency": 3.0, "damping_ratio": 0.1}, "keep one"),
+        ({"natural_frequency": 3.0}, "damping_ratio"),
+        ({"damping_ratio": 0.3}, "natural_frequency"),
+    ],
+)
+def test_bad_discs_are_refused(more, text):
+    case = main({})
+    case["links"]["relief"].update(more)
+    with pytest.raises(fvsolve.CaseError, match=text):
+        fvsolve.load(case)

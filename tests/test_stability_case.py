@@ -1,0 +1,266 @@
+"""Where a case fails: prediction against exact growth, against real runs, and where bounds mislead."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+from truth.scenes import RHO, area, chamber, junction, pipe, reservoir, scene, valve
+
+from fvsolve.cli import main
+from fvsolve.errors import FvsolveError
+from fvsolve.model.energy import energy_form
+from fvsolve.steppers import METHODS, method_named, stability_function
+from fvsolve.studies.linear.frozen import frozen
+from fvsolve.studies.linear.linearise import linearised
+from fvsolve.studies.stability.bounds import field_of_values, region_limit
+from fvsolve.studies.stability.carried import Sparse, stepping
+from fvsolve.studies.stability.growth import Dense, growth, powers, predicted, step_matrix
+from fvsolve.studies.stability.measured import Runs
+from fvsolve.studies.stability.stability import stability
+
+NUMERICS = {"method": "rk4", "step": 1e-3}
+IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-5", "lobatto-iiic-4", "tr-bdf2", "rodas-5p"]
+
+
+def shut(cells, scheme):
+    """A pipe between a shut valve and a blind end."""
+    nodes = {"A": reservoir(1e6), "a": junction(), "b": junction()}
+    links = {"v": valve("A", "a", 1e-3, 0.0), "p": pipe("a", "b", 100.0, 0.3, 1000.0, cells)}
+    return scene(nodes, links, 1.0, {**NUMERICS, "scheme": scheme})
+
+
+def through(cells, scheme):
+    """A pipe whose ends send nothing back: valves whose slope is that of the pipe, dM/dp = A / a."""
+    flow, admittance = 10.0, area(0.3) / 1000.0
+    conductance = 2 * flow * admittance  # M |M| = G dp
+    opened, drop = math.sqrt(conductance / (2 * RHO)), flow**2 / conductance
+    nodes = {"A": reservoir(1e6 + 2 * drop), "a": junction(), "b": junction(), "B": reservoir(1e6)}
+    links = {"p": pipe("a", "b", 100.0, 0.3, 1000.0, cells), "v": valve("A", "a", opened), "w": valve("b", "B", opened)}
+    return scene(nodes, links, 1.0, {**NUMERICS, "scheme": scheme})
+
+
+def branches(cells, scheme):
+    """Three pipes meet; a reservoir, a flowing valve and a blind end."""
+    nodes = {"A": reservoir(1.2e6), "t": junction(), "g": junction(), "B": reservoir(1e6), "d": junction()}
+    links = {"p": pipe("A", "t", 100.0, 0.3, 1000.0, cells), "q": pipe("t", "g", 60.0, 0.2, 1100.0, 5),
+             "r": pipe("t", "d", 80.0, 0.25, 900.0, 7), "v": valve("g", "B", 2e-3)}  # fmt: skip
+    return scene(nodes, links, 1.0, {**NUMERICS, "scheme": scheme})
+
+
+def chambers(count, scheme="upwind"):
+    """A chain of chambers and flowing valves between two pressures."""
+    nodes = {
+        "in": reservoir(2e6),
+        **{f"c{k}": chamber(1e-3 * (1 + k % 3)) for k in range(count)},
+        "out": reservoir(1e6),
+    }
+    names = list(nodes)
+    links = {f"v{k}": valve(names[k], names[k + 1], 1e-5) for k in range(count + 1)}
+    return scene(nodes, links, 1.0, NUMERICS)
+
+
+def matrix(case):
+    """J of a case in its energy norm."""
+    at = frozen(case)
+    return energy_form(at.model).seen(linearised(at).a)
+
+
+def test_powers_are_powers_and_hold_the_last():
+    m = np.array([[0.9, 0.3], [-0.2, 1.0]])
+    for steps in (1, 2, 33, 999, 1000, 1024):
+        found = dict(powers(m, steps))
+        assert max(found) == steps and set(range(1, min(steps, 64) + 1)) <= set(found)
+        assert all(np.allclose(p, np.linalg.matrix_power(m, n), rtol=1e-10) for n, p in found.items())
+        assert set(dict(powers(m, steps, few=True))) <= set(found)
+
+
+@pytest.mark.parametrize("name", [name for name, m in METHODS.items() if name == m.name])
+def test_a_step_matrix_is_the_stability_function_of_its_eigenvalues(name):
+    method, rng = method_named(name), np.random.default_rng(1)
+    rotated = np.linalg.qr(rng.standard_normal((4, 4)))[0]
+    blocks = np.array([[-0.3, 0.7, 0, 0], [-0.7, -0.3, 0, 0], [0, 0, -2.0, 0.5], [0, 0, -0.5, -2.0]])
+    found = np.linalg.eigvals(step_matrix(method, rotated @ blocks @ rotated.T))
+    exact = stability_function(method)(np.array([-0.3 + 0.7j, -0.3 - 0.7j, -2 + 0.5j, -2 - 0.5j]))
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(exact), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name, m in METHODS.items() if name == m.name and m.explicit])
+def test_one_step_of_the_program_is_the_step_matrix_to_round_off(name):
+    case = branches(5, "upwind5")
+    del case["nodes"]["B"], case["links"]["v"]  # linear to the last bit without its valve
+    assert one_step_error(case, name, 0.01) < 1e-10
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_one_implicit_step_of_the_program_is_the_step_matrix(name):
+    assert one_step_error(shut(5, "upwind3"), name, 0.05) < 1e-7
+
+
+def one_step_error(case, name, h):
+    """The program's step of unit vectors against R(h J), relative, in the energy norm."""
+    at = frozen(case)
+    a = linearised(at).a
+    runs = Runs(at, name, energy_form(at.model), a=a)
+    size = 1e-6
+    columns = []
+    for unit in np.eye(len(a)):
+        run = runs.loop(size * unit, h)
+        run.run(1.0)
+        columns.append(run.now / size)
+    exact = step_matrix(method_named(name), h * a)
+    return np.max(np.abs(np.array(columns).T - exact)) / np.max(np.abs(exact))
+
+
+@pytest.mark.parametrize("steps", [100, 1000])
+def test_limits_of_one_mode_are_those_of_its_powers(steps):
+    decay = predicted(Dense(method_named("euler"), np.array([[-5.0]]), steps))
+    assert decay.step == pytest.approx((1 + 1000 ** (1 / steps)) / 5.0, rel=2e-4)
+    swing = predicted(Dense(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
+    assert swing.step == pytest.approx(math.sqrt(1000 ** (2 / steps) - 1) / 3.0, rel=2e-4)
+    assert predicted(Dense(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step == math.inf
+
+
+def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
+    for cells, courant in ((20, 1.2), (40, 1.1), (60, 1.07)):
+        m = step_matrix(method_named("euler"), courant * (np.eye(cells, k=-1) - np.eye(cells)))
+        power, most = np.eye(cells), 0.0
+        for _ in range(400):
+            power = power @ m
+            most = max(most, np.linalg.norm(power, 2))
+        found = growth(m, 400)
+        assert 0.99 * most <= found.size <= most * (1 + 1e-9)
+        assert np.linalg.norm(np.linalg.matrix_power(m, found.steps) @ found.start) == pytest.approx(
+            found.size, rel=1e-6
+        )
+
+
+def test_an_inflow_pipe_grows_at_courant_numbers_far_below_what_its_eigenvalues_say():
+    for cells in (30, 100):
+        e = 10.0 * cells * (np.eye(cells, k=-1) - np.eye(cells))
+        euler = method_named("euler")
+        found = predicted(Dense(euler, e, 400)).step * 10.0 * cells
+        assert found == pytest.approx(by_hand(cells, 400), rel=1e-3)
+        assert found < 1.15
+        assert region_limit(euler, np.diag(e)) * 10.0 * cells == pytest.approx(2.0, rel=1e-6)
+        field = region_limit(euler, field_of_values(e)) * 10.0 * cells
+        assert field == pytest.approx(1.0, abs=0.006)
+
+
+def by_hand(cells, steps):
+    """Least Courant number at which some power of (1 - C) I + C S grows a thousandfold, S the shift; all powers."""
+    low, high = 1.0, 1.3
+    while high - low > 2e-4:
+        middle, power, fails = (low + high) / 2, np.eye(cells), False
+        for _ in range(steps):
+            shifted = np.vstack([np.zeros(cells), power[:-1]])
+            power = (1 - middle) * power + middle * shifted
+            if np.linalg.norm(power) > 1e3 and np.linalg.norm(power, 2) > 1e3:
+                fails = True
+                break
+        low, high = (low, middle) if fails else (middle, high)
+    return low
+
+
+def test_vectors_carried_along_find_the_limit_of_squaring():
+    from scipy.sparse import csr_array
+
+    for case, name in ((through(20, "upwind"), "euler"), (shut(20, "upwind5"), "rk4")):
+        e, method = matrix(case), method_named(name)
+        exact, found = (predicted(kind(method, part, 300)).step for kind, part in ((Dense, e), (Sparse, csr_array(e))))
+        assert found == pytest.approx(exact, rel=5e-3)
+
+
+@pytest.mark.parametrize("name", ["rk4", "radau-iia-5", "tr-bdf2"])
+def test_a_vector_carried_along_takes_the_same_step_as_the_matrix(name):
+    from scipy.sparse import csr_array
+
+    e, rng = matrix(shut(6, "upwind5")), np.random.default_rng(2)
+    v = rng.standard_normal((e.shape[0], 2))
+    found = stepping(method_named(name), 0.01, csr_array(e))(v)
+    assert found == pytest.approx(step_matrix(method_named(name), 0.01 * e) @ v, abs=1e-11)
+
+
+PAIRS = [
+    (shut, "upwind", "euler"), (shut, "fromm", "heun"), (shut, "central", "rk4"), (shut, "upwind5", "ssp-rk3"),
+    (through, "upwind", "euler"), (through, "upwind", "rk4"), (through, "upwind3", "ssp-rk2"),
+    (through, "upwind5", "dormand-prince"), (branches, "linear-upwind", "bogacki-shampine"),
+    (branches, "upwind5", "rk4"), (branches, "upwind", "tsitouras"), (chambers, "upwind", "euler"),
+    (through, "linear-upwind", "dormand-prince"), (chambers, "upwind", "rk4"), (chambers, "upwind", "dormand-prince"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("make, scheme, method", PAIRS)
+def test_prediction_and_measurement_agree_to_one_percent(make, scheme, method):
+    (row,) = stability(make(16, scheme), [scheme], [method], steps=300).rows
+    assert abs(row.difference) < 0.005
+    if make is not chambers:
+        assert row.courant(row.predicted) == row.predicted * row.rate > 0.05
+
+
+def test_where_bounds_mislead_it_is_said_and_why():
+    (row,) = stability(through(30, "upwind"), ["upwind"], ["euler"], steps=300).rows
+    assert row.courant(row.eigenvalues) == pytest.approx(2.0, rel=1e-6)
+    assert row.courant(row.predicted) < 1.2
+    assert any("eigenvalues mislead" in note for note in row.notes)
+    (row,) = stability(shut(12, "upwind5"), ["upwind5"], ["rk4"], steps=300).rows
+    assert row.field_of_values == 0.0 and row.predicted > 0.0
+    assert any("field of values says 0" in note for note in row.notes)
+
+
+def test_a_closed_chamber_and_a_tank_are_slower_than_any_bound():
+    (row,) = stability(chambers(3), None, ["implicit-midpoint"], steps=100).rows
+    assert math.isinf(row.predicted) and math.isinf(row.measured) and math.isinf(row.eigenvalues)
+    assert row.plain()["predicted"] == "none"
+
+
+def test_limited_schemes_are_measured_between_what_their_frozen_weights_say():
+    (row,) = stability(shut(20, "muscl"), ["muscl"], ["euler"], steps=200).rows
+    assert math.isnan(row.predicted) and {"upwind", "fromm"} < set(row.frozen)
+    assert min(row.frozen.values()) < row.measured < max(row.frozen.values())
+    assert row.longer < row.measured
+    (plain,) = stability(shut(20, "upwind"), ["upwind"], ["euler"], steps=200).rows
+    assert row.frozen["upwind"] == pytest.approx(plain.predicted, rel=2e-4)
+    assert any("no sharp limit" in note for note in row.notes)
+
+
+def test_rows_that_are_finished_are_reused(tmp_path):
+    first = stability(chambers(3), None, ["euler"], steps=100, folder=tmp_path).rows
+    before = (tmp_path / "points.jsonl").read_text()
+    again = stability(chambers(3), None, ["euler"], steps=100, folder=tmp_path).rows
+    assert again[0].plain() == first[0].plain() and (tmp_path / "points.jsonl").read_text() == before
+
+
+def test_what_cannot_be_answered_is_said():
+    case = scene({"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, NUMERICS)
+    with pytest.raises(FvsolveError, match="has no state"):
+        stability(case)
+    with pytest.raises(FvsolveError, match="at least 10 steps"):
+        stability(chambers(2), steps=3)
+    with pytest.raises(FvsolveError, match='did you mean "rk4"'):
+        stability(chambers(2), methods=["rk44"])
+
+
+def test_the_command_prints_one_json_object_and_draws(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["stability", "chamber-chain", "--method", "rk4", "--steps", "100", "--json"]
+    monkeypatch.setattr(sys, "argv", ["fvsolve", *arguments])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert not left.value.code
+    found = json.loads(capsys.readouterr().out)
+    (row,) = found["rows"]
+    assert abs(row["difference"]) < 0.01 and row["eigenvalues"] < row["predicted"]
+    folder = tmp_path / "runs" / "chamber-chain.stability"
+    assert {path.name for path in folder.iterdir()} == {"points.jsonl", "stability.csv", "spectrum-rk4.png"}
+
+
+def test_without_a_case_the_command_answers_for_a_periodic_grid(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["fvsolve", "stability", "--scheme", "upwind", "--method", "euler", "--json"])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert not left.value.code
+    assert json.loads(capsys.readouterr().out)["limits"][0]["limit"] == 1.0

@@ -1,0 +1,184 @@
+"""A sweep has a row for every combination, of a run's own numbers; finished rows are reused, failed ones explained."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from truth.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.case.text import write
+from fvsolve.cli.app import value_of
+from fvsolve.cli.sweep import split
+from fvsolve.errors import FvsolveError
+from fvsolve.studies import sweep
+from fvsolve.studies.sweep import pasted
+
+
+@pytest.fixture
+def line(tmp_path) -> dict:
+    """A pipe whose valve shuts."""
+    nodes = {"lake": reservoir(1e6), "gate": junction(), "out": reservoir(101325.0)}
+    links = {
+        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20, friction=NO_FRICTION, initial_flow=0.05),
+        "valve": valve("gate", "out", 0.01, {"start": 0.1, "duration": 0.05, "value": [1.0, 0.0]}),
+    }
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
+    return scene(nodes, links, 0.5, numerics, ["gate.pressure", "valve.flow"])
+
+
+VARY = {"links.main.cells": [10, 20], "numerics.courant": [0.5, 4.0]}
+
+
+def test_rows_are_the_numbers_of_the_runs_in_the_order_of_the_values(line):
+    made = sweep(line, VARY)
+    assert [(row["links.main.cells"], row["numerics.courant"]) for row in made.rows] == [
+        (10, 0.5), (10, 4.0), (20, 0.5), (20, 4.0)
+    ]  # fmt: skip
+    for row in (made.rows[0], made.rows[2]):
+        alone = fvsolve.run(line, {key: row[key] for key in VARY})
+        assert row["ok"] and row["reason"] == "finished" and row["t [s]"] == 0.5
+        assert row["max(gate.pressure) [Pa]"] == alone.extremes["gate.pressure"].greatest
+        assert row["t_max(gate.pressure) [s]"] == alone.extremes["gate.pressure"].t_greatest
+        assert row["min(valve.flow) [m3/s]"] == alone.extremes["valve.flow"].least
+        assert row["final(gate.pressure) [Pa]"] == alone["gate.pressure"][-1]
+        assert row["steps"] == alone.summary["steps"]
+
+
+def test_a_run_that_stops_or_is_refused_is_a_row_with_its_reason(line):
+    made = sweep(line, {"numerics.courant": [4.0, 0.5, -1.0]}, {"numerics.end": 5.0})
+    stopped, fine, refused = made.rows
+    assert stopped["max(gate.pressure) [Pa]"] is stopped["final(gate.pressure) [Pa]"] is None  # it blew up
+    assert fine["ok"]
+    assert not stopped["ok"] and "halve it" in stopped["reason"] and 0.1 < stopped["t [s]"] < 5.0
+    assert not refused["ok"] and refused["reason"].startswith("refused: numerics.courant: -1.0")
+
+
+def test_finished_rows_are_reused_and_a_changed_case_is_not_mistaken_for_them(line, tmp_path):
+    sweep(line, VARY, out=tmp_path)
+    more = {**VARY, "links.main.cells": [10, 20, 40]}
+    assert sweep(line, more, out=tmp_path).reused == 4
+    assert sweep(line, more, {"nodes.lake.pressure": 9e5}, out=tmp_path).reused == 0
+    with open(tmp_path / "sweep.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6 and rows[4]["ok"] == "True"
+
+
+def test_other_processes_find_the_same(line):
+    alone, together = sweep(line, VARY).rows, sweep(line, VARY, jobs=2).rows
+    for row in (*alone, *together):
+        row.pop("seconds")
+    assert together == alone
+
+
+def test_an_interrupted_sweep_keeps_what_it_has_and_goes_on(line, tmp_path):
+    def stop(done, total, what):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sweep(line, VARY, out=tmp_path, progress=stop)
+    with open(tmp_path / "sweep.csv", newline="") as file:
+        assert len(list(csv.DictReader(file))) == 2
+    assert sweep(line, VARY, out=tmp_path).reused == 2
+
+
+def test_ctrl_c_during_a_run_keeps_the_rows_that_are_finished(line, tmp_path):
+    (tmp_path / "line.toml").write_text(write({**line, "output": {"every": 1.0, "probes": ["gate.pressure"]}}))
+    script = """if True:
+        import os, signal, sys
+        from fvsolve.cli import main
+        from fvsolve.solve.solve import Run
+        Run.pause = lambda self, spent: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
+        main()"""
+    command = [sys.executable, "-c", script, "sweep", "line.toml", "--set", "numerics.end=0.5,2000,0.4", "--out", "o"]
+    left = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert left.returncode == 130 and "interrupted after 1 of 3" in left.stderr and "Traceback" not in left.stderr
+    assert len((tmp_path / "o" / "points.jsonl").read_text().splitlines()) == 1
+
+
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["to it", "to all, as a terminal does"])
+def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_keeps_what_is_finished(line, tmp_path, send):
+    (tmp_path / "line.toml").write_text(write({**line, "output": {"every": 1e6, "probes": ["gate.pressure"]}}))
+    values = "numerics.end=0.5,0.4,1e7,2e7"
+    command = [sys.executable, "-m", "fvsolve", "sweep", "line.toml", "--set", values, "--jobs", "2", "--out", "o"]
+    running = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    kept = tmp_path / "o" / "points.jsonl"
+    try:
+        while not kept.exists() or len(kept.read_text().splitlines()) < 2:
+            assert running.poll() is None, running.communicate()
+            time.sleep(0.01)
+        send(running.pid, signal.SIGINT)
+        err = running.communicate(timeout=30)[1]  # ends where no process holds the pipe any more
+    finally:
+        if running.poll() is None:
+            os.killpg(running.pid, signal.SIGKILL)
+    assert running.returncode == 130 and "interrupted after 2 of 4" in err and "Traceback" not in err
+    assert len(kept.read_text().splitlines()) == 2
+
+
+def test_a_row_shows_what_the_model_could_not_follow(line, fvs, tmp_path):
+    shut = {"start": 0.1, "duration": 0.05, "value": [1.0, 0.0]}  # dp = rho a v is more than the lake holds
+    quiet, marked = sweep(line, {"links.valve.opening": [1.0, shut]}).rows
+    assert quiet["marks"] == "" and marked["ok"] and "below vapour pressure" in marked["marks"]
+    (tmp_path / "line.toml").write_text(write(line))
+    values = f"links.valve.opening=1.0,{pasted(shut)}"
+    code, out, _ = fvs("sweep", tmp_path / "line.toml", "--set", values, "--out", tmp_path)
+    assert code == 0 and marked["marks"] in " ".join(out.split())
+    with open(tmp_path / "sweep.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert value_of(rows[1]["links.valve.opening"]) == shut and rows[1]["marks"] == marked["marks"]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [400, 0.1, 1e-7, True, "upwind5", "900 m", "400", "true", "a,b", "", " x", 'say "so"', [1.0, [0.0]],
+     {"model": "steady", "factor": 0.02, "on": False}],
+)  # fmt: skip
+def test_a_value_is_written_as_set_reads_it(value):
+    (text,) = split(pasted(value))
+    assert value_of(text) == value and type(value_of(text)) is type(value)
+
+
+def test_a_fault_of_every_run_is_a_fault_of_the_sweep(line, tmp_path):
+    with pytest.raises(FvsolveError, match="all 2 runs are refused: links.main.cels"):
+        sweep(line, {"links.main.cels": [10, 20]}, out=tmp_path)
+    assert not (tmp_path / "sweep.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "text, parts",
+    [
+        ("1,2,3", ["1", "2", "3"]),
+        ("[1.0, 0.0],[1.0, 0.5]", ["[1.0, 0.0]", "[1.0, 0.5]"]),
+        ('{ model = "none" }, { model = "steady", factor = 0.02 }',
+         ['{ model = "none" }', '{ model = "steady", factor = 0.02 }']),
+        ('"a,b",c', ['"a,b"', "c"]),
+        ("20 mm, 30 mm", ["20 mm", "30 mm"]),
+    ],
+)  # fmt: skip
+def test_values_are_parted_at_commas_outside_of_brackets_and_quotes(text, parts):
+    assert split(text) == parts
+
+
+@pytest.mark.parametrize("vary, jobs", [({}, 1), ({"numerics.courant": [0.5]}, 1), (VARY, 0)])
+def test_a_sweep_of_nothing_is_refused(line, vary, jobs):
+    with pytest.raises(FvsolveError, match="nothing varies|wanted 1 or more"):
+        sweep(line, vary, jobs=jobs)
+
+
+def test_the_command_prints_the_rows_and_fails_where_one_does(fvs, tmp_path):
+    code, out, _ = fvs("sweep", "two-tanks", "--set", "numerics.rtol=1e-4,1e-6", "--out", tmp_path, "--json")
+    said = json.loads(out)
+    assert code == 0 and said["keys"] == ["numerics.rtol"] and [row["ok"] for row in said["rows"]] == [True, True]
+    code, out, _ = fvs("sweep", "two-tanks", "--set", "numerics.rtol=1e-4,2", "--out", tmp_path)
+    assert code == 1 and "refused: numerics.rtol" in out
+    code, _, err = fvs("sweep", "two-tanks", "--set", "numerics.rtol", "--out", tmp_path)
+    assert code == 2 and "wanted KEY=a,b,c" in err

@@ -1,0 +1,105 @@
+"""Valves that act by themselves, by SciPy at 1e-12 and by waves on a frictionless pipe. Knows no fvsolve."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12, "dense_output": True}
+
+
+def stopped(rates, push, start, kinks, t):
+    """(states over t of y' = rates(t, y, held), times of its events) where the lift y[1] stays between 0 and 1.
+
+    rates(t, y, held) : list, with the lift's own rates zero while held; push(t, y) : what lifts it. Its speed y[2],
+    where there is one, is lost at a stop. Solved piece by piece between kinks and events.
+    """
+    y, now, held = np.array(start, float), t[0], 0
+    if y[1] <= 0.0 and push(now, y) <= 0.0:
+        held = -1
+    found, events = np.zeros((len(y), len(t))), []
+    while now < t[-1] - 1e-12:
+        end = next(k for k in [*kinks, t[-1]] if k > now + 1e-12)
+        if held:
+            watch = [lambda s, z: push(s, z)]
+            watch[0].direction = -held
+        else:
+            watch = [lambda s, z: z[1] - 1.0, lambda s, z: z[1]]
+            watch[0].direction, watch[1].direction = 1, -1
+        for one in watch:
+            one.terminal = True
+        step = solve_ivp(lambda s, z, h=held: rates(s, z, h), (now, end), y, events=watch, **TIGHT)
+        here = (t >= now - 1e-12) & (t <= step.t[-1] + 1e-12)
+        if here.any():
+            found[:, here] = step.sol(t[here])
+        now, y = step.t[-1], step.y[:, -1].copy()
+        if step.status == 1:
+            events.append(now)
+            held = 0 if held else 1 if len(step.t_events[0]) else -1
+            if held:
+                y[1] = max(held, 0)
+                y[2:] = 0.0
+    found[1] = np.clip(found[1], 0.0, 1.0)
+    return found, events
+
+
+def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
+    """(t, lift, mass flow, pressure behind) of a check valve with a slow disc before a frictionless pipe.
+
+    source(t) : pressure before it [Pa]; far : that at the other end of the pipe, whose waves come back after `delay`;
+    p_behind = p0 + Z (M - M0) + w, w(t) = -(p' + Z M')(t - delay); M |M| = G x^2 (source - p_behind).
+    """
+    first = math.sqrt(g * (source(0.0) - far))
+    pieces: list = []
+
+    def returned(t):
+        if t <= delay:
+            return 0.0
+        x = next(sol for end, sol in pieces if t - delay <= end + 1e-15)(t - delay)[0]
+        m, p = flow(t - delay, min(max(x, 0.0), 1.0))
+        return -((p - far) + impedance * (m - first))
+
+    cache: dict = {}
+
+    def flow(t, x):
+        if t not in cache:
+            cache[t] = returned(t)
+        w = cache[t]
+        d, open_ = source(t) - far + impedance * first - w, g * x * x
+        root = open_ * impedance + math.sqrt((open_ * impedance) ** 2 + 4.0 * open_ * abs(d))
+        m = 2.0 * open_ * d / root if open_ > 0.0 else 0.0
+        return m, far + impedance * (m - first) + w
+
+    def push(t, y):
+        return (source(t) - flow(t, min(max(y[0], 0.0), 1.0))[1]) / span - y[0]
+
+    now, y, held = 0.0, [1.0], 1
+    times, rows, events = [], [], []
+    while now < t_end - 1e-12:
+        end = next(k for k in [*sorted({*kinks, *np.arange(delay, t_end, delay)}), t_end] if k > now + 1e-12)
+        end = min(end, now + delay)
+        if held:
+            watch = [lambda s, z: push(s, z)]
+            watch[0].direction = -held
+        else:
+            watch = [lambda s, z: z[0] - 1.0, lambda s, z: z[0]]
+            watch[0].direction, watch[1].direction = 1, -1
+        for one in watch:
+            one.terminal = True
+        rate = (lambda s, z: [0.0]) if held else (lambda s, z: [push(s, z) / time])
+        step = solve_ivp(rate, (now, end), y, events=watch, method="DOP853", rtol=1e-9, atol=1e-10, dense_output=True,
+                         max_step=0.02)  # fmt: skip
+        pieces.append((step.t[-1], step.sol))
+        for s in np.linspace(now, step.t[-1], 100)[:-1]:
+            x = min(max(step.sol(s)[0], 0.0), 1.0)
+            times.append(s)
+            rows.append((x, *flow(s, x)))
+        now, y = step.t[-1], [float(step.y[0, -1])]
+        if step.status == 1:
+            events.append((now, held))
+            held = 0 if held else 1 if len(step.t_events[0]) else -1
+            if held:
+                y = [float(max(held, 0))]
+    return np.array(times), np.array(rows).T, events

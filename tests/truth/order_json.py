@@ -1,0 +1,33 @@
+"""`fvsolve order` as a person or a program calls it. Knows the command line; knows no case."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from fvsolve.case import text
+from fvsolve.cli import main
+
+
+def call(capsys, *words: str) -> tuple[int, str, str]:
+    """Exit code and what stands on standard output and error."""
+    old, sys.argv = sys.argv, ["fvsolve", "order", *words]
+    try:
+        main()
+        code = 0
+    except SystemExit as stop:
+        code = stop.code or 0
+    finally:
+        sys.argv = old
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def studies(capsys, folder: Path, case: dict, *words: str) -> list[dict]:
+    """What `--json` says of a case given as a dict."""
+    path = folder / "case.toml"
+    path.write_text(text.write(case), encoding="utf-8")
+    code, out, err = call(capsys, str(path), "--out", str(folder / "out"), "--json", *words)
+    assert code == 0, err
+    return json.loads(out)["studies"]
