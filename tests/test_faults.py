@@ -160,16 +160,16 @@ BAD = {
     "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: length is missing"),
     "unknown type": (
         swap('"valve"', '"vavle"'),
-        'line 33: links.valve.type: no type "vavle"; types are cylinder, damper, ',
+        'line 33: links.valve.type: no type "vavle"; types are check-valve, cylinder, damper, ',
     ),
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
     "missing type": (
         swap('type = "junction"\n', ""),
-        "line 15: nodes.gate: type is missing; wanted one of chamber, ",
+        "line 15: nodes.gate: type is missing; wanted one of accumulator, air-valve, chamber, ",
     ),
     "a link among nodes": (
         swap('"junction"', '"pipe"'),
-        'nodes.gate.type: no type "pipe"; types are chamber, frame,',
+        'nodes.gate.type: no type "pipe"; types are accumulator, air-valve, chamber, frame,',
     ),
     "a link among nodes, where": (swap('"junction"', '"pipe"'), "it belongs under [links]"),
     "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: no type 3"),
