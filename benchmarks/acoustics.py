@@ -81,7 +81,7 @@ class Acoustics:
 
     def _rhs(self):
         """fvsolve's own compiled rhs as f(t, y, dydt); its tables and `out` by their addresses."""
-        rhs, handle, out = self.model.functions()[0], self.model.handle, self.model.new_out()
+        rhs, handle, out = self.model.functions.rhs, self.model.handle, self.model.new_out()
         self._kept = handle, out
         handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
 

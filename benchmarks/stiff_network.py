@@ -81,7 +81,7 @@ def network_table(quick: bool) -> None:
 
 def parts(model) -> tuple[Structure, Costs, csc_array]:
     """The model's structure, what its parts cost at the start, and the matrix that is factored there."""
-    structure, rhs = Structure(sparsity(model)), model.functions()[0]
+    structure, rhs = Structure(sparsity(model)), model.functions.rhs
     factor, solve = structure.functions()
     shape, n, m, handle = structure.shape, structure.n, structure.m, model.handle
     where, out, y = int(model.layout["supply"]), model.new_out(), np.zeros(n)

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["argument", "beside", "cache_folder", "composed_folder", "inner", "njit", "source_hash"]
+__all__ = ["argument", "beside", "cache_folder", "written_folder", "inner", "njit", "source_hash"]
 
 KEPT = 3  # generations of compiled code kept beside the present one
 
@@ -65,7 +65,7 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         return function
     numba = _numba()
     home = Path(function.__code__.co_filename).resolve()
-    cache = home in _sources() or home.parent == composed_folder().resolve()
+    cache = home in _sources() or home.parent == written_folder().resolve()
     options = {"error_model": "numpy", "cache": cache, "_nrt": False} | options
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_code_folder()) if options["cache"] else before
@@ -159,9 +159,9 @@ def _code_folder() -> Path:
 
 
 @functools.cache
-def composed_folder() -> Path:
+def written_folder() -> Path:
     """Where modules that are written from others lie, and go with the sources they were written from."""
-    folder = _code_folder() / "composed"
+    folder = _code_folder() / "written"
     folder.mkdir(exist_ok=True)
     return folder
 

@@ -19,6 +19,7 @@ DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"memory"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating", "cavitating_nodes", "riemann"}
+JOBS = ("before", "core", "after", "observe", "record", "events")
 ALL = PIPES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
@@ -36,8 +37,8 @@ def compiled_with(*functions) -> set[str]:
 
 
 def files(model) -> set[str]:
-    loop = Loop(model)
-    return compiled_with(*model.functions(), loop.stepper.attempt, loop.stepper.march, *loop.stepper.algebra)
+    loop, own = Loop(model), model.functions.scene.functions(*JOBS)
+    return compiled_with(*own, loop.stepper.attempt, loop.stepper.march, *loop.stepper.algebra)
 
 
 def tanks(**numerics) -> dict:
@@ -109,7 +110,7 @@ def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
     more[[other.state_names.index(name) for name in one.state_names]] = y
     found = dict(zip(other.state_names, other.rhs(0.0, more), strict=True))
     assert [found[name] for name in one.state_names] == pytest.approx(one.rhs(0.0, y), rel=1e-12)
-    assert one.functions()[0] is not other.functions()[0]
+    assert one.functions.rhs is not other.functions.rhs
 
 
 def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():

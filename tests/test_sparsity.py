@@ -103,7 +103,7 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     n, m, at = model.y_size, len(model.node_names), int(model.layout["supply"])
     f, out = model.evaluate(t, y)
     supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
-    given = (model.functions()[0], model.handle, structure.shape, at, t, y, f, supply, model.scale)
+    given = (model.functions.rhs, model.handle, structure.shape, at, t, y, f, supply, model.scale)
     calls = compiled_differences()(*given, np.zeros(n), np.zeros(n), model.new_out(), jacobian)
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)

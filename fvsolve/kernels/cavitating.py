@@ -216,8 +216,9 @@ def note_cavity(t, pipe, r, l, at, tables):
 
 
 @njit
-def record_cavities(t, y, tables):
+def record_cavities(t, y, out, handle, values):
     """Cavities of all pipes after an accepted step."""
+    tables = open_tables(handle)
     pipes, at = tables[I_PIPES], tables[I_MARKS].size - 3 * tables[I_PIPES].size
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]

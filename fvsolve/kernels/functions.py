@@ -1,50 +1,62 @@
-"""The functions that a density law offers to the stepper, compiled on first use."""
+"""The functions that a scene offers to the stepper, compiled on first use. Knows jobs; knows no law."""
 
 import functools
 
 from fvsolve.jit import beside, njit
-from fvsolve.kernels import compose
+from fvsolve.kernels import calls
+from fvsolve.kernels.rooms import Scene
+
+READERS = "from fvsolve.kernels.functions import Scene, compile_readers; "
+MARCH = "from fvsolve.steppers.march import compiled; compiled()"
 
 
-@functools.cache
-def functions(law: str, pipes: bool = True, rooms: tuple[str, ...] = (), kinds: tuple[int, ...] = ()) -> tuple:
-    """(rhs, observe, record, events) of a density law, in scenes with or without pipes and with these rooms.
+class Functions:
+    """Compiled functions of a scene: `rhs`, `observe`, `record`, `events`, and `energies` once they are asked for.
 
-    rooms : of "bodies", "devices", "memory", "cavities", in this order; "cavities" wants pipes
-    kinds : codes of the devices that there are
+    calls : int64[jobs, n]  addresses of what they call, which the handle of a model must hold
     """
-    made = module_of(law, pipes, rooms, kinds)
-    watching = "devices" not in rooms  # whose events close the nodes: they wait for the rhs
-    code = f"from fvsolve.kernels.functions import watch; watch({law!r}, {pipes}, {rooms!r}); " * watching
-    with beside(code + "from fvsolve.steppers.march import compiled; compiled()", "march.march-*.nbi"):
-        compile_as(made.rhs, "tvvvh")
-    watch(law, pipes, rooms, kinds)
-    return made.rhs, made.observe, made.record, made.events
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, rates = scene, scene.functions("before", "core", "after")
+        self.calls = calls.empty_calls(len(rates) + 2)
+        with beside(f"{READERS}compile_readers({scene!r}); {MARCH}", "march.march-*.nbi"):
+            self.rhs = self.one(calls.RHS, rates, calls.rhs_in_turn)
+        if scene.kinds:  # their events are read off closed nodes
+            self.enter(calls.CLOSE, scene.functions("before", "core"))
+        self.observe = self.one(calls.OBSERVE, scene.functions("observe"), calls.observe_in_turn)
+        self.enter(calls.RECORD, scene.functions("record"))
+        self.enter(calls.EVENTS, scene.functions("events"))
+        self.record, self.events = compile_readers(scene)
+
+    def enter(self, job: int, functions: list) -> None:
+        """Note the addresses of a job's functions."""
+        self.calls[job, : len(functions)] = calls.listed(functions, calls.ARGUMENTS[job])
+
+    def one(self, job: int, functions: list, in_turn):
+        """One function that calls all of a job: the only one itself."""
+        self.enter(job, functions)
+        if len(functions) == 1:
+            return functions[0]
+        calls.compile_as(in_turn, calls.ARGUMENTS[job])
+        return in_turn
+
+    @functools.cached_property
+    def energies(self) -> tuple:
+        """(power, stored), each of (t, y, dydt, out, handle, rows)."""
+        power, stored = self.scene.functions("power"), self.scene.functions("stored")
+        return self.one(calls.POWER, power, calls.power_in_turn), self.one(calls.STORED, stored, calls.stored_in_turn)
 
 
-def module_of(law: str, pipes: bool, rooms: tuple[str, ...], kinds: tuple[int, ...]):
-    """Where these functions stand, not yet compiled; modules that a scene does not need are not even loaded."""
-    family = "cavitating" if "cavities" in rooms else kind_of(law)
-    return compose.functions(family, pipes, rooms_of(law, rooms), kinds)
+functions = functools.cache(Functions)
 
 
-def kind_of(law: str) -> str:
-    """The family of a density law."""
-    return "linear" if law == "linear" else "barotropic"
-
-
-def rooms_of(law: str, rooms: tuple[str, ...]) -> tuple[str, ...]:
-    """Rooms as `compose` names them: some differ from law to law."""
-    named = {room: f"{room}, {kind_of(law)}" for room in rooms}
-    return tuple(other if other in compose.ROOMS else room for room, other in named.items())
-
-
-def watch(law: str, pipes: bool, rooms: tuple[str, ...], kinds: tuple[int, ...] = ()) -> None:
-    """Compile what reads a state."""
-    made = module_of(law, pipes, rooms, kinds)
-    compile_as(made.record, "tvvhv")
-    compile_as(made.observe, "tvvhv")
-    compile_as(made.events, "tvhv")
+def compile_readers(scene: Scene) -> tuple:
+    """(record, events) of a scene, compiled with all that they call."""
+    for function in scene.functions("observe", "record", "events"):
+        calls.compile_as(function, calls.READS)
+    calls.compile_as(calls.record_in_turn, calls.READS)
+    calls.compile_as(calls.events_in_turn, "tvhv")
+    return calls.record_in_turn, calls.events_in_turn
 
 
 @functools.cache
@@ -53,21 +65,10 @@ def leap_function(wanted: bool):
     found = stay
     if wanted:
         from fvsolve.kernels.leap import leap_linear as found
-    compile_as(found, "ttvvvhv")
+    calls.compile_as(found, "ttvvvhv")
     return found
 
 
 @njit
 def stay(t, h, y, y_new, out, handle, values):
     """Never called."""
-
-
-def compile_as(function, letters: str) -> None:
-    """Compile for arguments that are times (t), vectors (v) and a handle (h), and for no others."""
-    if not hasattr(function, "compile") or function.overloads:
-        return
-    from numba import types
-
-    kinds = {"t": types.float64, "v": types.float64[::1], "h": types.int64[::1]}
-    function.compile(tuple(kinds[letter] for letter in letters))
-    function.disable_compile()

@@ -10,6 +10,7 @@ from math import log, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density, log_density, pressure_of_log
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
     FORCE,
     I_ARMED,
@@ -89,8 +90,9 @@ def chamber_state(tables, node, volume, excess):
 
 
 @njit
-def chambers(y, out, tables):
+def chambers(t, y, dydt, out, handle):
     """Pressures and stiffness of moving chambers, and the flow that the piston and its leak take from each."""
+    tables = open_tables(handle)
     layout, nodes, pistons = tables[I_LAYOUT][0], tables[I_NODES], tables[I_PISTONS]
     for k in range(pistons.size):
         piston = pistons[k]
@@ -194,8 +196,9 @@ def mechanical_rate(out, tables):
 
 
 @njit
-def finish_bodies(t, y, dydt, out, tables):
+def finish_bodies(t, y, dydt, out, handle):
     """Forces, d/dt of positions and velocities, the rate; status where a piston has used up its chamber."""
+    tables = open_tables(handle)
     layout, nodes, bodies = tables[I_LAYOUT][0], tables[I_NODES], tables[I_BODIES]
     forces(t, y, out, tables)
     out[RATE] = max(out[RATE], mechanical_rate(out, tables))
@@ -213,8 +216,9 @@ def finish_bodies(t, y, dydt, out, tables):
 
 
 @njit
-def observe_bodies(y, out, tables, values):
+def observe_bodies(t, y, out, handle, values):
     """Values of the probes that read bodies and what pushes them."""
+    tables = open_tables(handle)
     layout, bodies, pistons, probes = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_PISTONS], tables[I_PROBES]
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
@@ -231,8 +235,9 @@ def observe_bodies(y, out, tables, values):
 
 
 @njit
-def record_bodies(t, y, tables):
+def record_bodies(t, y, out, handle, values):
     """The first time that a piston is beyond its stroke."""
+    tables = open_tables(handle)
     marks, pistons = tables[I_MARKS], tables[I_PISTONS]
     first = tables[I_PIPES].size + 3 * tables[I_NODES].size + tables[I_COLUMNS].size
     for k in range(pistons.size):
@@ -243,8 +248,9 @@ def record_bodies(t, y, tables):
 
 
 @njit
-def body_events(y, tables, g):
+def body_events(t, y, out, handle, g):
     """The room that is left before each side of a stop."""
+    tables = open_tables(handle)
     stops = tables[I_STOPS]
     first = g.size - 2 * stops.size
     for k in range(stops.size):

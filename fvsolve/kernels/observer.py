@@ -162,11 +162,12 @@ def record_pipe(t, r, l, pipe, which, tables):
 
 
 @njit
-def record_all(t, y, out, tables, values):
+def record_all(t, y, out, handle, values):
     """Extremes of probes, envelopes of pipes and first times of marks, after every accepted step.
 
     marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
     """
+    tables = open_tables(handle)
     pipes = tables[I_PIPES]
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
@@ -196,8 +197,9 @@ def record_nodes(t, out, tables, values):
 
 
 @njit
-def tank_events(y, tables, g):
+def tank_events(t, y, out, handle, g):
     """Functions that are located where they fall through zero: a tank's content, and its room below the rim."""
+    tables = open_tables(handle)
     nodes, k = tables[I_NODES], 0
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK:

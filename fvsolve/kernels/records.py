@@ -350,7 +350,8 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_PIECES,
     I_ENVELOPE,
     I_EXTREMES,
-) = range(len(TABLES))
+    I_CALLS,
+) = range(len(TABLES) + 1)  # the last, int64[:, :], holds addresses of functions: a handle has it, a model does not
 
 
 @functools.cache
@@ -360,4 +361,5 @@ def table_types() -> tuple:
 
     records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
     flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
-    return (*records, *flats, *[types.Array(types.float64, 2, "C") for _ in MATRICES])
+    matrices = [types.Array(types.float64, 2, "C") for _ in MATRICES]
+    return (*records, *flats, *matrices, types.Array(types.int64, 2, "C"))

@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.kernels import compose
 from fvsolve.kernels import records as rec
 from fvsolve.model.model import Model
-
-
-@functools.cache
-def energy_functions(law: str, rooms: tuple[str, ...], kinds: tuple[int, ...]) -> tuple:
-    """(power, stored) of a density law and the rooms of a scene, compiled; asked for by energy studies alone."""
-    from fvsolve.kernels.functions import compile_as, kind_of, rooms_of
-
-    made = compose.energies(kind_of(law), rooms_of(law, rooms), kinds)
-    for function in (made.power, made.stored):
-        compile_as(function, "tvvvhv")
-    return made.power, made.stored
 
 
 @dataclass(frozen=True)
@@ -42,7 +29,7 @@ class Accounts:
 
     def __init__(self, model: Model) -> None:
         self.model, case = model, model.case
-        self.power, self.stored = energy_functions(case.fluid.law, model.rooms, model.device_kinds)
+        self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # of stored energy: rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
@@ -154,7 +141,7 @@ class Accounts:
 
     def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Power of every line [W] : float64[lines], from a state; its rates and `out` are written here."""
-        self.model.functions()[0](t, y, dydt, out, self.model.handle)
+        self.model.functions.rhs(t, y, dydt, out, self.model.handle)
         return self.power_by(t, y, dydt, out)
 
     def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
@@ -166,7 +153,7 @@ class Accounts:
     def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
         """Change of what every part stores since the profile [J] : float64[held]."""
         rows, out = np.zeros(self.stores), self.model.new_out()
-        self.model.functions()[0](t, y, np.zeros(0), out, self.model.handle)
+        self.model.functions.rhs(t, y, np.zeros(0), out, self.model.handle)
         self.stored(t, y, np.zeros(0), out, self.model.handle, rows)
         return self.holding @ rows
 

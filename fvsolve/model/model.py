@@ -90,17 +90,17 @@ class Model:
         """Whether the friction of a pipe remembers the past of its flow."""
         return bool(self.tables[rec.I_PIPES]["terms"].any())
 
-    @property
-    def rooms(self) -> tuple[str, ...]:
-        """What the scene has beside the fluid's places and links."""
-        there = {"bodies": len(self.tables[rec.I_BODIES]), "devices": len(self.tables[rec.I_DEVICES])}
-        there |= {"memory": self.unsteady, "cavities": self.cavitates and self.cells}
-        return tuple(room for room, count in there.items() if count)
+    @cached_property
+    def functions(self):
+        """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
+        from fvsolve.kernels.functions import functions
+        from fvsolve.kernels.rooms import Scene
 
-    @property
-    def device_kinds(self) -> tuple[int, ...]:
-        """Codes of the devices that there are."""
-        return tuple(int(kind) for kind in np.unique(self.tables[rec.I_DEVICES]["kind"]))
+        kinds = np.unique(self.tables[rec.I_DEVICES]["kind"])
+        bodies, law = len(self.tables[rec.I_BODIES]) > 0, self.case.fluid.law
+        return functions(
+            Scene(law, self.cells > 0, self.cavitates, bodies, self.unsteady, tuple(int(kind) for kind in kinds))
+        )
 
     @property
     def layout(self):
@@ -109,10 +109,10 @@ class Model:
 
     @cached_property
     def handle(self):
-        """The tables as compiled functions take them."""
+        """The tables, and what there is to call, as compiled functions take them."""
         from fvsolve.kernels.handle import make_handle
 
-        return make_handle(self.tables)
+        return make_handle((*self.tables, self.functions.calls))
 
     @cached_property
     def structure(self):
@@ -121,12 +121,6 @@ class Model:
         from fvsolve.steppers.structure import Structure
 
         return Structure(sparsity(self), self.case.numerics.linear_algebra)
-
-    def functions(self) -> tuple:
-        """(rhs, observe, record, events), compiled: of the case's law, with what the scene has."""
-        from fvsolve.kernels.functions import functions
-
-        return functions(self.case.fluid.law, self.cells > 0, self.rooms, self.device_kinds)
 
     def new_out(self) -> np.ndarray:
         """An array for what the rhs writes beside dydt."""
@@ -142,14 +136,14 @@ class Model:
         dydt, out = np.zeros(self.y_size), self.new_out()
         y = np.ascontiguousarray(y, dtype=np.float64)
         self.arm(float(t), y)
-        self.functions()[0](float(t), y, dydt, out, self.handle)
+        self.functions.rhs(float(t), y, dydt, out, self.handle)
         return dydt, out
 
     def arm(self, t: float, y: np.ndarray) -> None:
         """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
         armed, g = self.tables[rec.I_ARMED], np.zeros(self.tables[rec.I_ARMED].size)
         for _ in range(1 + 2 * len(self.events)):
-            self.functions()[3](t, y, self.handle, g)
+            self.functions.events(t, y, self.handle, g)
             changed = np.any((g <= 0.0) != (armed > 0.0))
             armed[:] = g <= 0.0
             if not changed:
@@ -171,7 +165,7 @@ class Model:
         """Values of all probes : float64[probes] [SI]."""
         out = self.evaluate(t, y, limit)[1]
         values = np.zeros(len(self.probes))
-        self.functions()[1](float(t), y, out, self.handle, values)
+        self.functions.observe(float(t), y, out, self.handle, values)
         return values
 
     # what the numbers mean ----------------------------------------------------------------------------------

@@ -28,7 +28,8 @@ class Loop:
         self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.rhs, self.observe, self.record, self.events = arguments(model.functions())
+        call = model.functions
+        self.rhs, self.observe, self.record, self.events = arguments((call.rhs, call.observe, call.record, call.events))
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
         ledgers, structure = len(model.node_names), structure or (lambda: model.structure)

@@ -1,4 +1,4 @@
-"""What the law of each kind of device is made of, one entry a part. Knows names; `compose` makes loops of them."""
+"""What the law of each kind of device is made of, one entry a part. Knows names; `loops` makes loops of them."""
 
 from dataclasses import dataclass
 

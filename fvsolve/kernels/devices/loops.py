@@ -1,83 +1,54 @@
-"""What all devices of a scene do: a template, in which `compose` puts the calls of its kinds in place of `each`."""
+"""Writes the loops over all devices of a kind from its law, so that a scene compiles its own kinds alone.
 
-from fvsolve.jit import njit
-from fvsolve.kernels.records import (
-    DEVICE_VALUE,
-    I_COLUMNS,
-    I_DEVICES,
-    I_MARKS,
-    I_NODES,
-    I_PIPES,
-    I_PISTONS,
-    I_PROBES,
-)
+They stand in the folder of compiled code, written once and cached like any other. Knows names; knows no law.
+"""
 
-DEVICE = 3  # rows of `power` a device
+from __future__ import annotations
 
+import functools
+import importlib.util
+import os
+import sys
+from pathlib import Path
+from types import ModuleType
 
-@njit
-def set_devices(t, y, out, tables):
-    """Before nodes are closed: conductances, speeds, pressures and stiffness that devices set, from (t, y) alone."""
-    for k in range(tables[I_DEVICES].size):
-        device = tables[I_DEVICES][k]  # noqa: F841
-        # each: set
+from fvsolve.jit import written_folder
+from fvsolve.kernels.devices.laws import LAWS
+
+HOME = "fvsolve.kernels.devices"
+TEMPLATE = Path(__file__).parent / "template.py"
 
 
-@njit
-def move_devices(t, y, dydt, out, tables):
-    """After: d/dt of what devices hold, where dydt is asked for, and their greatest rates into out[RATE]."""
-    for k in range(tables[I_DEVICES].size):
-        device = tables[I_DEVICES][k]  # noqa: F841
-        # each: move
+@functools.cache
+def loops_of(kind: int) -> ModuleType:
+    """The module of a kind's loops: `before`, `after`, `events`, `observe`, `record`, `power` and `stored`."""
+    path, source = written_folder() / f"kind_{kind}.py", text(kind)
+    if not path.is_file() or path.read_text(encoding="utf-8") != source:
+        fresh = Path(f"{path}.{os.getpid()}")
+        fresh.write_text(source, encoding="utf-8")
+        os.replace(fresh, path)
+    spec = importlib.util.spec_from_file_location(f"{HOME}.kind_{kind}", path)
+    made = sys.modules[spec.name] = importlib.util.module_from_spec(spec)  # where numba looks for it
+    spec.loader.exec_module(made)
+    return made
 
 
-@njit
-def device_events(t, y, out, tables, g):
-    """Event functions of devices, from a state whose nodes are closed."""
-    for k in range(tables[I_DEVICES].size):
-        device = tables[I_DEVICES][k]  # noqa: F841
-        # each: events
+def text(kind: int) -> str:
+    """The source of that module: the template, with the calls of this kind in it."""
+    law = vars(LAWS[kind])
+    homes = [call.split(": ") for call in law.values() if call]
+    lines = dict.fromkeys(f"from {HOME}.{module} import {call.split('(')[0]}" for module, call in homes)
+    head, *functions = TEMPLATE.read_text(encoding="utf-8").replace("KIND = -1", f"KIND = {kind}").split("\n\n\n")
+    return "\n\n\n".join(
+        ["\n".join(dict.fromkeys(lines)) + "\n" + head, *filter(None, (filled(f, law) for f in functions))]
+    )
 
 
-@njit
-def observe_devices(t, y, out, tables, values):
-    """Values of the probes that read devices."""
-    probes = tables[I_PROBES]
-    for k in range(probes.size):
-        if probes[k]["kind"] == DEVICE_VALUE:
-            device, which = tables[I_DEVICES][probes[k]["index"]], probes[k]["side"]  # noqa: F841
-            # each: values[k] = value
-
-
-@njit
-def mark_devices(t, out, tables):
-    """The first time that each device works where its law is not to be trusted."""
-    marks, devices = tables[I_MARKS], tables[I_DEVICES]
-    first = tables[I_PIPES].size + 3 * tables[I_NODES].size + tables[I_COLUMNS].size + tables[I_PISTONS].size
-    for k in range(devices.size):
-        device, beyond = devices[k], False  # noqa: F841
-        # each: beyond = outside
-        if beyond and marks[first + k] != marks[first + k]:
-            marks[first + k] = t
-
-
-@njit
-def power_devices(t, y, dydt, out, tables, power):
-    """Rows of devices, the last of `power` [W]: supplied, rate of what is stored, dissipated."""
-    devices = tables[I_DEVICES]
-    first = power.size - DEVICE * devices.size
-    for k in range(devices.size):
-        device, rows = devices[k], power[first + DEVICE * k : first + DEVICE * (k + 1)]  # noqa: F841
-        rows[0], rows[1], rows[2] = 0.0, 0.0, 0.0
-        # each: rows[0], rows[1], rows[2] = power
-
-
-@njit
-def stored_devices(t, y, out, tables, stored):
-    """Rows of devices, the last of `stored`, changes since the profile [J]."""
-    devices = tables[I_DEVICES]
-    first = stored.size - devices.size
-    for k in range(devices.size):
-        device = devices[k]  # noqa: F841
-        stored[first + k] = 0.0
-        # each: stored[first + k] = stored
+def filled(function: str, law: dict[str, str]) -> str:
+    """A function of the template with its call in place, "" where this kind has none and needs none."""
+    before, mark, after = function.partition("...  # each: ")
+    asked, end, rest = after.partition("\n")
+    *into, job = asked.split(" = ")
+    if law[job]:
+        return before + " = ".join([*into, law[job].split(": ")[1]]) + end + rest
+    return before + "pass" + end + rest if job in ("power", "stored") else ""

@@ -4,6 +4,7 @@ What remembers is the velocity: u = (rho A)_ref M / m, so that v times the drag 
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.pipes import GAUSS
 from fvsolve.kernels.records import I_FLOATS, I_PIPES, I_PROFILE, I_SCRATCH, I_SETTINGS
 from fvsolve.kernels.unsteady.memory import follow_all, take_off
@@ -24,8 +25,9 @@ def velocity_change(pipe, profile, reference, r, l, change):
 
 
 @njit
-def remember_barotropic(y, dydt, tables):
+def remember_barotropic(t, y, dydt, out, handle):
     """Unsteady friction of all pipes, added to rates, where there are any."""
+    tables = open_tables(handle)
     pipes, floats, scratch = tables[I_PIPES], tables[I_FLOATS], tables[I_SCRATCH]
     for i in range(pipes.size):
         pipe = pipes[i]

@@ -7,6 +7,7 @@ kinetic energy. Under the laws log and table M is rho A times the velocity at th
 
 from fvsolve.jit import njit
 from fvsolve.kernels.energy import NODE, PIPE, SHARES, at_point, width_of
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import I_FLOATS, I_NODES, I_PIPES, I_PROFILE, I_SCRATCH, I_SETTINGS, LAW_LINEAR
 from fvsolve.kernels.unsteady.barotropic import velocity_change
 from fvsolve.kernels.unsteady.memory import difference
@@ -67,8 +68,9 @@ def memory_energy(st, floats, profile, pipe, y):
 
 
 @njit
-def add_power(y, dydt, tables, power):
+def add_power(t, y, dydt, out, handle, power):
     """What all pipes remember, into their rows of power."""
+    tables = open_tables(handle)
     st, pipes, at = tables[I_SETTINGS][0], tables[I_PIPES], NODE * tables[I_NODES].size
     for i in range(pipes.size):
         if pipes[i]["terms"] > 0:
@@ -81,8 +83,9 @@ def add_power(y, dydt, tables, power):
 
 
 @njit
-def add_stored(y, tables, stored):
+def add_stored(t, y, dydt, out, handle, stored):
     """What all pipes remember, into their rows of stored energy."""
+    tables = open_tables(handle)
     st, pipes, nodes = tables[I_SETTINGS][0], tables[I_PIPES], tables[I_NODES]
     for i in range(pipes.size):
         if pipes[i]["terms"] > 0:

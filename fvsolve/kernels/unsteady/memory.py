@@ -7,6 +7,7 @@ dz_k/dt = (n_k nu / R^2) (M - z_k). Linear in averages of cells, so exact for th
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import I_FLOATS, I_PIPES, I_SCRATCH
 
 
@@ -48,8 +49,9 @@ def difference(r, l, flow):
 
 
 @njit
-def remember_linear(y, dydt, tables):
+def remember_linear(t, y, dydt, out, handle):
     """Unsteady friction of all pipes under the linear law, added to rates, where there are any."""
+    tables = open_tables(handle)
     pipes, floats, scratch = tables[I_PIPES], tables[I_FLOATS], tables[I_SCRATCH]
     for i in range(pipes.size):
         pipe = pipes[i]

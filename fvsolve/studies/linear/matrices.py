@@ -29,7 +29,7 @@ def responses(model, t: float, y: np.ndarray, outputs: int) -> np.ndarray:
     if outputs == 0:
         return dydt
     values = np.zeros(len(model.probes))
-    model.functions()[1](float(t), np.ascontiguousarray(y), out, model.handle, values)
+    model.functions.observe(float(t), np.ascontiguousarray(y), out, model.handle, values)
     return np.concatenate([dydt, values[:outputs]])
 
 

@@ -1,0 +1,150 @@
+"""Calls of compiled functions by their addresses, so that each is compiled once and a scene is a list of them.
+
+Numba compiles whatever a function calls into it again; an address ends that. All pieces of a job take the same
+arguments: `t, y, dydt, out, handle` and, where they read a state, the vector that they fill. What they raise is lost.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import I_CALLS, I_SPARE
+
+# Jobs: rows of `calls`, each ended by a zero. CLOSE is what event functions want to have run before them.
+RHS, OBSERVE, RECORD, EVENTS, POWER, STORED, CLOSE, JOBS = range(8)
+RATES, READS, ENERGIES = "tvvvh", "tvvhv", "tvvvhv"  # arguments: times, vectors, handles
+ARGUMENTS = {
+    RHS: RATES, CLOSE: RATES, OBSERVE: READS, RECORD: READS, EVENTS: READS, POWER: ENERGIES, STORED: ENERGIES
+}  # fmt: skip
+COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+
+
+def argument_types(letters: str) -> tuple:
+    """Numba's types of arguments that are times (t), vectors (v) and a handle (h)."""
+    from numba import types
+
+    kinds = {"t": types.float64, "v": types.float64[::1], "h": types.int64[::1]}
+    return tuple(kinds[letter] for letter in letters)
+
+
+def compile_as(function, letters: str) -> None:
+    """Compile for arguments of these kinds, and for no others."""
+    if hasattr(function, "compile") and not function.overloads:
+        function.compile(argument_types(letters))
+        function.disable_compile()
+
+
+def listed(functions: list, letters: str) -> list:
+    """The functions, compiled, as a row of `calls` holds them: addresses, or themselves where JIT is off."""
+    for function in functions:
+        compile_as(function, letters)
+    return [address_of(function) if COMPILING else function for function in functions]
+
+
+def address_of(function) -> int:
+    """Where the machine code of a function of one signature lies; it stays there as long as the function does."""
+    (compiled,) = function.overloads.values()
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
+
+def empty_calls(longest: int) -> np.ndarray:
+    """Room for rows of so many functions."""
+    return np.zeros((JOBS, longest + 1), dtype=np.int64 if COMPILING else object)
+
+
+if COMPILING:
+    from numba.core import types
+    from numba.extending import intrinsic
+
+    def called(context, builder, kind, args):
+        """Machine code of a call whose first argument is the address."""
+        shape = context.call_conv.get_function_type(types.none, kind.args[1:])
+        pointer = builder.inttoptr(args[0], shape.as_pointer())
+        context.call_conv.call_function(builder, pointer, types.none, kind.args[1:], args[1:])
+        return context.get_dummy_value()
+
+    @intrinsic
+    def call_rates(typingctx, address, t, y, dydt, out, handle):
+        """Call the function at an address."""
+        return types.none(types.int64, *argument_types(RATES)), called
+
+    @intrinsic
+    def call_reader(typingctx, address, t, y, out, handle, values):
+        """Call the function at an address."""
+        return types.none(types.int64, *argument_types(READS)), called
+
+    @intrinsic
+    def call_energies(typingctx, address, t, y, dydt, out, handle, rows):
+        """Call the function at an address."""
+        return types.none(types.int64, *argument_types(ENERGIES)), called
+else:
+
+    def call_rates(function, *arguments):
+        """Call a function."""
+        function(*arguments)
+
+    call_reader = call_energies = call_rates
+
+
+@njit
+def rhs_in_turn(t, y, dydt, out, handle):
+    """Every piece of the right-hand side."""
+    calls, k = open_tables(handle)[I_CALLS], 0
+    while calls[RHS, k] != 0:
+        call_rates(calls[RHS, k], t, y, dydt, out, handle)
+        k += 1
+
+
+@njit
+def observe_in_turn(t, y, out, handle, values):
+    """Every piece that reads probes."""
+    calls, k = open_tables(handle)[I_CALLS], 0
+    while calls[OBSERVE, k] != 0:
+        call_reader(calls[OBSERVE, k], t, y, out, handle, values)
+        k += 1
+
+
+@njit
+def record_in_turn(t, y, out, handle, values):
+    """Every piece that notes an accepted state, after the probes are read."""
+    calls, k = open_tables(handle)[I_CALLS], 0
+    observe_in_turn(t, y, out, handle, values)
+    while calls[RECORD, k] != 0:
+        call_reader(calls[RECORD, k], t, y, out, handle, values)
+        k += 1
+
+
+@njit
+def events_in_turn(t, y, handle, g):
+    """Every piece of the event functions, from a state whose nodes are closed first where that matters."""
+    tables, k = open_tables(handle), 0
+    calls, out = tables[I_CALLS], tables[I_SPARE]
+    while calls[CLOSE, k] != 0:
+        call_rates(calls[CLOSE, k], t, y, y[:0], out, handle)
+        k += 1
+    k = 0
+    while calls[EVENTS, k] != 0:
+        call_reader(calls[EVENTS, k], t, y, out, handle, g)
+        k += 1
+
+
+@njit
+def power_in_turn(t, y, dydt, out, handle, power):
+    """Every piece that fills `power`."""
+    calls, k = open_tables(handle)[I_CALLS], 0
+    while calls[POWER, k] != 0:
+        call_energies(calls[POWER, k], t, y, dydt, out, handle, power)
+        k += 1
+
+
+@njit
+def stored_in_turn(t, y, dydt, out, handle, stored):
+    """Every piece that fills `stored`."""
+    calls, k = open_tables(handle)[I_CALLS], 0
+    while calls[STORED, k] != 0:
+        call_energies(calls[STORED, k], t, y, dydt, out, handle, stored)
+        k += 1

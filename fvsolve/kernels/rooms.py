@@ -1,0 +1,96 @@
+"""Which functions each room of a scene adds to which job, and in which order. Knows names; knows no law."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+
+from fvsolve.kernels.devices.loops import loops_of
+
+HOME = "fvsolve.kernels"
+
+
+@dataclass(frozen=True)
+class Room:
+    """Functions as `module: function`, "" for none.
+
+    before : sets what the nodes are closed with; core : closes them; after : adds to rates
+    observe : reads probes; record : notes an accepted state; events : event functions
+    """
+
+    before: str = ""
+    core: str = ""
+    after: str = ""
+    observe: str = ""
+    record: str = ""
+    events: str = ""
+    power: str = ""
+    stored: str = ""
+
+
+LINEAR = {
+    "observe": "observer: observe_linear", "power": "energy: power_linear", "stored": "energy: stored_linear",
+}  # fmt: skip
+BAROTROPIC = {
+    "observe": "barotropic: observe_barotropic",
+    "power": "energy_barotropic: power_barotropic", "stored": "energy_barotropic: stored_barotropic",
+}  # fmt: skip
+FLUIDS = {  # (family of the density law, whether there are pipes)
+    ("linear", True): Room(core="network: rhs_linear", **LINEAR),
+    ("linear", False): Room(core="lumped: rhs_lumped_linear", **LINEAR),
+    ("barotropic", True): Room(core="barotropic: rhs_barotropic", **BAROTROPIC),
+    ("barotropic", False): Room(core="barotropic_lumped: rhs_lumped_barotropic", **BAROTROPIC),
+    ("cavitating", True): Room(
+        core="cavitating: rhs_cavitating", record="cavitating: record_cavities", **BAROTROPIC
+    ),
+}  # fmt: skip
+MEMORY = {"power": "unsteady.energy: add_power", "stored": "unsteady.energy: add_stored"}
+ROOMS = {  # in the order in which they are called
+    "bodies": Room(
+        before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
+        record="mechanics: record_bodies", events="mechanics: body_events",
+    ),
+    "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
+    "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
+}  # fmt: skip
+ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What decides which functions a scene is made of.
+
+    law : of the fluid; cavities : whether it knows them; kinds : codes of the devices that there are
+    """
+
+    law: str
+    pipes: bool
+    cavities: bool = False
+    bodies: bool = False
+    memory: bool = False
+    kinds: tuple[int, ...] = ()
+
+    def rooms(self) -> Iterator[Room]:
+        """Its rooms, in order."""
+        linear = self.law == "linear"
+        family = "linear" if linear else "cavitating" if self.cavities and self.pipes else "barotropic"
+        yield FLUIDS[family, self.pipes]
+        if self.bodies:
+            yield ROOMS["bodies"]
+        for kind in self.kinds:
+            loops = loops_of(kind)
+            yield Room(**{job: f"{loops.__name__}: {job}" for job in vars(Room()) if hasattr(loops, job)})
+        if self.memory:
+            yield ROOMS["memory" if linear else "memory, barotropic"]
+        yield ALWAYS
+
+    def functions(self, *jobs: str) -> list:
+        """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""
+        return [found(name) for job in jobs for room in self.rooms() if (name := getattr(room, job))]
+
+
+def found(name: str):
+    """The function of a name."""
+    module, function = name.split(": ")
+    return getattr(import_module(module if module.startswith(HOME) else f"{HOME}.{module}"), function)
