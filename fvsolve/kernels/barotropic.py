@@ -8,12 +8,10 @@ solution with the reference wave speed c), less the profile's.
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import (
     close_nodes_barotropic,
-    drive,
-    hold_columns_barotropic,
     stored_pressures_barotropic,
     waves_inside,
 )
-from fvsolve.kernels.columns import column_inflows, column_rate
+from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -27,7 +25,6 @@ from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
-    I_COLUMNS,
     I_FLOATS,
     I_LAYOUT,
     I_NODES,
@@ -100,24 +97,6 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 
 @njit
-def column_rates_barotropic(t, dydt, out, tables):
-    """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
-    st, layout, nodes, columns = (
-        tables[I_SETTINGS][0],
-        tables[I_LAYOUT][0],
-        tables[I_NODES],
-        tables[I_COLUMNS],
-    )
-    for k in range(columns.size):
-        column = columns[k]
-        i, j = column["from_node"], column["to_node"]
-        p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
-        p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
-        now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
-        dydt[column["y"]] = column_rate(t, tables, out, k, now - column["base"])
-
-
-@njit
 def rhs_barotropic(t, y, dydt, out, handle):
     """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch.
 
@@ -131,23 +110,23 @@ def rhs_barotropic(t, y, dydt, out, handle):
     waves_inside(y, out, tables)
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
-    column_inflows(t, y, out, tables)
+    run(INFLOWS, t, y, dydt, out, handle)
     close_nodes_barotropic(t, y, out, tables)
-    hold_columns_barotropic(t, out, tables)
+    run(HOLD, t, y, dydt, out, handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = rate = greatest_rate(t, out, tables)
+    out[RATE] = greatest_rate(out, tables)
+    run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return
-    column_rates_barotropic(t, dydt, out, tables)
+    run(MOVE, t, y, dydt, out, handle)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         own = pipe_rates_barotropic(
             st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch,
             dydt[o : o + n], dydt[o + n : o + 2 * n],
         )  # fmt: skip
-        rate = max(rate, own)
-    out[RATE] = rate
+        out[RATE] = max(out[RATE], own)
 
 
 @njit

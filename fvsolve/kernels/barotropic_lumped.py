@@ -1,13 +1,11 @@
 """Scenes without a pipe under the density laws log and table. Knows the tables."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic import column_rates_barotropic
 from fvsolve.kernels.barotropic_nodes import (
     close_nodes_barotropic,
-    hold_columns_barotropic,
     stored_pressures_barotropic,
 )
-from fvsolve.kernels.columns import column_inflows
+from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
 from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
@@ -22,11 +20,12 @@ def rhs_lumped_barotropic(t, y, dydt, out, handle):
     open_scheduled(t, out, tables)
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
-    column_inflows(t, y, out, tables)
+    run(INFLOWS, t, y, dydt, out, handle)
     close_nodes_barotropic(t, y, out, tables)
-    hold_columns_barotropic(t, out, tables)
+    run(HOLD, t, y, dydt, out, handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(t, out, tables)
+    out[RATE] = greatest_rate(out, tables)
+    run(BRAKE, t, y, dydt, out, handle)
     if dydt.size > 0:
-        column_rates_barotropic(t, dydt, out, tables)
+        run(MOVE, t, y, dydt, out, handle)

@@ -19,7 +19,6 @@ from fvsolve.kernels.clusters import (
     solve_dense,
     whole_inflows,
 )
-from fvsolve.kernels.columns import gate_area, led_end
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -40,7 +39,6 @@ from fvsolve.kernels.records import (
     CURVE,
     FIXED,
     I_CLUSTERS,
-    I_COLUMNS,
     I_FLOATS,
     I_INTEGERS,
     I_LAYOUT,
@@ -371,20 +369,3 @@ def close_nodes_barotropic(t, y, out, tables):
             break
     finish_clusters(out, tables, space, moved)
     ends_into_nodes(out, tables, space[0], True)
-
-
-@njit
-def hold_columns_barotropic(t, out, tables):
-    """Give the node at the shut end of a standing column the enthalpy of its other end, less the height."""
-    st, nodes, floats = tables[I_SETTINGS][0], tables[I_NODES], tables[I_FLOATS]
-    pressure = tables[I_LAYOUT][0]["pressure"]
-    for k in range(tables[I_COLUMNS].size):
-        column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
-        x = column["to_node"] if end == 1 else column["from_node"]
-        if end != 0 and gate_area(tables, out, x)[0] == 0.0:
-            i, j = column["from_node"], column["to_node"]
-            if end == -1:
-                i, j = j, i
-            rise = st["gravity"] * (nodes[j]["elevation"] - nodes[i]["elevation"])
-            h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
-            out[pressure + j] = pressure_of_enthalpy(st, floats, h - rise) - nodes[j]["pressure"]

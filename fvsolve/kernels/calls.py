@@ -14,12 +14,12 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import I_CALLS, I_SPARE
 
-# Jobs: rows of `calls`, each ended by a zero. CLOSE is what event functions want to have run before them.
-RHS, OBSERVE, RECORD, EVENTS, POWER, STORED, CLOSE, JOBS = range(8)
+# Jobs: rows of `calls`, each ended by a zero. CLOSE is what event functions want to have run before them; within the
+# right-hand side, CLUSTERS closes nodes that several valves join, and the others see to rigid columns.
+RHS, OBSERVE, RECORD, EVENTS, POWER, STORED, CLOSE, CLUSTERS, INFLOWS, HOLD, MOVE, BRAKE, JOBS = range(13)
 RATES, READS, ENERGIES = "tvvvh", "tvvhv", "tvvvhv"  # arguments: times, vectors, handles
-ARGUMENTS = {
-    RHS: RATES, CLOSE: RATES, OBSERVE: READS, RECORD: READS, EVENTS: READS, POWER: ENERGIES, STORED: ENERGIES
-}  # fmt: skip
+ARGUMENTS = dict.fromkeys((RHS, CLOSE, CLUSTERS, INFLOWS, HOLD, MOVE, BRAKE), RATES)
+ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
@@ -90,13 +90,19 @@ else:
     call_reader = call_energies = call_rates
 
 
+@njit(forceinline=True)
+def run(job, t, y, dydt, out, handle):
+    """Every piece of a job that takes part in the right-hand side."""
+    calls, k = open_tables(handle)[I_CALLS], 0
+    while calls[job, k] != 0:
+        call_rates(calls[job, k], t, y, dydt, out, handle)
+        k += 1
+
+
 @njit
 def rhs_in_turn(t, y, dydt, out, handle):
     """Every piece of the right-hand side."""
-    calls, k = open_tables(handle)[I_CALLS], 0
-    while calls[RHS, k] != 0:
-        call_rates(calls[RHS, k], t, y, dydt, out, handle)
-        k += 1
+    run(RHS, t, y, dydt, out, handle)
 
 
 @njit
@@ -123,10 +129,7 @@ def events_in_turn(t, y, handle, g):
     """Every piece of the event functions, from a state whose nodes are closed first where that matters."""
     tables, k = open_tables(handle), 0
     calls, out = tables[I_CALLS], tables[I_SPARE]
-    while calls[CLOSE, k] != 0:
-        call_rates(calls[CLOSE, k], t, y, y[:0], out, handle)
-        k += 1
-    k = 0
+    run(CLOSE, t, y, y[:0], out, handle)
     while calls[EVENTS, k] != 0:
         call_reader(calls[EVENTS, k], t, y, out, handle, g)
         k += 1

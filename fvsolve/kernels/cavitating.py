@@ -8,10 +8,10 @@ profile's; so a front moves at its own speed, be it sound's in the liquid or a c
 from math import exp
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic import column_rates_barotropic, wall_force
-from fvsolve.kernels.barotropic_nodes import hold_columns_barotropic, stored_pressures_barotropic
+from fvsolve.kernels.barotropic import wall_force
+from fvsolve.kernels.barotropic_nodes import stored_pressures_barotropic
+from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.cavitating_nodes import balance_junctions, close_nodes_cavitating
-from fvsolve.kernels.columns import column_inflows
 from fvsolve.kernels.density import local_speed, log_density, pressure_of_mass, thrust
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_volume
@@ -176,24 +176,24 @@ def rhs_cavitating(t, y, dydt, out, handle):
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
     soften_chambers(out, tables)
-    column_inflows(t, y, out, tables)
+    run(INFLOWS, t, y, dydt, out, handle)
     close_nodes_cavitating(t, y, out, tables)
-    hold_columns_barotropic(t, out, tables)
+    run(HOLD, t, y, dydt, out, handle)
     net_flows(out, tables)
     balance_junctions(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = rate = greatest_rate(t, out, tables)
+    out[RATE] = greatest_rate(out, tables)
+    run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return
-    column_rates_barotropic(t, dydt, out, tables)
+    run(MOVE, t, y, dydt, out, handle)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         own = pipe_rates_cavitating(
             st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch,
             dydt[o : o + n], dydt[o + n : o + 2 * n],
         )  # fmt: skip
-        rate = max(rate, own)
-    out[RATE] = rate
+        out[RATE] = max(out[RATE], own)
 
 
 @njit

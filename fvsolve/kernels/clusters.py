@@ -8,6 +8,7 @@ shuts, a deviation would keep nothing but its rounding. Where nothing has change
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.isolated import check_unserved, find_held, float_shut, inner_row
 from fvsolve.kernels.records import (
     I_CLUSTERS,
@@ -248,3 +249,11 @@ def finish(cluster, tables, out, g, m, c, held, group, moved):
             float_shut(cluster, tables, out, g, held, group)
             check_unserved(cluster, tables, out, c, held, group, scale)
             return
+
+
+@njit
+def close_clusters(t, y, dydt, out, handle):
+    """Pressures of the nodes of all clusters and flows of their valves."""
+    tables = open_tables(handle)
+    for which in range(tables[I_CLUSTERS].size):
+        close_cluster(out, tables, which)

@@ -10,7 +10,8 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.friction import drag
-from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_SETTINGS, I_VALVES, JUNCTION
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_SETTINGS, I_VALVES, JUNCTION, RATE
 from fvsolve.kernels.restrictions import conductance, conductance_at, restriction_slope
 
 NEARLY = 1e-3  # share of their full area below which valves lead their column
@@ -103,8 +104,9 @@ def led_flow(t, tables, out, k, end, solved):
 
 
 @njit
-def column_inflows(t, y, out, tables):
+def column_inflows(t, y, dydt, out, handle):
     """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
+    tables = open_tables(handle)
     layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
     for k in range(columns.size):
         column, end = columns[k], led_end(tables, out, k)
@@ -117,8 +119,9 @@ def column_inflows(t, y, out, tables):
 
 
 @njit
-def hold_columns(t, out, tables):
+def hold_columns(t, y, dydt, out, handle):
     """Give the node at the shut end of a standing column the pressure that drives no flow through it."""
+    tables = open_tables(handle)
     pressure = tables[I_LAYOUT][0]["pressure"]
     for k in range(tables[I_COLUMNS].size):
         end = led_end(tables, out, k)
@@ -129,8 +132,9 @@ def hold_columns(t, out, tables):
 
 
 @njit
-def column_rates(t, dydt, out, tables):
+def column_rates(t, y, dydt, out, handle):
     """d/dt of the flow in rigid columns under the linear law."""
+    tables = open_tables(handle)
     columns, pressure = tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
     for k in range(columns.size):
         column = columns[k]
@@ -156,10 +160,10 @@ def column_drag(column, flow):
 
 
 @njit
-def quickest_column(t, out, tables):
-    """Greatest rate [1/s] at which valves alone brake a column: (A / L) dp / dM."""
+def quickest_column(t, y, dydt, out, handle):
+    """Greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM, into out[RATE]."""
+    tables = open_tables(handle)
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    rate = 0.0
     for k in range(tables[I_COLUMNS].size):
         column = tables[I_COLUMNS][k]
         for side in range(2):
@@ -171,5 +175,4 @@ def quickest_column(t, out, tables):
                 drop -= out[layout["pressure"] + valves[which]["to_node"]]
                 slope += restriction_slope(tables, out, which, drop)
             if slope > 0.0 and led_end(tables, out, k) == 0:
-                rate = max(rate, column["area"] / column["length"] / slope)
-    return rate
+                out[RATE] = max(out[RATE], column["area"] / column["length"] / slope)

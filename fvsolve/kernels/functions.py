@@ -8,6 +8,7 @@ from fvsolve.kernels.rooms import Scene
 
 READERS = "from fvsolve.kernels.functions import Scene, compile_readers; "
 MARCH = "from fvsolve.steppers.march import compiled; compiled()"
+INSIDE = {getattr(calls, name.upper()): name for name in ("clusters", "inflows", "hold", "move", "brake")}
 
 
 class Functions:
@@ -21,6 +22,8 @@ class Functions:
         self.calls = calls.empty_calls(len(rates) + 2)
         with beside(f"{READERS}compile_readers({scene!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.one(calls.RHS, rates, calls.rhs_in_turn)
+        for job, name in INSIDE.items():
+            self.enter(job, scene.functions(name))
         if scene.kinds:  # their events are read off closed nodes
             self.enter(calls.CLOSE, scene.functions("before", "core"))
         self.observe = self.one(calls.OBSERVE, scene.functions("observe"), calls.observe_in_turn)

@@ -6,8 +6,8 @@ are the same in the same order, so the bits are too.
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.calls import RHS, run
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import rhs_linear
 from fvsolve.kernels.observer import note, observe_linear, record_nodes
 from fvsolve.kernels.records import (
     I_ENVELOPE,
@@ -68,7 +68,7 @@ def leap_linear(t, h, y, y_new, out, handle, values):
         for i in range(1, n - 1, BLOCK):
             j = min(i + BLOCK, n - 1)
             bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
-    rhs_linear(t, y_new, y_new[:0], out, handle)
+    run(RHS, t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)
     record_nodes(t, out, tables, values)
     if bad > 0:

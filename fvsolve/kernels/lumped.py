@@ -1,7 +1,7 @@
 """The right-hand side of scenes without a pipe, so that nothing of the pipes' room is compiled. Knows the tables."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.columns import column_rates
+from fvsolve.kernels.calls import BRAKE, MOVE, run
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
 from fvsolve.kernels.nodes import close_nodes
@@ -16,9 +16,10 @@ def rhs_lumped_linear(t, y, dydt, out, handle):
     out[STATUS], out[WHERE] = OK, -1.0
     open_scheduled(t, out, tables)
     clear_net(out, tables)
-    close_nodes(t, y, out, tables)
+    close_nodes(t, y, dydt, out, handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(t, out, tables)
+    out[RATE] = greatest_rate(out, tables)
+    run(BRAKE, t, y, dydt, out, handle)
     if dydt.size > 0:
-        column_rates(t, dydt, out, tables)
+        run(MOVE, t, y, dydt, out, handle)

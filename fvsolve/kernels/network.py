@@ -5,7 +5,7 @@ out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.columns import column_rates, quickest_column
+from fvsolve.kernels.calls import BRAKE, MOVE, run
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.nodes import close_nodes
@@ -127,10 +127,10 @@ def stored_rates(y, dydt, out, tables):
 
 
 @njit(forceinline=True)
-def greatest_rate(t, out, tables):
+def greatest_rate(out, tables):
     """Greatest rate of the scene [1/s]: waves over cells, and stored masses against what touches them."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    rate = max(tables[I_SETTINGS][0]["rate"], quickest_column(t, out, tables))
+    rate = tables[I_SETTINGS][0]["rate"]
     for i in range(nodes.size):
         if nodes[i]["kind"] != FIXED and nodes[i]["kind"] != JUNCTION:
             rate = max(rate, stiffness_of(nodes, layout, out, i) * nodes[i]["admittance"])
@@ -168,14 +168,15 @@ def rhs_linear(t, y, dydt, out, handle):
     out[STATUS], out[WHERE] = OK, -1.0
     open_scheduled(t, out, tables)
     waves_out(y, out, tables)
-    close_nodes(t, y, out, tables)
+    close_nodes(t, y, dydt, out, handle)
     waves_in(out, tables)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(t, out, tables)
+    out[RATE] = greatest_rate(out, tables)
+    run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return
-    column_rates(t, dydt, out, tables)
+    run(MOVE, t, y, dydt, out, handle)
     for i in range(pipes.size):
         pipe = pipes[i]
         n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i

@@ -5,14 +5,13 @@ Y = area / speed. A node without storage makes these and the flows of its other 
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.clusters import close_cluster
-from fvsolve.kernels.columns import column_inflows, hold_columns
+from fvsolve.kernels.calls import CLUSTERS, HOLD, INFLOWS, run
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
     ALONE,
     CHAMBER,
     CLUSTER,
     FIXED,
-    I_CLUSTERS,
     I_FLOATS,
     I_LAYOUT,
     I_NODES,
@@ -48,7 +47,7 @@ def stored_pressures(t, y, out, tables):
 
 
 @njit(forceinline=True)
-def junction_flows(t, y, out, tables):
+def junction_flows(t, out, tables):
     """Change of flow into each node without storage at p' = 0, less its demand; kept in out[net]."""
     layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
     for i in range(nodes.size):
@@ -56,7 +55,6 @@ def junction_flows(t, y, out, tables):
             demand = schedule_value(tables, nodes[i]["schedule"], t)
             out[layout["supply"] + i] = -demand
             out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
-    column_inflows(t, y, out, tables)
 
 
 @njit(forceinline=True)
@@ -102,12 +100,13 @@ def close_single(out, tables):
 
 
 @njit(forceinline=True)
-def close_nodes(t, y, out, tables):
+def close_nodes(t, y, dydt, out, handle):
     """Pressure deviation of every node and flow of every valve, from out[net] and the stored masses."""
+    tables = open_tables(handle)
     stored_pressures(t, y, out, tables)
-    junction_flows(t, y, out, tables)
+    junction_flows(t, out, tables)
+    run(INFLOWS, t, y, dydt, out, handle)
     close_alone(out, tables)
     close_single(out, tables)
-    for which in range(tables[I_CLUSTERS].size):
-        close_cluster(out, tables, which)
-    hold_columns(t, out, tables)
+    run(CLUSTERS, t, y, dydt, out, handle)
+    run(HOLD, t, y, dydt, out, handle)

@@ -15,13 +15,19 @@ HOME = "fvsolve.kernels"
 class Room:
     """Functions as `module: function`, "" for none.
 
-    before : sets what the nodes are closed with; core : closes them; after : adds to rates
+    before : sets what the nodes are closed with; core : closes them; after : adds to rates; of the core's own parts,
+    clusters : of nodes that several valves join; inflows, hold, move, brake : of rigid columns
     observe : reads probes; record : notes an accepted state; events : event functions
     """
 
     before: str = ""
     core: str = ""
     after: str = ""
+    clusters: str = ""
+    inflows: str = ""
+    hold: str = ""
+    move: str = ""
+    brake: str = ""
     observe: str = ""
     record: str = ""
     events: str = ""
@@ -46,7 +52,14 @@ FLUIDS = {  # (family of the density law, whether there are pipes)
     ),
 }  # fmt: skip
 MEMORY = {"power": "unsteady.energy: add_power", "stored": "unsteady.energy: add_stored"}
-ROOMS = {  # in the order in which they are called
+COLUMNS = {"inflows": "columns: column_inflows", "brake": "columns: quickest_column"}
+ROOMS = {
+    "clusters": Room(clusters="clusters: close_clusters"),
+    "columns": Room(hold="columns: hold_columns", move="columns: column_rates", **COLUMNS),
+    "columns, barotropic": Room(
+        hold="barotropic_columns: hold_columns_barotropic", move="barotropic_columns: column_rates_barotropic",
+        **COLUMNS,
+    ),
     "bodies": Room(
         before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
@@ -67,6 +80,8 @@ class Scene:
     law: str
     pipes: bool
     cavities: bool = False
+    clusters: bool = False
+    columns: bool = False
     bodies: bool = False
     memory: bool = False
     kinds: tuple[int, ...] = ()
@@ -76,6 +91,10 @@ class Scene:
         linear = self.law == "linear"
         family = "linear" if linear else "cavitating" if self.cavities and self.pipes else "barotropic"
         yield FLUIDS[family, self.pipes]
+        if self.clusters and linear:
+            yield ROOMS["clusters"]
+        if self.columns:
+            yield ROOMS["columns" if linear else "columns, barotropic"]
         if self.bodies:
             yield ROOMS["bodies"]
         for kind in self.kinds:

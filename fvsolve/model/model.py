@@ -96,11 +96,9 @@ class Model:
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.rooms import Scene
 
-        kinds = np.unique(self.tables[rec.I_DEVICES]["kind"])
-        bodies, law = len(self.tables[rec.I_BODIES]) > 0, self.case.fluid.law
-        return functions(
-            Scene(law, self.cells > 0, self.cavitates, bodies, self.unsteady, tuple(int(kind) for kind in kinds))
-        )
+        kinds = tuple(int(kind) for kind in np.unique(self.tables[rec.I_DEVICES]["kind"]))
+        there = [len(self.tables[at]) > 0 for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
+        return functions(Scene(self.case.fluid.law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds))
 
     @property
     def layout(self):
