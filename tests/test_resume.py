@@ -71,24 +71,27 @@ def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, nume
     script.write_text(OFTEN)
     whole = fvsolve.run(case, out=tmp_path / "whole")
     assert whole.ok, whole.reason
-    file, broken, kills = tmp_path / "whole" / "case.toml", tmp_path / "broken", 0
+    file, broken, reached = tmp_path / "whole" / "case.toml", tmp_path / "broken", 0.0
     for _ in range(KILLS):
+        wanted = reached + moments.uniform(0.0, 0.3) * whole.t[-1]
         running = started(script, file, broken)
-        wait_for_a_run(broken, running)
-        time.sleep(moments.uniform(0.25, 0.5) * whole.summary["seconds"])
+        while running.poll() is None and checkpoint(broken) <= wanted:
+            time.sleep(0.001)
         running.kill()
         running.communicate()
-        with np.load(broken / "restart.npz") as kept:
-            kills += running.returncode != 0 and 0.0 < kept["t"] < whole.t[-1]
+        before, reached = reached, checkpoint(broken)
+        assert running.returncode != 0 and before <= wanted < reached < whole.t[-1]  # in the midst of the run
     said = started(script, file, broken).communicate()
     assert said == ("finished\n", "")
-    assert kills  # at least one of them in the midst of the run
     same_files(tmp_path / "whole", broken)
 
 
-def wait_for_a_run(folder: Path, running: subprocess.Popen) -> None:
-    while running.poll() is None and not (folder / "restart.npz").exists():
-        time.sleep(0.005)
+def checkpoint(folder: Path) -> float:
+    """Time up to which a run could be resumed [s], 0 before the first checkpoint."""
+    if not (folder / "restart.npz").exists():
+        return 0.0
+    with np.load(folder / "restart.npz") as kept:
+        return float(kept["t"])
 
 
 def test_a_later_end_goes_on_to_the_longer_run(tmp_path):
