@@ -201,6 +201,24 @@ def test_valves_of_every_kind_stand_as_epanets_do(kind, tmp_path):
     assert tomllib.loads(made.text)["links"]["v1"]["type"] == word
 
 
+def test_a_valve_that_drives_its_flow_uphill_is_listed(tmp_path):
+    """EPANET keeps the drop of a PBV at its setting whichever way it flows: from c to a it then gives what it takes."""
+    path = tmp_path / "in" / "valve.inp"
+    path.parent.mkdir()
+    text = SMALL.format(r=110, formula="H-W").replace("p4 a c 500 150 110 0 Open\n", "")
+    path.write_text(text.replace("[VALVES]", "[VALVES]\nv1 a c 150 PBV 30 0"))
+    made = differences(path, 0, tmp_path)[2]
+    assert ["v1"] in [names for what, names in made.notes if what.startswith("PBV raises heads along its flow")]
+
+
+def test_a_file_that_wntr_alone_refuses_is_not_laid_at_epanets_door(tmp_path, fvs):
+    path = tmp_path / "rule.inp"
+    rule = "[RULES]\nRULE 1\nIF SYSTEM CLOCKTIME >= 2 AM\nTHEN PIPE p4 STATUS IS CLOSED\n[VALVES]"
+    path.write_text(SMALL.format(r=110, formula="H-W").replace("[VALVES]", rule))
+    code, _, err = fvs("new", "x", tmp_path / "x.toml", "--from", path)
+    assert code == 2 and "as WNTR, which reads it for us, says" in err and "'2 AM'" in err
+
+
 def test_cells_grow_only_where_there_would_be_too_many():
     assert cell_time([1e4, 2e4], 1200.0) == 0.01
     assert cell_time([1e6], 1000.0) == 0.025

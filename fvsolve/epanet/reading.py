@@ -65,9 +65,9 @@ def read_network(path: Path) -> Any:
             found, faults = package.network.WaterNetworkModel(str(path)), []
     except Exception as error:  # WNTR raises whatever its parser stumbles over
         faults = [_innermost(error)]
-    faults += _listed(package, path)  # WNTR lets some pass, for example a pattern that is nowhere
-    if faults:
-        raise FvsolveError(_said(path, faults if found is None else ["", *faults]))
+    listed = _listed(package, path)  # of what WNTR lets pass too, for example a pattern that is nowhere
+    if faults or listed:
+        raise FvsolveError(_said(path, listed or faults, "EPANET" if listed else "WNTR, which reads it for us,"))
     return found
 
 
@@ -89,7 +89,8 @@ def state_at(network: Any, hour: float) -> Hour:
             found = simulator.run_sim(file_prefix=str(Path(folder) / "net"), convergence_error=True)
         except Exception as error:
             report = Path(folder) / "net.rpt"
-            raise FvsolveError(_said(Path(network.name), [_innermost(error), *_complaints(report)])) from None
+            said = _complaints(report) or [_innermost(error)]
+            raise FvsolveError(_said(Path(network.name), said, "EPANET")) from None
     if seconds not in found.node["head"].index:
         raise FvsolveError(f"{network.name}: EPANET's run holds no hour {hour:g}")
     rows = [
@@ -106,16 +107,18 @@ def _innermost(error: BaseException) -> str:
     while chain[-1].__cause__ is not None:
         chain.append(chain[-1].__cause__)
     coded = [one for one in chain if "(Error " in str(one)]
-    said = str(coded[-1] if coded else chain[-1]).strip("\"'").replace("%s", "").replace(" ()", "")
+    said = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")
+    if said[:1] == said[-1:] and said[:1] in "\"'":
+        said = said[1:-1]
     if not coded and isinstance(chain[-1], KeyError):
         said = f"WNTR does not know {said!r}"
     return re.sub(r"\s+", " ", re.sub(r"^\(Error \d+\) ", "", said)).strip()
 
 
-def _said(path: Path, faults: list[str]) -> str:
-    """One message with every fault once; what EPANET lists says what WNTR found, and more."""
-    faults = list(dict.fromkeys(faults[1:] or faults[:1]))
-    head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, as EPANET says"
+def _said(path: Path, faults: list[str], who: str) -> str:
+    """One message with every fault once."""
+    faults = list(dict.fromkeys(faults))
+    head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, as {who} says"
     return "\n".join([head, *(f"  {fault}" for fault in faults)])
 
 

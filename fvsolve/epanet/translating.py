@@ -168,12 +168,14 @@ class Translation:
             self.note(f"{kind} is shut at this hour: a shut valve", name)
             return words.valve(ends, diameter, 0.0, opening=0.0)
         flow = self.hour.flow[name]
-        drop = abs(self.hour.head[link.start_node_name] - self.hour.head[link.end_node_name])
+        drop = self.hour.head[link.start_node_name] - self.hour.head[link.end_node_name]
         if kind == "TCV" and status == ACTIVE:
             return words.valve(ends, diameter, self.hour.setting[name])
-        if kind in ("PBV", "GPV") and flow and drop:
+        if kind in ("PBV", "GPV") and flow * drop < 0.0:
+            self.note(f"{kind} raises heads along its flow, as no valve does: an open valve, and heads differ", name)
+        elif kind in ("PBV", "GPV") and flow and drop:
             self.note(f"{kind}: a valve that stays as it stands at this hour", name)
-            return words.valve(ends, diameter, words.loss_of(drop, flow, diameter))
+            return words.valve(ends, diameter, words.loss_of(abs(drop), flow, diameter))
         return words.valve(ends, diameter, link.minor_loss)
 
     def bore(self, link: Any, otherwise: float = 0.1) -> float:
