@@ -201,6 +201,17 @@ def test_valves_of_every_kind_stand_as_epanets_do(kind, tmp_path):
     assert tomllib.loads(made.text)["links"]["v1"]["type"] == word
 
 
+@pytest.mark.parametrize("line, opening", [("v1 a c 150 PRV 90 2", 1.0), ("v1 a c 150 PSV 90 0", 0.0)])
+def test_a_valve_set_above_every_source_stands_open_or_shut(line, opening, tmp_path):
+    path = tmp_path / "in" / "valve.inp"
+    path.parent.mkdir()
+    text = SMALL.format(r=110, formula="H-W").replace("p4 a c 500 150 110 0 Open\n", "")
+    path.write_text(text.replace("[VALVES]", f"[VALVES]\n{line}"))
+    lost, off, made = differences(path, 0, tmp_path)
+    assert lost < 5e-3 and off < 1e-3
+    assert tomllib.loads(made.text)["links"]["v1"].get("opening", 1.0) == opening
+
+
 def test_a_valve_that_drives_its_flow_uphill_is_listed(tmp_path):
     """EPANET keeps the drop of a PBV at its setting whichever way it flows: from c to a it then gives what it takes."""
     path = tmp_path / "in" / "valve.inp"

@@ -161,6 +161,9 @@ class Translation:
     def valve(self, name: str, link: Any) -> words.Part:
         ends, kind, status = self.ends(link), link.valve_type, int(self.hour.status[name])
         diameter = self.size(link)
+        if kind in ("PRV", "PSV") and link.initial_status == REGULATES and self.out_of_reach(name, link):
+            self.note(f"{kind} set above every source: {'an open' if kind == 'PRV' else 'a shut'} valve", name)
+            return words.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
         if kind in words.REGULATING and link.initial_status == REGULATES:
             self.note(f"{kind}: EPANET knows no time constant, here {words.TIME_CONSTANT}", name)
             return words.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
@@ -191,6 +194,13 @@ class Translation:
             return link.diameter
         self.note("valve wider than every pipe next to it: as wide as the widest", link.name)
         return widest
+
+    def out_of_reach(self, name: str, link: Any) -> bool:
+        """Whether no reservoir and no tank has the head that a PRV or PSV is to hold, and no pump lifts any water."""
+        network, held = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
+        sources = [*network.reservoir_name_list, *network.tank_name_list]
+        most = max(self.hour.head[source] for source in sources)
+        return not network.num_pumps and self.hour.setting[name] + network.get_node(held).elevation > most
 
     def setting(self, name: str, link: Any) -> float:
         """What a valve holds: a head above its end [m] or a flow [m3/s]; a moved elevation moves it along."""
