@@ -26,6 +26,9 @@ from fvsolve.kernels.records import (
     I_SCRATCH,
     I_SETTINGS,
     JUNCTION,
+    NOT_CONVERGED,
+    STATUS,
+    WHERE,
 )
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
 
@@ -117,13 +120,14 @@ def cavitating_ends(out, tables, slope, final):
 
 @njit
 def hold_back(sweep, out, tables, before, low, high):
-    """Keep Newton's step of every node inside what is known of its root; returns the greatest change, relative.
+    """Keep Newton's step of every node inside what is known of its root; returns (greatest change, relative, whose).
 
-    A node alone in its cluster takes in less the higher its pressure is, so each step bounds its root on one side.
-    Others keep above the floor, and take half steps after a while.
+    A node alone in its cluster takes in less the higher its pressure is, so each step bounds its root on one side;
+    after a while the bounds are halved. Others keep above the floor, and then take half steps.
     """
     st, nodes, clusters = tables[I_SETTINGS][0], tables[I_NODES], tables[I_CLUSTERS]
     pressure, floor, moved = tables[I_LAYOUT][0]["pressure"], st["floor"], 0.0
+    worst = -1
     for which in range(clusters.size):
         for k in range(clusters[which]["nodes"]):
             i = tables[I_INTEGERS][clusters[which]["first_node"] + k]
@@ -133,11 +137,12 @@ def hold_back(sweep, out, tables, before, low, high):
                 q = max(p + 0.5 * (q - p) if sweep > LONG else q, floor + FALL * (p - floor), least)
             elif q != p:
                 low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
-                if not low[i] < q < high[i]:
+                if sweep > LONG or not low[i] < q < high[i]:  # a kink can lead Newton to and fro
                     q = max(between(floor, low[i], high[i], p), least)
             out[pressure + i] = q - base
-            moved = max(moved, abs(q - p) / (1e5 + abs(p)))
-    return moved
+            if abs(q - p) > moved * (1e5 + abs(p)):
+                moved, worst = abs(q - p) / (1e5 + abs(p)), i
+    return moved, worst
 
 
 @njit
@@ -149,16 +154,19 @@ def close_nodes_cavitating(t, y, out, tables):
     low[:], high[:] = tables[I_SETTINGS][0]["floor"], UNBOUNDED
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
-    moved, before = 1e300, 1e300
+    moved, before, worst = 1e300, 1e300, -1
     for sweep in range(1, 101):
         cavitating_ends(out, tables, space[0], False)
         for i in range(n):
             last[i] = out[pressure + i]
         step_clusters(sweep, out, tables, space)
-        before, moved = moved, hold_back(sweep, out, tables, last, low, high)
+        before = moved
+        moved, worst = hold_back(sweep, out, tables, last, low, high)
         if settled(moved, before):
             break
     finish_clusters(out, tables, space, moved)
+    if out[STATUS] == NOT_CONVERGED:
+        out[WHERE] = worst
     cavitating_ends(out, tables, space[0], True)
 
 
