@@ -310,6 +310,14 @@ def test_faults(friction, kind, words):
         fvsolve.load(case)
 
 
+def test_a_weighting_at_a_reynolds_number_wants_one():
+    case = line(0.02, 9)
+    case["nodes"]["gate"]["demand"] = 0.0
+    case["links"]["main"]["friction"] = {"model": "unsteady", "roughness": 1e-5, "weighting": "vardy-brown"}
+    with pytest.raises(CaseError, match="friction.weighting: vardy-brown .* nothing flows there"):
+        fvsolve.build(fvsolve.load(case))
+
+
 def test_it_needs_a_viscosity():
     case = line(0.02, 9)
     case["fluid"] = {key: value for key, value in case["fluid"].items() if key != "viscosity"}

@@ -137,6 +137,10 @@ def add_terms(scene) -> dict[str, dict]:
         unit = 4.0 * fluid.viscosity / (fluid.density * mesh.diameter**2)  # tau per time [1/s]
         reynolds = abs(float(row["flow"])) * mesh.diameter / (float(row["area"]) * fluid.viscosity)
         weighting = law.weighting or ("zielke" if reynolds < LAMINAR else "vardy-brown")
+        if weighting == "vardy-brown" and reynolds == 0.0:
+            what = "vardy-brown is a weighting at the Reynolds number of the start, and nothing flows there"
+            scene.fault(f"links.{name}.friction.weighting", f"{what}; give an initial flow, or zielke")
+            continue
         cell, span = unit * row["dx"] / row["speed"], unit * (numerics.end - numerics.start)
         accuracy = ACCURACY if law.accuracy is None else law.accuracy
         try:

@@ -242,7 +242,15 @@ class Run:
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:
-        """Where, when and what to try."""
+        """Where, when and what to try; gas that expands far is more than the mixture law alone can follow."""
+        said, fluid = self.what_failed(code), self.model.case.fluid
+        numbers = code in (told.BAD_VALUE, told.NEWTON_STUCK, told.TINY_STEP)
+        if numbers and fluid.law == "mixture" and not self.model.cavitates:
+            said += "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation.md)"
+        return said
+
+    def what_failed(self, code: int) -> str:
+        """What, where and when, and what to try."""
         model, loop = self.model, self.loop
         place = ""
         if code == told.BAD_VALUE:
