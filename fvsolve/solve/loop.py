@@ -92,13 +92,17 @@ class Loop:
         """Which events have happened and still hold (a view)."""
         return self.model.tables[rec.I_ARMED]
 
-    def switch(self, before: np.ndarray) -> bool:
-        """Note the events that have just happened; False where they go to and fro at one time."""
+    def note(self, before: np.ndarray) -> None:
+        """List the events that have happened since the flags were `before`, and do what they do at once."""
         first, many = 2 * int(np.sum(self.model.tables[rec.I_NODES]["kind"] == rec.TANK)), len(self.model.events)
         now = self.armed[first : first + many] > before[first : first + many]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now)]
         for (_, _, device), row in zip(self.model.devices, self.model.tables[rec.I_DEVICES], strict=True):
             device.settle(self.armed, row, self.now)
+
+    def switch(self, before: np.ndarray) -> bool:
+        """Note the events that have just happened; False where they go to and fro at one time."""
+        self.note(before)
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size

@@ -105,9 +105,16 @@ class Run:
 
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
-        out = self.model.evaluate(t, self.loop.now, limit)[1]
+        out = self.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, :].copy())
+        return out
+
+    def evaluate(self, limit: float) -> np.ndarray:
+        """`out` now, with schedules' left limit from `limit` on; events that a jump has brought are listed."""
+        before = self.loop.armed.copy()
+        out = self.model.evaluate(self.loop.t, self.loop.now, limit)[1]
+        self.loop.note(before)
         return out
 
     def flush(self) -> None:
@@ -157,6 +164,7 @@ class Run:
 
     def open(self) -> None:
         out = self.row(self.start, self.start)
+        self.loop.switched.clear()  # as what it starts is no event
         if self.loop.orders[told.FIELD_EVERY] > 0:
             self.frame(self.start, self.loop.now, out)
         self.loop.memory[told.NEXT_OUTPUT] = self.loop.memory[told.NEXT_FIELD] = 1.0
@@ -165,7 +173,7 @@ class Run:
     def stop_columns(self, end: float) -> None:
         """Take the flow out of rigid columns that stand from now on; a mark where there was some."""
         model, t = self.model, self.loop.t
-        out = model.evaluate(t, self.loop.now, end)[1]
+        out = self.evaluate(end)
         for k, row in enumerate(model.tables[rec.I_COLUMNS]):
             flow = row["flow"] + self.loop.now[row["y"]]
             if flow != 0.0 and out[model.layout["column"] + k] == 0.0:
