@@ -28,6 +28,7 @@ class Loop:
         self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
+        self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         self.rhs, self.observe, self.record, self.events = arguments(model.functions())
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
@@ -83,8 +84,9 @@ class Loop:
                 self.leap, self.observe, self.record, self.events, self.rhs, self.model.handle,
                 int(self.model.layout["supply"]), self.armed,
             )  # fmt: skip
-            if code == told.SWITCHED and not self.switch(before):
-                code = told.CHATTERS
+            if code == told.SWITCHED:
+                code = told.SWITCHED if self.switch(before) else told.CHATTERS
+                self.on_switch()
         return code
 
     @property
