@@ -19,7 +19,19 @@ INERTIA = RHO * LENGTH / area(DIAMETER)
 TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
 
 
-def bores(p: float, inlet: float, outlet: float) -> float:
+SMALL = (
+    1e-3  # of the pressure upstream: below it the root of a difference is the odd quintic that joins it twice smooth
+)
+QUINTIC = np.linalg.solve([[1, 1, 1], [1, 3, 5], [0, 6, 20]], [1.0, 0.5, -0.25])
+
+
+def softened(x: float) -> float:
+    """sqrt(x), or the quintic, over sqrt(x)."""
+    s = x / SMALL
+    return 1.0 if s >= 1.0 else float(QUINTIC @ [s, s**3, s**5]) / math.sqrt(s) if s > 0.0 else 0.0
+
+
+def bores(p: float, inlet: float, outlet: float, soft=softened) -> float:
     """Mass flow of air into a chamber at p: subsonic and choked, in and out (Wylie and Streeter 1993, 7-4) [kg/s]."""
     root = math.sqrt(HEAT)
     if p <= AMBIENT:
@@ -28,7 +40,7 @@ def bores(p: float, inlet: float, outlet: float) -> float:
         size, r, sign = 0.6 * area(outlet) * p / root, AMBIENT / p, -1.0
     if r < 0.528281787717174:
         return sign * size * math.sqrt(1.4) * (2 / 2.4) ** (2.4 / 0.8)
-    return sign * size * math.sqrt(7 * max(0.0, r ** (2 / 1.4) - r ** (2.4 / 1.4)))
+    return sign * size * math.sqrt(7 * max(0.0, r ** (2 / 1.4) - r ** (2.4 / 1.4))) * soft(1.0 - r)
 
 
 def drained(inlet=0.05, outlet=0.05, low=AMBIENT - 0.6e5, end=6.0, numerics=TIGHT, law="linear", flow=0.05, **more):
@@ -58,29 +70,58 @@ def test_choked_air_comes_in_at_its_closed_rate():
 RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
 
 
-@pytest.mark.parametrize("law", ["linear", "log"])
-def test_subsonic_in_and_out_and_choked_out_follow_scipy(law):
-    """Drawn in, subsonic; squeezed by a column that comes back, and blown out, choked at last."""
+def test_near_ambient_pressure_alone_its_flow_is_not_the_textbooks():
+    """Beyond SMALL to rounding; within, less than 0.18 sqrt(SMALL) off the root, the greatest that the quintic is."""
+    from fvsolve.kernels.devices.air_valve import orifice_air
+
+    for r in (0.2, 0.5283, 0.53, 0.9, 1.0 - 1.01 * SMALL):
+        textbook = bores(r * AMBIENT, 0.1, 0.1, lambda x: 1.0) / (0.6 * area(0.1) * AMBIENT / math.sqrt(HEAT))
+        assert orifice_air(r) == pytest.approx(textbook, rel=2e-12)
+    for x in np.linspace(0.0, SMALL, 50):
+        assert 0.0 <= math.sqrt(7 * x / 3.5) - orifice_air(1.0 - x) <= math.sqrt(2.0) * 0.18 * math.sqrt(SMALL) + SMALL
+
+
+RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
+
+
+def off_scipy(law, beta=2.2e9) -> tuple[float, int]:
+    """Greatest difference of air mass, flow and pressure to SciPy's, of their own size; and how many steps.
+
+    Drawn in, subsonic; squeezed by a column that comes back, and blown out, choked at last. The throat between fluid
+    and air is 30 inlets wide, of loss 1.
+    """
     inlet, outlet = 0.04, 0.02
-    result = fvsolve.run(drained(inlet, outlet, RETURN, law=law))
+    case = drained(inlet, outlet, RETURN, law=law)
+    case["fluid"]["bulk_modulus"] = beta
+    result = fvsolve.run(case)
     t = np.asarray(result.t)
     shut = [event["time"] for event in result.summary["events"] if event["what"] == "shuts"]
     rows = (t >= 0.6) & (t < shut[0] - 0.02)
     first = [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")]
 
     def rates(now, y):
-        p = y[2] * HEAT / y[1]
-        return (p - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA, y[0], bores(p, inlet, outlet)
+        p, v = y[2] * HEAT / y[1], y[0] / area(30.0 * inlet)
+        drop = 0.5 * RHO * v * abs(v)
+        return (p - drop - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA, y[0], bores(p, inlet, outlet)
 
-    exact = solve_ivp(rates, (t[rows][0], t[rows][-1]), first, t_eval=t[rows], rtol=1e-11, atol=1e-14, max_step=0.01)
+    exact = solve_ivp(rates, (t[rows][0], t[rows][-1]), first, t_eval=t[rows], rtol=1e-11, atol=1e-14, max_step=0.01,
+                      method="DOP853")  # fmt: skip
     p = exact.y[2] * HEAT / exact.y[1]
     assert p.max() > 2.0 * AMBIENT and p.min() < 0.95 * AMBIENT
-    turn = int(np.argmax(exact.y[2]))  # from there on the polynomial within 1e-3 of ambient pressure has told
-    assert result["v.air_mass"][rows][:turn] == pytest.approx(exact.y[2][:turn], rel=2e-5 if law == "linear" else 3e-3)
-    near = 2e-4 if law == "linear" else 3e-3
-    assert result["v.air_mass"][rows] == pytest.approx(exact.y[2], rel=near)
-    assert result["c.flow"][rows] == pytest.approx(exact.y[0], abs=near * 0.1)
-    assert result["v.air_pressure"][rows] == pytest.approx(p, rel=5 * near)
+    off = [(result["v.air_mass"][rows], exact.y[2]), (result["v.air_pressure"][rows], p)]
+    flow = np.abs(result["c.flow"][rows] - exact.y[0]).max() / np.abs(exact.y[0]).max()
+    return max(flow, *(np.abs(found / true - 1.0).max() for found, true in off)), result.summary["steps"]
+
+
+def test_subsonic_in_and_out_and_choked_out_follow_scipy():
+    """To what all local errors amount to: rtol a step."""
+    off, steps = off_scipy("linear")
+    assert off < TIGHT["rtol"] * steps
+
+
+def test_under_a_compressible_law_it_differs_by_the_first_order_of_its_compressibility():
+    one, two = (off_scipy("log", beta)[0] for beta in (2.2e9, 8.8e9))
+    assert one < 6e5 / 2.2e9 and one / two == pytest.approx(4.0, rel=0.05)
 
 
 def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
@@ -89,6 +130,14 @@ def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
     assert texts[:2] == ["opens", "shuts"] and len(texts) <= 8
     assert texts == (["opens", "shuts"] * 4)[: len(texts)]
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("numerics", [{"method": "euler", "step": 0.001}, {"method": "rk4", "step": 0.01}])
+def test_fixed_explicit_steps_open_it_once(numerics):
+    """A body of the size that such valves have gives a chamber no quicker than the steps: no chatter where it opens."""
+    found, true = (fvsolve.run(drained(0.05, 0.05, numerics=own)) for own in (numerics, TIGHT))
+    assert found.ok and [event["what"] for event in found.summary["events"]] == ["opens"]
+    assert found["v.air_mass"][-1] == pytest.approx(true["v.air_mass"][-1], rel=numerics["step"])
 
 
 def test_shut_it_is_a_junction_to_the_last_bit_but_rounding():

@@ -8,7 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from truth import discs
-from truth.scenes import GRAVITY, RHO, SHARP, SMOOTH, WATER, area, chamber, junction, lake, pipe, reservoir, scene
+from truth.scenes import (
+    GRAVITY,
+    RHO,
+    SHARP,
+    SMOOTH,
+    WATER,
+    area,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    valve,
+)
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy
@@ -68,6 +82,21 @@ def test_at_a_jump_it_stops_the_flow_at_once(law):
     assert not result["check.flow"][after].any()
     near = 1e-12 if law == "linear" else 5e-3
     assert result["a.pressure"][after] == pytest.approx(5.9e5 - 1000.0 / area(0.3) * first, rel=near)
+
+
+def test_what_a_jump_shuts_and_opens_is_listed_once():
+    """A check valve and a pump's own stand beside one lake that falls at 1 s and is back at 2 s; at the start, none."""
+    fall = reservoir({"time": [0.0, 1.0, 2.0], "value": [3e5, 1e5, 3e5], "kind": "step"})
+    nodes = {"pump": fall, "a": junction(), "b": junction(), "town": reservoir(2e5)}
+    links = {"check": check("pump", "a"), "tap": valve("a", "town", 0.01), "way": valve("b", "town", 0.01),
+             "lift": {"type": "pump", "from": "pump", "to": "b", "check_valve": True,
+                      "curve": {"flow": [0.05], "head": [5.0]}}}  # fmt: skip
+    result = fvsolve.run(scene(nodes, links, 3.0, {"method": "rk4", "step": 0.1}, ["check.flow", "lift.flow"], 0.1))
+    shuts = [(1.0, "check", "shuts"), (1.0, "lift", "check valve shuts")]
+    opens = [(2.0, "check", "opens"), (2.0, "lift", "check valve opens")]
+    assert sorted((e["time"], e["name"], e["what"]) for e in result.summary["events"]) == [*shuts, *opens]
+    stands = (result.t > 1.0) & (result.t < 2.0)
+    assert not result["check.flow"][stands].any() and not result["lift.flow"][stands].any()
 
 
 SWING = {"time": [0.0, 0.5, 2.0, 2.5], "value": [50.0, 10.0, 10.0, 60.0]}

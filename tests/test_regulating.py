@@ -11,6 +11,7 @@ from truth.scenes import AMBIENT, GRAVITY, RHO, SMOOTH, WATER, chamber, junction
 
 import fvsolve
 from fvsolve.kernels import records as rec
+from fvsolve.steady import union
 from fvsolve.studies.energy.energy import energy
 
 BETA, TIME, BAND, SET = 2e7, 0.5, 1e5, 5e5
@@ -100,23 +101,37 @@ def standing(case, model, name) -> str:
     return "shut" if m > -1e-6 and (beyond < 1.0 or drop < 1.0) else ""
 
 
-@pytest.mark.parametrize("count, refused", [(1, 1), (3, 5), (6, 10)])
+def hangs_on_valves(case) -> float:
+    """What is drawn where only valves that regulate lead to [m3/s]."""
+    names, links = list(case["nodes"]), case["links"].values()
+    pairs = [(names.index(x["from"]), names.index(x["to"])) for x in links if x["type"] == "pipe"]
+    label = union(len(names), pairs)
+    fed = {label[names.index(name)] for name in ("high", "mid")}
+    drawn = [(case["nodes"][name].get("demand", 0.0), at) for name, at in zip(names, label, strict=True)]
+    return sum(demand for demand, at in drawn if at not in fed)
+
+
+@pytest.mark.parametrize("count, refused", [(1, [27]), (3, []), (6, [38])])
 def test_every_valve_of_a_random_net_obeys_its_law(count, refused):
-    """Nets that ask for flow which their valves hold back have no steady state: these alone may be refused."""
-    seen, without = set(), 0
+    """Of the two that are refused one draws 0.04 m3/s through a valve set to 0.0194, one through valves that are shut.
+
+    Of all 3^6 ways in which the valves of seeds 17 and 30 can stand, one or two are a steady state; they are found.
+    """
+    seen = set()
     for seed in range(40):
         case = network(seed, count)
         try:
             model = fvsolve.build(fvsolve.load(case))
         except fvsolve.CaseError as error:
-            assert "no steady state" in str(error)
-            without += 1
+            said = "in which v0 stay as they are" if count == 1 else "m3/s are drawn here but every way to it is shut"
+            assert seed in refused and said in str(error) and hangs_on_valves(case) > 0.0
             continue
+        assert seed not in refused
         found = [standing(case, model, f"v{j}") for j in range(count)]
         assert "" not in found, (seed, found)
         assert not model.rhs(0.0, np.zeros(model.y_size)).any(), seed
         seen |= set(found)
-    assert seen >= {"active", "shut"} and without <= refused
+    assert seen >= {"active", "shut"}
 
 
 def line(kind, given, **more):

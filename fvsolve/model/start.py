@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,8 @@ from fvsolve.model.unsteady import add_terms
 from fvsolve.steady import Edge, solve_steady
 
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
-REVISIONS = 50  # of what devices do, at most
-AT_ONCE = 10  # of these, all of them together
+REVISIONS = 200  # of what devices do, at most
+AT_ONCE, ROUND = 10, 20  # of these, all of them together; after which those that regulate begin elsewhere
 PRESSURE_SCALE = 1e5
 SNAP = 1e-12  # flows below this share of the scene's are zero
 
@@ -90,17 +91,29 @@ class Start:
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
+        random, devices = Random(0), list(zip(self.scene.devices, self.scene.device_table, strict=True))
         for turn in range(REVISIONS):
             self.balance()
-            devices = list(zip(self.scene.devices, self.scene.device_table, strict=True))
-            revised = (device.revise(self, part, row) for (_, part, device), row in devices[turn:] + devices[:turn])
+            revised = (device.revise(self, part, row) for (_, part, device), row in devices)
             if not (any(revised) if turn > AT_ONCE else sum(revised)):  # later one by one, lest they go in rounds
                 return self.report_faults(self.held)
+            random.shuffle(devices)
+            if turn % ROUND == ROUND - 1:
+                self.scatter(random)
         self.report_faults(self.held)
         names = listing([name for name, _, device in self.scene.devices])
         self.scene.fault("numerics.initial", f"no steady state was found in which {names} stay as they are; "
                          'try initial = "rest"')  # fmt: skip
         self.scene.check()
+
+    def scatter(self, random: Random) -> None:
+        """Let those that regulate stand as chance has it: from where they stood no revision led on."""
+        for k in sorted(self.modes):
+            if random.random() < 0.5:
+                self.shut = self.shut | {k}
+            else:
+                self.shut = self.shut - {k}
+                del self.modes[k]
 
     def across(self, k: int) -> tuple[float, float]:
         """Potentials just found at both ends of valve k [Pa]; where demands go unserved there is none left."""
@@ -252,7 +265,7 @@ class Start:
     def report_faults(self, held) -> None:
         """What no steady state can meet, each by its name."""
         names = list(self.case.places)
-        for i in self.answer.no_solution:
+        for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
             drawn = self.demand[i] / self.scene.fluid.density
             self.scene.fault(
                 f"nodes.{names[i]}",

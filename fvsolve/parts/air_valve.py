@@ -11,6 +11,7 @@ from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.value import Number, Quantity, between, positive
 
+BODY = 3.0  # width and length of the float's chamber where its volume is not given, in diameters of the inlet
 WIDE = 30.0  # throat between fluid and air, in diameters of the inlet, of loss 1
 
 
@@ -38,7 +39,7 @@ class AirValve(Node, kind="air-valve"):
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=WIDE * self.inlet, loss_in=1.0, loss_out=1.0)
-        volume = self.volume if self.volume is not None else math.pi / 4.0 * self.inlet**3
+        volume = self.volume if self.volume is not None else math.pi / 4.0 * (BODY * self.inlet) ** 3
         chamber = self.model_copy(update={"volume": volume})
         place = Junction.model_construct(elevation=self.elevation, demand=constant(0.0))
         return behind(name, chamber, place, size)

@@ -28,6 +28,7 @@ class Loop:
         self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
+        self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
         self.rhs, self.observe, self.record, self.events = arguments((call.rhs, call.observe, call.record, call.events))
         leaps = leap_allowed(model, method)
@@ -84,8 +85,9 @@ class Loop:
                 self.leap, self.observe, self.record, self.events, self.rhs, self.model.handle,
                 int(self.model.layout["supply"]), self.armed,
             )  # fmt: skip
-            if code == told.SWITCHED and not self.switch(before):
-                code = told.CHATTERS
+            if code == told.SWITCHED:
+                code = told.SWITCHED if self.switch(before) else told.CHATTERS
+                self.on_switch()
         return code
 
     @property
@@ -93,13 +95,17 @@ class Loop:
         """Which events have happened and still hold (a view)."""
         return self.model.tables[rec.I_ARMED]
 
-    def switch(self, before: np.ndarray) -> bool:
-        """Note the events that have just happened; False where they go to and fro at one time."""
+    def note(self, before: np.ndarray) -> None:
+        """List the events that have happened since the flags were `before`, and do what they do at once."""
         first, many = 2 * int(np.sum(self.model.tables[rec.I_NODES]["kind"] == rec.TANK)), len(self.model.events)
         now = self.armed[first : first + many] > before[first : first + many]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now)]
         for (_, _, device), row in zip(self.model.devices, self.model.tables[rec.I_DEVICES], strict=True):
             device.settle(self.armed, row, self.now)
+
+    def switch(self, before: np.ndarray) -> bool:
+        """Note the events that have just happened; False where they go to and fro at one time."""
+        self.note(before)
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size

@@ -24,7 +24,6 @@ from fvsolve.steppers import orders as told
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
-FAILED = (told.BAD_VALUE, told.BAD_STATUS, told.CHATTERS, told.NEWTON_STUCK, told.TINY_STEP)
 PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS, rec.I_ARMED)
 
 
@@ -50,6 +49,7 @@ class Run:
         self.model, self.sink, self.progress = model, sink, progress
         self.began = time.perf_counter()
         self.loop = self.loop_type(model)
+        self.loop.on_switch = self.stop_columns
         numerics, output = model.case.numerics, model.case.output
         self.start, self.end = numerics.start, numerics.end
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
@@ -105,9 +105,16 @@ class Run:
 
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
-        out = self.model.evaluate(t, self.loop.now, limit)[1]
+        out = self.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, :].copy())
+        return out
+
+    def evaluate(self, limit: float) -> np.ndarray:
+        """`out` now, with schedules' left limit from `limit` on; events that a jump has brought are listed."""
+        before = self.loop.armed.copy()
+        out = self.model.evaluate(self.loop.t, self.loop.now, limit)[1]
+        self.loop.note(before)
         return out
 
     def flush(self) -> None:
@@ -157,15 +164,16 @@ class Run:
 
     def open(self) -> None:
         out = self.row(self.start, self.start)
+        self.loop.switched.clear()  # as what it starts is no event
         if self.loop.orders[told.FIELD_EVERY] > 0:
             self.frame(self.start, self.loop.now, out)
         self.loop.memory[told.NEXT_OUTPUT] = self.loop.memory[told.NEXT_FIELD] = 1.0
         self.begin_segment(self.starts_with_jump)
 
-    def stop_columns(self, end: float) -> None:
+    def stop_columns(self) -> None:
         """Take the flow out of rigid columns that stand from now on; a mark where there was some."""
         model, t = self.model, self.loop.t
-        out = model.evaluate(t, self.loop.now, end)[1]
+        out = self.evaluate(self.bounds[self.segment][0])
         for k, row in enumerate(model.tables[rec.I_COLUMNS]):
             flow = row["flow"] + self.loop.now[row["y"]]
             if flow != 0.0 and out[model.layout["column"] + k] == 0.0:
@@ -176,7 +184,7 @@ class Run:
 
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
-        self.stop_columns(end)
+        self.stop_columns()
         if jumped:
             self.row(self.loop.t, end)
         self.loop.begin(end, end if jump else NO_LIMIT)
@@ -205,10 +213,7 @@ class Run:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         while True:
             before, steps, busy = time.perf_counter(), self.loop.memory[told.STEPS], time.thread_time()
-            seen = len(self.loop.switched)
             code = self.loop.run(self.left)
-            if len(self.loop.switched) > seen and code not in FAILED:
-                self.stop_columns(self.bounds[self.segment][0])
             self.processor += time.thread_time() - busy
             self.left = max(1.0, self.left - (self.loop.memory[told.STEPS] - steps))
             self.spent += time.perf_counter() - before
@@ -246,7 +251,7 @@ class Run:
         said, fluid = self.what_failed(code), self.model.case.fluid
         numbers = code in (told.BAD_VALUE, told.NEWTON_STUCK, told.TINY_STEP)
         if numbers and fluid.law == "mixture" and not self.model.cavitates:
-            said += "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation.md)"
+            said += "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation)"
         return said
 
     def what_failed(self, code: int) -> str:

@@ -9,6 +9,7 @@ from math import expm1, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
+from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.records import (
     I_ARMED,
     I_FLOATS,
@@ -134,7 +135,7 @@ def air_valve_events(y, out, tables, device, g):
         p = tables[I_NODES][place]["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + place] - st["ambient"]
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         left = p - min(gauge, 0.0) + RELUCTANCE
-    g[at], g[at + 1] = left, -left
+    either(tables, g, at, left)
 
 
 @njit

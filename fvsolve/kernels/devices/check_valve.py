@@ -5,6 +5,7 @@ drop exceeds its cracking pressure. armed[event] says which: it changes on accep
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_NODES, I_VALVES, JUNCTION
 from fvsolve.kernels.restrictions import head_drop
 
@@ -34,7 +35,7 @@ def check_valve_events(out, tables, device, g):
         left = head_drop(tables, out, k)[1] + RELUCTANCE
     if tables[I_ARMED][at] > 0.0:
         left = head_drop(tables, out, k)[1] - tables[I_FLOATS][device["data"]] - RELUCTANCE
-    g[at], g[at + 1] = left, -left
+    either(tables, g, at, left)
 
 
 @njit

@@ -9,12 +9,14 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.codes import RELIEF_DISC
+from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
 from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_VALVES, RATE
 from fvsolve.kernels.restrictions import head_drop
 
 LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6  # numbers: three of the start, then its keys
 AT_REST = 1e-10  # share of its span that does not lift it off a stop: rounding must not
+SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
 EARLY = 1e-6  # share of 1 / w by which it is asked which way it moves
 
 
@@ -76,7 +78,7 @@ def disc_events(y, out, tables, device, g):
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
     stop, seat = -drive - AT_REST, drive - AT_REST
     if device["states"] == 1:
-        onward = drive - AT_REST, drive + AT_REST
+        onward = drive - SETTLED, drive + SETTLED
     else:
         speed = y[o + 1] / tables[I_FLOATS][device["data"] + SWING] + EARLY * drive
         onward = speed, speed
@@ -84,8 +86,8 @@ def disc_events(y, out, tables, device, g):
         stop = max(1.0 - x, -onward[1])
     if armed[at + 2] == 0.0:
         seat = max(x, onward[0])
-    g[at], g[at + 1] = stop, -stop
-    g[at + 2], g[at + 3] = seat, -seat
+    either(tables, g, at, stop)
+    either(tables, g, at + 2, seat)
 
 
 @njit

@@ -10,6 +10,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.curves import COUNT, LAST, LAW, OWN, SCALE, SUTER, curve_head, piecewise, suter_value
 from fvsolve.kernels.devices.check_valve import RELUCTANCE
+from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.records import (
     I_ARMED,
     I_FLOATS,
@@ -177,7 +178,7 @@ def pump_events(out, tables, device, g):
         rho, drop = head_drop(tables, out, k)
         most = curve_head(floats, valve["data"], out[layout["drive"] + k], 0.0)[0]
         left = drop + rho * tables[I_SETTINGS][0]["gravity"] * most - RELUCTANCE
-    g[at], g[at + 1] = left, -left
+    either(tables, g, at, left)
 
 
 @njit

@@ -9,6 +9,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING
+from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
 from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_VALVES, RATE
 from fvsolve.kernels.restrictions import head_drop
@@ -16,6 +17,7 @@ from fvsolve.kernels.schedules import schedule_value
 
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
 AT_REST = 1e-10  # error, as a share of the band, that does not lift it off a stop: rounding must not
+SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
 ALMOST_SHUT = 1e-6  # opening below which its flow may be rounding
 RELUCTANCE = 1e-3  # drop below which it stays shut against reversed flow [Pa]
 
@@ -83,12 +85,12 @@ def regulator_events(t, y, out, tables, device, g):
             back = drop - RELUCTANCE
     full, seat = -error - AT_REST, error - AT_REST
     if armed[at + 2] == 0.0:
-        full = max(full, 1.0 - x)
+        full = max(full + SETTLED, 1.0 - x)
     if armed[at + 4] == 0.0:
-        seat = max(seat, x)
-    g[at], g[at + 1] = back, -back
-    g[at + 2], g[at + 3] = full, -full
-    g[at + 4], g[at + 5] = seat, -seat
+        seat = max(seat + SETTLED, x)
+    either(tables, g, at, back)
+    either(tables, g, at + 2, full)
+    either(tables, g, at + 4, seat)
 
 
 @njit

@@ -5,6 +5,7 @@ armed[event + 2] that it is fully open: these change on accepted states alone, s
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.records import I_ARMED, I_LAYOUT, I_VALVES
 from fvsolve.kernels.restrictions import pressure_lift
 
@@ -31,9 +32,10 @@ def relief_events(out, tables, device, g):
     From shut to fully open it lifts first: a jump may ask for either end in the law of the other, and not stay there.
     """
     armed, at, x = tables[I_ARMED], device["event"], pressure_lift(tables, out, device["valve"])
-    g[at], g[at + 2] = x, 1.0 - x
+    left, missing = x, 1.0 - x
     if armed[at] > 0.0:
-        g[at], g[at + 2] = x - RELUCTANCE, 1.0
+        left, missing = x - RELUCTANCE, 1.0
     elif armed[at + 2] > 0.0:
-        g[at], g[at + 2] = 1.0, 1.0 - RELUCTANCE - x
-    g[at + 1], g[at + 3] = -g[at], -g[at + 2]
+        left, missing = 1.0, 1.0 - RELUCTANCE - x
+    either(tables, g, at, left)
+    either(tables, g, at + 2, missing)

@@ -192,6 +192,8 @@ class FlowControl(Regulator, kind="flow-control"):
         if now == ACTIVE:
             drop, small = here.p_from - here.p_to, SMALL_FLOW * here.start.flow_scale
             return OPEN if drop < here.loss - SMALL_PRESSURE or here.flow < here.target - small else now
+        if now == "shut":  # it holds nothing back but what is beyond its set flow
+            return OPEN
         return ACTIVE if here.flow > here.target + SMALL_FLOW * here.start.flow_scale else now
 
 

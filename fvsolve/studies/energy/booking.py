@@ -165,11 +165,11 @@ class EnergyRun(Run):
         self.holdings.append(self.holding() - self.first)
         self.losses.append(self.lost.copy())
 
-    def stop_columns(self, end: float) -> None:
+    def stop_columns(self) -> None:
         """What a column that stops dead had in it is dissipated."""
         columns = self.model.tables[rec.I_COLUMNS]
         before = [self.kinetic(row) for row in columns]
-        super().stop_columns(end)
+        super().stop_columns()
         self.lost += [was - self.kinetic(row) for was, row in zip(before, columns, strict=True)]
 
     def kinetic(self, row) -> float:
