@@ -9,7 +9,16 @@ import pytest
 import fvsolve
 from fvsolve.cli.order import unit
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.accuracy import afford
+from fvsolve.studies.accuracy.afford import affordable
+from fvsolve.studies.accuracy.fit import fit
+from fvsolve.studies.accuracy.judge import plausible
+from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings
+from fvsolve.studies.accuracy.reference import otherwise
+from fvsolve.studies.accuracy.witnesses import candidates
 from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.outcome import outcome
+from fvsolve.studies.points import Points
 from fvsolve.studies.stability import stability as room
 from fvsolve.studies.stability.carried import TooLarge
 from fvsolve.studies.stability.stability import stability
@@ -88,3 +97,51 @@ def test_check_names_the_pipe_that_sets_the_step_and_knows_what_cavities_cost():
     assert cavities["step_set_by"].startswith("links.main:")
     cost = [one["expected_seconds"] / one["steps"] / one["cells"] for one in (cavities, plain)]
     assert cost[0] > 5.0 * cost[1]
+
+
+# order ----------------------------------------------------------------------------------------------------------
+
+
+def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeypatch, tmp_path):
+    few = case("relief-on-closed-main", links__main__cells=64)
+    whole = affordable(few, None, None, 3, None, "auto", None)
+    assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
+    monkeypatch.setattr(afford, "LONGEST", 1e-6)
+    made = affordable(few, None, None, 3, None, "auto", Points(tmp_path))
+    assert [level.cells for level in made.levels] == [8, 16, 32] and "begun on 8 of 64 cells" in made.words
+    assert affordable(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
+    monkeypatch.undo()
+    assert affordable(few, None, None, 3, None, "auto", Points(tmp_path)) == made  # a study that goes on
+
+
+def test_errors_that_fall_quicker_than_scheme_and_method_can_make_them_are_said_to_show_no_order():
+    sizes = [2.0**-k for k in range(5)]
+    assert "show no order" in plausible(fit(sizes, [h**8 for h in sizes]), 4.0).note
+    assert not plausible(fit(sizes, [h**4 for h in sizes]), 4.0).note
+
+
+def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
+    keys = otherwise(case("adelaide", links__main__cells=10), ("muscl",), "both", 4.0)
+    assert keys["numerics.scheme"] == "muscl" and keys["links.main.cells"] == 40
+
+
+# chart ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_chart_leaves_out_what_does_not_follow_cavities():
+    found, coarse = case("adelaide"), Coarse(25, 800.0, 800, 0.0)
+    made = settings(found, coarse, None, None, [50], None, None)
+    assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(found) == "muscl rk4"
+    assert left_out(found, None) == ["upwind5", "weno5"] and not left_out(found, ["weno5"])
+    assert not left_out(case("pump-trip"), None)
+
+
+def test_with_cavities_both_references_of_a_chart_can_be_run():
+    few = case("adelaide", links__main__cells=8)
+    found = [outcome(few, keys[0]).ok for keys in candidates(few, 4, False).values()]
+    assert found == [True, True]
+
+
+def test_a_chart_of_dear_rates_has_fewer_cells():
+    cheap, dear = (Coarse(25, 800.0, 800, 0.0, dearness).levels for dearness in (1.0, 30.0))
+    assert max(dear) < max(cheap) and len(dear) == len(cheap)
