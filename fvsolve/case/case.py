@@ -11,7 +11,7 @@ from typing import Any
 from fvsolve.case import text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
-from fvsolve.case.sections import DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.fluid import Fluid
 from fvsolve.parts import Link, Node, Pipe
 from fvsolve.parts.table import plain
@@ -59,6 +59,12 @@ class Case:
         named = [*self.output.probes]
         named += [one.probe for one in [*self.expect.values(), *self.compare.values()]]
         return list({probe.text: probe for probe in named}.values())
+
+    @property
+    def schemes(self) -> tuple[str, ...]:
+        """Schemes that can follow what its fluid does."""
+        air = self.properties.air
+        return CAVITY_SCHEMES if air is not None and air.cavitation else SCHEMES
 
     @cached_property
     def places(self) -> dict[str, Node]:

@@ -8,7 +8,7 @@ from typing import Any
 from fvsolve import units
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
-from fvsolve.case.sections import Numerics
+from fvsolve.case.sections import CAVITY_SCHEMES, Numerics
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import (
     KINDS,
@@ -26,8 +26,6 @@ from fvsolve.parts import (
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show
-
-CAVITY_SCHEMES = ("upwind", "muscl")  # the others reach over a cavity's edge
 
 Found = Iterator[tuple[tuple, str]]
 

@@ -29,6 +29,7 @@ from fvsolve.steppers.structure import KINDS
 from fvsolve.units import show
 
 SCHEMES = ("upwind", "muscl", "upwind5", "weno5", "central", "linear-upwind", "fromm", "upwind3")
+CAVITY_SCHEMES = ("upwind", "muscl")  # the others reach over a cavity's edge
 LIMITERS = ("minmod", "van-leer", "monotonized-central")
 
 # Every default of [numerics] and [output], chosen by docs/accuracy-and-speed.md. Steps: Courant where there are cells,

@@ -99,6 +99,8 @@ def _show(made, paths) -> None:
         where,
         f"errors against {made.reference}; {made.second} differs from it by {floor:.2g}: below, the chart says nothing",
     )
+    if made.left_out:
+        line(where, f"left out: {', '.join(made.left_out)}, which do not follow cavities in pipes")
     for text in made.told:
         line(where, f"no reference: {text}")
     for point in made.failed:

@@ -19,11 +19,6 @@ COLUMNS = (
 )  # fmt: skip
 SHOWN = 3  # variables with a table of their own on the terminal; all are in order.csv
 NORMS = ("L1", "L2", "max")
-UNITS = {
-    "pressure": "Pa", "gauge_pressure": "Pa", "head": "m", "level": "m", "flow": "m3/s", "velocity": "m/s",
-    "position": "m", "force": "N", "opening": "-", "speed": "-", "torque": "N m", "power": "W", "gas_pressure": "Pa",
-    "gas_volume": "m3",
-}  # fmt: skip
 
 
 @app.command()
@@ -91,8 +86,13 @@ def title(one) -> str:
 
 def unit(variable: str) -> str:
     """SI unit of a variable."""
+    from fvsolve.parts import KINDS
+    from fvsolve.units import DIMENSIONS
+
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
-    return UNITS["flow" if quantity.startswith("flow_") else quantity]
+    kinds = [kind for group in KINDS.values() for kind in group.values()]
+    return next(DIMENSIONS[known[quantity]].si for kind in kinds
+                for known in (kind.quantities, getattr(kind, "along", {})) if quantity in known)  # fmt: skip
 
 
 def write_table(path: Path, found) -> Path:

@@ -118,10 +118,10 @@ def _extremes(console, one) -> None:
 def _step(found: dict) -> str:
     if found["step"] is None:
         return f"step: {found['step_set_by']}"
-    return (
-        f"step {_number(found['step'])} s, set by {found['step_set_by']}; {found['steps']} steps, "
-        f"about {found['expected_seconds']:.2g} s"
-    )
+    expected = found["expected_seconds"]
+    cost = "" if expected is None else f", about {expected:.2g} s"
+    step = f"step at the start {_number(found['step'])} s, set by {found['step_set_by']}"
+    return f"{step}; {found['steps']} such steps{cost}"
 
 
 def _ledger(ledger: dict) -> str:

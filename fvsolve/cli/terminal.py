@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-WIDTH = 140  # of output that goes to no terminal
+WIDTH = 160  # of output that goes to no terminal
 
 
 def console():

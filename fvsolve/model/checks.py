@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from time import process_time
 from typing import Any
 
 import numpy as np
 
+from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
+from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.tableau import method_named
 
-SECONDS_PER_CELL_STEP = 5e-9  # of a method with three stages; benchmarks/kernels.py
-SECONDS_PER_STEP = 1.5e-6
+TRIED = 1e-3  # of what counts as a small deviation: the states whose rates are timed, for at rest much is skipped
+LONG = 1e-3  # [s] that a timing takes at least
+SECONDS_PER_STEP = 5e-7  # beside the rates
+LOCAL = 0.05  # by which sound at a pressure may be quicker than at the reference, where the law is not linear
 STIFF = 3.0  # times as many steps as waves ask for: from there on an implicit method is worth a try
 
 
@@ -46,12 +51,31 @@ def checks(model) -> dict[str, Any]:
     numerics = model.case.numerics
     span = numerics.end - numerics.start
     steps = math.ceil(span / step) if step else None
-    cost = SECONDS_PER_STEP + SECONDS_PER_CELL_STEP * model.cells
+    method = method_named(first_method(numerics.method))
+    timed = steps is not None and method.explicit
+    expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     return {
         "nodes": nodes, "bodies": bodies, "pipes": pipes, "states": model.y_size, "cells": model.cells, "step": step,
-        "step_set_by": set_by, "steps": steps, "expected_seconds": steps * cost if steps else None,
+        "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
         "moving": model.steady["moving"], "warnings": model.warnings,
     }  # fmt: skip
+
+
+def rhs_seconds(model) -> float:
+    """CPU time of one call of the compiled rates, waves running [s]."""
+    y = TRIED * model.scale * np.random.default_rng(1).choice([-1.0, 1.0], model.y_size)
+    dydt, out = np.zeros(model.y_size), model.new_out()
+    rhs, t, handle, found, calls = model.functions()[0], float(model.case.numerics.start), model.handle, math.inf, 1
+    for _ in range(5):
+        spent = 0.0
+        while spent < LONG:
+            began = process_time()
+            for _ in range(calls):
+                rhs(t, y, dydt, out, handle)
+            spent, calls = process_time() - began, 2 * calls
+        calls //= 2
+        found = min(found, spent / calls)
+    return found
 
 
 def step_and_reason(model) -> tuple[float | None, str]:
@@ -69,10 +93,26 @@ def step_and_reason(model) -> tuple[float | None, str]:
         own, rate = model.wave_rates, float(model.wave_rates.max(initial=0.0))
     if not rate > 0.0:
         return None, "nothing limits it"
+    if model.case.fluid.law != "linear" and len(own):
+        own = own * (1.0 + LOCAL) + velocities(model) / model.tables[rec.I_PIPES]["dx"]
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
-    part = "a chamber, tank, rigid column or mass, quicker than every pipe cell"
+    part = f"{quick_parts(model)}, quicker than every pipe cell"
     if len(own) and rate > STIFF * own.max():
         part += f', {rate / own.max():.3g} times; rtol with method = "rodas-5p" does not follow it'
     return numerics.courant / rate, part
+
+
+def velocities(model) -> np.ndarray:
+    """Of the flow in all pipes at the start, without sign : float64[pipes] [m/s]."""
+    pipes = model.tables[rec.I_PIPES]
+    return np.abs(pipes["flow"] / (model.case.properties.density * pipes["area"]))
+
+
+def quick_parts(model) -> str:
+    """What may have a rate of its own beside the pipes: what stores, rigid columns, bodies."""
+    stores = [name for name, row in zip(model.node_names, model.tables[rec.I_NODES], strict=True)
+              if row["kind"] not in (rec.FIXED, rec.JUNCTION)]  # fmt: skip
+    found = [*stores, *model.column_names, *model.body_names]
+    return found[0] if len(found) == 1 else f"one of {listing(found)}"

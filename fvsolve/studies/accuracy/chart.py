@@ -15,7 +15,7 @@ from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.distance import Distance, distance, track
 from fvsolve.studies.accuracy.front import Point, Row, cheapest, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
-from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, settings
+from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, left_out, settings
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
@@ -58,6 +58,7 @@ class Chart:
     reused: int = 0
     aim: Aim | None = None
     told: tuple[str, ...] = field(default=())
+    left_out: tuple[str, ...] = field(default=())  # schemes that do not follow the fluid
 
     def curves(self) -> dict[str, list[Point]]:
         """Points by name of scheme and method, from coarse to fine."""
@@ -124,7 +125,7 @@ class _Study:
     def go(self, schemes, methods, cells, rtol, step, target) -> Chart:
         known(schemes, methods)
         if longest(self.case):
-            self.coarse = coarse(self.case)
+            self.coarse = Coarse(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarsely))
             self.compiling += self.coarse.compile_seconds
         self.all = settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
         self.finest = max((one.cells for one in self.all if one.cells), default=None)
@@ -138,7 +139,7 @@ class _Study:
         aim = None if target is None else self.aim(points, target, floor)
         return Chart(
             self.case.name, points, floor["reference"], floor["second"], floor, self.default, self.compiling, rows,
-            self.points.reused, aim, tuple(floor["told"]),
+            self.points.reused, aim, tuple(floor["told"]), tuple(left_out(self.case, schemes)),
         )  # fmt: skip
 
     @cached_property
@@ -151,6 +152,10 @@ class _Study:
         return witnesses(
             self.case, self.finest, stiff, lambda name: self.progress(self.done, self.total, f"reference {name}")
         )
+
+    def coarsely(self) -> dict:
+        """The coarse run, kept, so that the same cells are found again."""
+        return asdict(coarse(self.case))
 
     def floor(self) -> dict:
         """What the references are called and how far they disagree."""

@@ -18,7 +18,8 @@ from fvsolve.studies.accuracy.refine import Level, Plan, greatest_rate, pipes
 from fvsolve.studies.outcome import Outcome, Told, outcome, prepared
 from fvsolve.studies.points import Points
 
-BEST_OF = 2  # timings of a row
+BEST_OF, BRIEF = 2, 1.0  # timings of a row; [s] that the first may take for there to be a second
+BEYOND = 1.5  # by which a fitted order may exceed that of scheme and method, as some do at a point
 UNSURE = "reference"  # the mark of rows that the reference cannot judge
 FINEST = "finest"  # the mark of a row that ran, with no finer one to judge it
 SURE_FACTOR = 0.25  # error that an extrapolated error may have
@@ -86,7 +87,7 @@ class Judge:
 
     def run(self, level: Level) -> Outcome:
         """The run of a row."""
-        return outcome(self.case, recorded(self.case, level.set), best_of=BEST_OF)
+        return outcome(self.case, recorded(self.case, level.set), best_of=BEST_OF, budget=BRIEF)
 
     def sizes(self) -> dict[str, float]:
         """How large each variable is, by the first row that runs: rounding is measured against it."""
@@ -104,13 +105,13 @@ class Judge:
 
     def made(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
         """Fits of all variables and norms, and what is to be said of them."""
-        fits, doubtful = {}, []
+        fits, doubtful, most = {}, [], self.smooth_order()
         for name in sizes:
             fits[name] = {}
             for norm in NORMS:
                 errors = [row.errors.get(name, {}).get(norm, np.nan) for row in rows]
                 floor, rounding = own.get(name, {}).get(norm, 0.0), ROUNDING * sizes[name]
-                found = fit([row.level.size for row in rows], errors, max(floor, rounding))
+                found = plausible(fit([row.level.size for row in rows], errors, max(floor, rounding)), most)
                 unsure = [e < WORTH * floor and floor > rounding for e in errors]
                 pairs = zip(unsure, found.marks, strict=True)
                 marks = [UNSURE if bad and mark == FLOOR else mark for bad, mark in pairs]
@@ -163,9 +164,10 @@ class Judge:
         jump, told = any(jumps for _, jumps in breaks), self.theory()
         what = "jumps, so fronts run" if jump else "has kinks, and these run"
         most = "none in max" if jump else f"{told['max']:.2g} in max"
+        more = "; so does what opens or shuts on the way" if prepared(self.case).events else ""
         return [
-            f"a schedule {what} through the pipes: order {self.smooth_order()} in space and time is expected to show "
-            f"about {told['L1']:.2g} in L1, {told['L2']:.2g} in L2 and {most}"
+            f"a schedule {what} through the pipes{more}: order {self.smooth_order()} in space and time is expected to "
+            f"show about {told['L1']:.2g} in L1, {told['L2']:.2g} in L2 and {most}"
         ]
 
     def way_out(self, fits) -> list[str]:
@@ -209,6 +211,14 @@ class Judge:
         return replace(
             made, rows=extrapolated(rows, fits), fits=fits, notes=(*made.notes, *differences_only(rows, fits))
         )
+
+
+def plausible(found: Fit, most: float) -> Fit:
+    """A fit, with a word where errors fall far quicker than scheme and method together can make them."""
+    if found.reason or not found.order > most + BEYOND:
+        return found
+    return replace(found, note=f"errors fall quicker than order {most:g} of scheme and method: they are what is left "
+                   "of a motion that dies away, or have changed sign, and show no order of these")  # fmt: skip
 
 
 RICHARDSON = "Richardson: each row against the next, extrapolated"

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import Fit
-from fvsolve.studies.accuracy.refine import Level, Plan, plan
+from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.outcome import Told
 from fvsolve.studies.points import Points
 
@@ -93,7 +94,7 @@ def order(
         )
     given = {"numerics.scheme": scheme, "numerics.method": method}
     case = load(case, {**(set or {}), **{name: value for name, value in given.items() if value is not None}})
-    made = plan(case, refine, key, levels, cells)
+    made = affordable(case, refine, key, levels, cells, against, points)
     if initial is None and source is None and exact is None:
         from fvsolve.studies.accuracy.judge import Judge
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME, SCHEMES
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.model.checks import rhs_seconds
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest, with_cells, without_cells
 from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
@@ -21,19 +22,21 @@ STEPS = tuple(32 * 4**k for k in range(7))  # of methods that estimate no error
 LEVELS, MOST_CELLS = 5, 400
 MOST_WORK = 1e7  # cells times steps of the finest run
 STIFF = 3.0  # times the steps that waves ask for
+CALL, CELL = 1e-6, 1e-8  # [s] that a call of the rates takes beside its cells, and a cell
 
 
 @dataclass(frozen=True)
 class Coarse:
     """A coarse run of a case with pipes: its cells, the steps that its waves ask for, and the steps it took.
 
-    compile_seconds : what it took beyond a second run [s]
+    compile_seconds : what it took beyond a second run [s]; dearness : of its rates, a cell, in usual ones
     """
 
     cells: int
     waves: float
     steps: int
     compile_seconds: float
+    dearness: float = 1.0
 
     @property
     def stiff(self) -> bool:
@@ -47,7 +50,7 @@ class Coarse:
         while finest > 2**LEVELS:
             finer = 16 * finest / MOST_CELLS
             stiff = self.steps * self.cells * finer if self.stiff else 0.0
-            if self.waves * self.cells * finer**2 <= MOST_WORK and stiff <= 10 * MOST_WORK:
+            if self.dearness * max(self.waves * self.cells * finer**2, stiff / 10) <= MOST_WORK:
                 break
             finest //= 2
         return [finest // 2**k for k in range(LEVELS - 1, -1, -1)]
@@ -55,17 +58,28 @@ class Coarse:
 
 def coarse(case: Case) -> Coarse:
     """Run a case with pipes by the program's default on few cells."""
-    model = prepared(case, with_cells(case, DEFAULT_SCHEME, DEFAULT_METHOD, MOST_CELLS // 16).keys)
+    model = prepared(case, with_cells(case, default_scheme(case), DEFAULT_METHOD, MOST_CELLS // 16).keys)
     span = case.numerics.end - case.numerics.start
     waves, spent = span * float(model.wave_rates.max()) / DEFAULT_COURANT, compile_seconds(model)
     found = finished(model, capped)
     done = (found.t - case.numerics.start) / span  # less than 1 where it was given up
-    return Coarse(model.cells, waves, round(found.counts["steps"] / done) if done > 0.0 else 0, spent)
+    dearness = max(1.0, (rhs_seconds(model) - CALL) / (CELL * model.cells))
+    return Coarse(model.cells, waves, round(found.counts["steps"] / done) if done > 0.0 else 0, spent, dearness)
+
+
+def default_scheme(case: Case) -> str:
+    """The program's default, or what stands in for it where that does not follow the fluid."""
+    return DEFAULT_SCHEME if DEFAULT_SCHEME in case.schemes else case.schemes[-1]
 
 
 def default_curve(case: Case) -> str:
     """Name of the curve that the program's defaults lie on."""
-    return f"{DEFAULT_SCHEME} {DEFAULT_METHOD}" if longest(case) else DEFAULT_METHOD_RTOL
+    return f"{default_scheme(case)} {DEFAULT_METHOD}" if longest(case) else DEFAULT_METHOD_RTOL
+
+
+def left_out(case: Case, schemes: Sequence[str] | None) -> list[str]:
+    """Schemes that a chart usually tries and that do not follow the fluid of this case."""
+    return [] if schemes or not longest(case) else [name for name in CHART_SCHEMES if name not in case.schemes]
 
 
 def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, step) -> list[Setting]:
@@ -77,7 +91,7 @@ def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, st
         return _lumped(case, schemes, methods, cells, rtol, step)
     if rtol or step:
         raise FvsolveError(f"{case.name} has pipes, so its resolution is cells: use --cells, not a tolerance")
-    pairs, levels = chosen(schemes, methods, found.stiff), sorted({*(cells or found.levels)})
+    pairs, levels = chosen(case, schemes, methods, found.stiff), sorted({*(cells or found.levels)})
     return [with_cells(case, *pair, level) for pair in pairs for level in levels]
 
 
@@ -94,9 +108,11 @@ def _lumped(case: Case, schemes, methods, cells, rtol, step) -> list[Setting]:
     return found
 
 
-def chosen(schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: bool = False) -> list[tuple[str, str]]:
+def chosen(
+    case: Case, schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: bool = False
+) -> list[tuple[str, str]]:
     """Pairs of scheme and method: all of those asked for, else a telling set; the default's pair always."""
-    taken = list(schemes or CHART_SCHEMES)
+    taken = list(schemes or [name for name in CHART_SCHEMES if name in case.schemes])
     if methods:
         found = [(scheme, method) for scheme in taken for method in methods]
     else:
@@ -105,7 +121,7 @@ def chosen(schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: 
         found += [(scheme, method) for scheme in taken for method in explicit]
         implicit = taken if stiff else [IMPLICIT_SCHEME] if IMPLICIT_SCHEME in taken else taken[:1]
         found += [(scheme, IMPLICIT) for scheme in implicit]
-    return list(dict.fromkeys([*found, (DEFAULT_SCHEME, DEFAULT_METHOD)]))
+    return list(dict.fromkeys([*found, (default_scheme(case), DEFAULT_METHOD)]))
 
 
 def known(schemes: Sequence[str] | None, methods: Sequence[str] | None) -> None:

@@ -20,7 +20,7 @@ from fvsolve.studies.accuracy.apart import NORMS, averaged, differences, fields,
 from fvsolve.studies.accuracy.refine import greatest_rate, pipes
 from fvsolve.studies.outcome import Outcome, outcome
 
-SCHEMES = ("upwind5", "weno5", "upwind3", "fromm")  # of references, in this order
+SCHEMES = ("upwind5", "weno5", "upwind3", "fromm", "muscl")  # of references, in this order; with cavities the last
 EXPLICIT, IMPLICIT = ("dormand-prince", "tsitouras"), ("radau-iia-5", "esdirk-5")  # methods of references
 FINER = 4  # two levels
 COURANT = 0.8
@@ -158,7 +158,8 @@ def otherwise(case, avoid, way: str, share: float) -> dict:
     keys: dict = {"numerics.method": method}
     if way != "time" and counts:
         counts = {name: max(1, round(n * share)) for name, n in counts.items()}
-        keys["numerics.scheme"] = next((name for name in SCHEMES if name not in avoid), SCHEMES[0])
+        able = [name for name in SCHEMES if name in case.schemes]
+        keys["numerics.scheme"] = next((name for name in able if name not in avoid), able[0])
         keys |= {f"links.{name}.cells": n for name, n in counts.items()}
         if numerics.rtol is not None and not METHODS[method].explicit:
             return keys | {"numerics.rtol": max(1e-13, min(1e-8, 0.01 * numerics.rtol))}

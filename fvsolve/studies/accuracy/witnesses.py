@@ -24,6 +24,10 @@ PIPES = (
     ("upwind5", "rk4", "courant", 0.8, FINER),
     ("weno5", "ssp-rk3", "courant", 0.9, FINER),
 )
+CAVITIES = (  # where one scheme alone is above first order, limiters make the difference
+    ("muscl", "ssp-rk3", "courant", 0.5, FINER, "van-leer"),
+    ("muscl", "rk4", "courant", 0.5, FINER, "minmod"),
+)
 STIFF = (("upwind5", "rodas-5p", "rtol", 1e-7, FINER), ("weno5", "radau-iia-5", "rtol", 1e-6, FINER))
 TIGHT = (("radau-iia-9", 1e-12), ("rodas-5p", 1e-11))  # without cells
 ORDERS = 0.5, 5.0  # between which the order is that halvings show
@@ -64,7 +68,7 @@ def witnesses(
     stiff : whether something else than waves holds explicit steps back: the references are implicit then
     """
     found, told = [], []
-    for name, runs in _candidates(case, finest, stiff).items():
+    for name, runs in candidates(case, finest, stiff).items():
         progress(name)
         try:
             found.append(_witness(case, name, runs))
@@ -123,18 +127,20 @@ def _doubt(one: Witness) -> float:
     return one.own.trajectory if math.isfinite(one.own.trajectory) else math.inf
 
 
-def _candidates(case: Case, finest: int | None, stiff: bool) -> dict[str, list[dict]]:
+def candidates(case: Case, finest: int | None, stiff: bool) -> dict[str, list[dict]]:
     """Name -> keys of its runs, from coarse to fine; with equal cell times characteristics at Courant 1 too."""
     if finest is None:
         return {
             f"{method}, rtol {rtol:g}": [{"numerics.method": method, "numerics.rtol": rtol}] for method, rtol in TIGHT
         }
     found = {}
-    for scheme, method, control, size, factor in STIFF if stiff else PIPES:
+    able = {scheme for scheme, *_ in PIPES} <= {*case.schemes}
+    for scheme, method, control, size, factor, *limiters in (STIFF if stiff else PIPES) if able else CAVITIES:
         keys = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
+        keys |= dict(zip(["numerics.limiter"], limiters, strict=False))
         runs = [keys | cell_keys(case, finest * factor // 2**k) for k in (2, 1, 0)]
         if factor == FINER or _sharp(case, runs[0]):
-            found[f"{scheme} {method} on {factor * finest} cells"] = runs
+            found[" ".join([scheme, *limiters, method, f"on {factor * finest} cells"])] = runs
     return found
 
 

@@ -20,12 +20,9 @@ UNITS = {"opening": "-", "position": "-", "pressure": "Pa", "head": "m", "flow":
          "torque": "N m", "set pressure": "Pa"}  # fmt: skip
 BOUNDS = {"opening": (0.0, 1.0), "speed": (0.0, np.inf), "position": (-1.0, 1.0)}
 STATE_UNITS = {
-    "mass": "kg",
-    "excess": "kg",
-    "position": "m",
-    "velocity": "m/s",
-    "speed": "-",
-}  # others are mass flows [kg/s]
+    "mass": "kg", "excess": "kg", "air": "kg", "forward": "kg/s", "backward": "kg/s", "memory": "kg/s", "flow": "kg/s",
+    "position": "m", "velocity": "m/s", "speed": "-", "opening": "-",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +56,8 @@ class Linear:
     @property
     def state_units(self) -> list[str]:
         """Units of x."""
-        return [STATE_UNITS.get(name.rsplit(".", 1)[1], "kg/s") for name in self.states]
+        names = set(self.states)
+        return [state_unit(name, f"{name.rsplit('.', 1)[0]}.opening" in names) for name in self.states]
 
     @property
     def sparse(self) -> bool:
@@ -81,6 +79,12 @@ class Linear:
             "A": a, "B": self.b, "C": self.c, "D": self.d, "error": self.error,
             "state": self.at.y, "rate": self.at.rate,
         }  # fmt: skip
+
+
+def state_unit(name: str, opens: bool) -> str:
+    """SI unit of a state; the speed of what opens and shuts is that of its opening."""
+    quantity = name.rsplit(".", 1)[1].rstrip("0123456789[]")
+    return "1/s" if quantity == "speed" and opens else STATE_UNITS[quantity]
 
 
 def linearise(
@@ -124,12 +128,12 @@ def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
 
 def refuse_limiter(model) -> None:
     """Raise where a limited scheme is at work."""
-    scheme = model.case.numerics.scheme
+    scheme, able = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
+        smooth = f"{FROZEN_AS[scheme]} (what {scheme} is where all is smooth), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
-            f"the deviation; linearise with a linear scheme, --scheme {FROZEN_AS[scheme]} (what {scheme} is where all "
-            "is smooth), upwind or upwind5"
+            f"the deviation; linearise with a linear scheme, --scheme {smooth if 'upwind5' in able else 'upwind'}"
         )
 
 

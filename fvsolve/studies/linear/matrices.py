@@ -84,7 +84,7 @@ def refuse(model, j: int, what: str) -> None:
     why = {
         "slope": "its slope has no end there, as that of a valve at a drop of zero: give the valve "
                  "laminar_reynolds, or linearise while it flows (--at)",
-        "kink": "its slope differs from side to side there (a tank dry or full, an end-stop just touched): choose "
+        "kink": "its slope differs from side to side there (a tank dry or full, an end-stop or a seat just touched): "
                 "another time with --at",
     }[what]  # fmt: skip
     raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {why}")

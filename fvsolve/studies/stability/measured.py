@@ -70,7 +70,8 @@ class Runs:
         model = self.at.model
         changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
-        made = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
+        own = tuple(table.copy() for table in model.tables)  # what has opened or shut in one run has not in another
+        made = Loop(replace(model, case=replace(model.case, numerics=numerics), tables=own), lambda: self.structure)
         made.now[:] = y
         made.memory[told.T] = self.at.t
         made.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import listing
+from fvsolve.studies.linear.frozen import LIMITED
 from fvsolve.studies.stability.carried import TooLarge
 
 CLOSE = 0.02  # bounds that differ by less from the prediction need no word
@@ -14,8 +15,8 @@ GROWS = 1e-9  # of the greatest wave rate or eigenvalue: real parts below are ro
 def notes(row, side, system) -> list[str]:
     """What a reader of the row has to know."""
     found = [*of_the_case(row, side)]
-    if row.frozen:
-        return found + of_a_limiter(row)
+    if row.scheme in LIMITED and side.at.model.cells:
+        return found + of_a_limiter(row, side.at.model)
     if not np.isfinite(row.predicted):
         return [*found, "no step up to 1e4 / ||J|| fails", *of_a_state_left(row)]
     if "eigenvalues" not in row.left_out:
@@ -26,9 +27,16 @@ def notes(row, side, system) -> list[str]:
         found.append(f"no real run fails, up to h = {row.measured_up_to:.3g} s: the state moves away from where it was "
                      "linearised, or laws that are not linear stop the growth")  # fmt: skip
     if np.isfinite(row.difference) and abs(row.difference) > 0.01:
-        found.append(f"prediction and measurement differ by {100 * row.difference:+.1f} %: the deviation does not stay "
-                     "linear, or the state moves while it is carried along")  # fmt: skip
+        found.append(f"prediction and measurement differ by {100 * row.difference:+.1f} %: {why_apart(row, side)}")
     return found
+
+
+def why_apart(row, side) -> str:
+    """Why real runs may fail at another step than the linear system."""
+    if not moves(side):
+        return "the deviation does not stay linear"
+    return (f"{row.steps} such steps take {row.steps * row.predicted:.3g} s, and meanwhile the state leaves the one "
+            "that was linearised; the prediction is for that one alone")  # fmt: skip
 
 
 def of_a_state_left(row) -> list[str]:
@@ -42,17 +50,22 @@ def of_a_state_left(row) -> list[str]:
 def of_the_case(row, side) -> list[str]:
     """What is wrong with the state itself."""
     found = []
-    if row.greatest_real > GROWS * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
+    grows = row.greatest_real > 0.0
+    if grows and row.greatest_real > GROWS * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
         found.append(f"the case itself grows, at {row.greatest_real:.3g} 1/s: long steps do not make it so")
     if side.whole is not side.form:
         found.append(f"{listing(side.idle)}: no energy hangs on it, but it moves what has some: it counts, with the "
                      "least weight of all")  # fmt: skip
     elif side.idle:
         found.append(f"{listing(side.idle)}: no energy hangs on it where it moves freely, and that motion is left out")
-    moving = np.max(np.abs(side.at.rate) / side.at.model.scale)
-    if moving > 1e-9:
+    if moves(side):
         found.append("the state moves: runs are compared with a run from the same state, schedules held")
     return found
+
+
+def moves(side) -> bool:
+    """Whether the state does."""
+    return bool(np.max(np.abs(side.at.rate) / side.at.model.scale) > 1e-9)
 
 
 def of_eigenvalues(row, system) -> list[str]:
@@ -101,10 +114,12 @@ def of_von_neumann(row) -> list[str]:
     return []
 
 
-def of_a_limiter(row) -> list[str]:
+def of_a_limiter(row, model) -> list[str]:
     """What frozen weights say, and what they do not."""
-    found = [f"{row.scheme} has no derivative at a constant state: its limit is measured; frozen, its weights give the "
-             "limits beside it"]  # fmt: skip
+    beside = "its weights give the limits beside it"
+    if model.cavitates:
+        beside = "pipes with cavities know its weights only as upwind"
+    found = [f"{row.scheme} has no derivative at a constant state: its limit is measured; frozen, {beside}"]
     if np.isfinite(row.longer):
         found.append(f"Euler with a limiter has no sharp limit: {row.courant(row.measured):.3g} in {row.steps} steps, "
                      f"{row.courant(row.longer):.3g} in {10 * row.steps}")  # fmt: skip

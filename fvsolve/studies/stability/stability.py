@@ -6,7 +6,7 @@ Knows cases, matrices and runs; draws nothing. Failure: max over n <= N of ||R(h
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,12 +17,12 @@ from fvsolve.errors import FvsolveError
 from fvsolve.model.energy import EnergyForm, energy_form
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.methods import AUTO
-from fvsolve.studies.linear.frozen import LIMITED, Frozen, frozen, reweighted
+from fvsolve.studies.linear.frozen import FROZEN_AS, LIMITED, Frozen, frozen, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
 from fvsolve.studies.points import Points
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
-from fvsolve.studies.stability.carried import LONGEST, VECTORS
+from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
 from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD, predicted, system
 from fvsolve.studies.stability.measured import LONGEST as RUNNING
 from fvsolve.studies.stability.measured import Runs
@@ -138,12 +138,21 @@ class Maker:
             self.sides[scheme] = Side(self.at(scheme))
         return self.sides[scheme]
 
-    def frozen_side(self, name: str, weights: tuple[float, ...], degree: int) -> Side:
-        """The linear system with the weights of the limited scheme standing still; same cells, same state."""
-        if name not in self.sides:
-            wide = replace(self.at("upwind5"), y=self.at(self.scheme).y)
-            self.sides[name] = Side(reweighted(wide, weights, degree))
-        return self.sides[name]
+    def frozen_sides(self) -> Iterator[tuple[str, Side]]:
+        """Linear systems with the weights of the limited scheme standing still; same cells, same state."""
+        at = self.at(self.scheme)
+        if at.model.cavitates:  # pipes with cavities have no weights but these
+            yield "upwind", Side(replace(self.at("upwind"), y=at.y))
+            return
+        from fvsolve.studies.stability.limited import FROZEN
+
+        for name, weights in FROZEN["weno5" if self.scheme == "weno5" else at.model.case.numerics.limiter].items():
+            if name not in self.sides:
+                cells = sum(weight != 0 for weight in weights)
+                degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")  # of the ends
+                wide = replace(self.at("upwind5"), y=at.y)
+                self.sides[name] = Side(reweighted(wide, tuple(map(float, weights)), degree))
+            yield name, self.sides[name]
 
     def row(self, name: str) -> Row:
         """The row of a method."""
@@ -181,9 +190,7 @@ class Maker:
         else:
             left_out["field_of_values"] = f"{model.y_size} states; it is computed up to {WIDE}"
         if model.cells:
-            from fvsolve.studies.stability.grid import advection_limit
-
-            row["von_neumann"] = advection_limit(self.scheme, method.name).limit / side.rate
+            row["von_neumann"] = on_a_long_pipe(self.scheme, method) / side.rate
         if model.y_size > DENSE:
             left_out["squaring"] = f"{model.y_size} states: predicted by {VECTORS} vectors carried along"
         return row | {"left_out": left_out}
@@ -191,31 +198,36 @@ class Maker:
     def limited(self, method) -> Row:
         """The row of a limited scheme: limits with its weights frozen, and the measured one."""
         at = self.at(self.scheme)
-        numerics = at.model.case.numerics
-        from fvsolve.studies.stability.limited import FROZEN
-
-        frozen_as = FROZEN["weno5" if self.scheme == "weno5" else numerics.limiter]
-        found, starts, latest = {}, {}, time.monotonic() + LONGEST
-        for name, weights in frozen_as.items():
-            cells = sum(weight != 0 for weight in weights)
-            degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")  # of the ends
-            side = self.frozen_side(name, tuple(map(float, weights)), degree)
-            one = system(method, side.e, self.steps, self.threshold, latest)
-            limit = predicted(one)
-            found[name] = limit.step
-            if 0.0 < limit.step < np.inf:
-                starts[limit.step] = one.growth(limit.fails).start
+        found, starts, left_out, latest = {}, {}, {}, time.monotonic() + LONGEST
+        try:
+            for name, side in self.frozen_sides():
+                one = system(method, side.e, self.steps, self.threshold, latest)
+                limit = predicted(one)
+                found[name] = limit.step
+                if 0.0 < limit.step < np.inf:
+                    starts[limit.step] = one.growth(limit.fails).start
+        except TooLarge as error:
+            left_out["frozen weights"] = str(error)
         guess = sorted(starts)[len(starts) // 2] if starts else np.inf  # between the flat and the steep ones
+        if left_out and not starts:
+            guess = on_a_long_pipe(FROZEN_AS[self.scheme], method) / side.rate or np.inf
         runs = Runs(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, VISIBLE)
         row = {
             "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
-            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": found, "left_out": {},
+            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": found, "left_out": left_out,
         }  # fmt: skip
-        row |= measure(runs, guess, float(np.abs(side.spectrum.values).max(initial=0.0)), row["left_out"])
+        row |= measure(runs, guess, one.size, row["left_out"])
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
             longer = Runs(at, method.name, side.form, starts.get(guess), LONGER * self.steps, self.threshold, VISIBLE)
             row["longer"] = measure(longer, row["measured"], 0.0, row["left_out"], "longer").get("measured", np.nan)
         return Row(**row | {"notes": tuple(notes(Row(**row), side, None))})
+
+
+def on_a_long_pipe(scheme: str, method) -> float:
+    """Von Neumann's limit, a Courant number."""
+    from fvsolve.studies.stability.grid import advection_limit
+
+    return advection_limit(scheme, method.name).limit
 
 
 def place(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:

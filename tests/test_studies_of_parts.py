@@ -1,0 +1,147 @@
+"""Studies asked of scenes with devices, vessels and cavities: what cases of parts brought to light."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import fvsolve
+from fvsolve.cli.order import unit
+from fvsolve.errors import FvsolveError
+from fvsolve.studies.accuracy import afford
+from fvsolve.studies.accuracy.afford import affordable
+from fvsolve.studies.accuracy.fit import fit
+from fvsolve.studies.accuracy.judge import plausible
+from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings
+from fvsolve.studies.accuracy.reference import otherwise
+from fvsolve.studies.accuracy.witnesses import candidates
+from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.outcome import outcome
+from fvsolve.studies.points import Points
+from fvsolve.studies.stability import stability as room
+from fvsolve.studies.stability.carried import TooLarge
+from fvsolve.studies.stability.stability import stability
+
+CASES = Path(__file__).parent.parent / "cases"
+
+
+def case(name, **numerics):
+    """A shipped case with keys changed: double underscores are dots."""
+    return fvsolve.load(CASES / f"{name}.toml", {key.replace("__", "."): value for key, value in numerics.items()})
+
+
+# stability ------------------------------------------------------------------------------------------------------
+
+
+def test_two_runs_of_a_scene_with_events_keep_apart_what_has_shut_in_each():
+    (row,) = stability(case("check-valve-slam", links__main__cells=20), at=3.8, steps=200).rows
+    assert abs(row.difference) < 0.01
+
+
+def test_a_state_that_moves_is_named_where_prediction_and_measurement_differ_and_at_rest_they_do_not():
+    (moves,) = stability(case("surge-tank")).rows
+    assert abs(moves.difference) > 0.1 and any("the state leaves the one" in note for note in moves.notes)
+    (rests,) = stability(case("surge-tank", links__tunnel__initial_flow=0.0, nodes__shaft__level=50.0)).rows
+    assert abs(rests.difference) < 1e-3
+
+
+def test_pipes_with_cavities_are_measured_beside_what_upwind_predicts():
+    few = case("adelaide", links__main__cells=10)
+    (row,) = stability(few, steps=100).rows
+    assert row.measured > 0.0 and set(row.frozen) == {"upwind"}
+    (plain,) = stability(few, ["upwind"], steps=100).rows
+    assert row.frozen["upwind"] == pytest.approx(plain.predicted) and abs(plain.difference) < 0.01
+    with pytest.raises(FvsolveError, match="--scheme upwind$"):
+        linearise(few)
+
+
+def test_a_limited_scheme_is_measured_where_its_frozen_weights_take_too_long(monkeypatch):
+    def never(one):
+        raise TooLarge("too large")
+
+    few = case("surge-tank", links__tunnel__type="pipe", links__tunnel__wave_speed=1000.0, links__tunnel__cells=20)
+    known = stability(few, ["muscl"], ["ssp-rk3"], steps=100).rows[0].measured
+    monkeypatch.setattr(room, "predicted", never)
+    (row,) = stability(few, ["muscl"], ["ssp-rk3"], steps=100).rows
+    assert not row.frozen and row.left_out["frozen weights"] == "too large"
+    assert row.measured == pytest.approx(known, rel=0.2)
+
+
+# units ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("variable", "said"), [
+    ("top.air_volume", "m3"), ("top.air_mass", "kg"), ("links at the end: opening", "-"), ("spool.flow_P", "m3/s"),
+    ("main.gauge_pressure@0.5", "Pa"), ("pump.speed", "-"),
+])  # fmt: skip
+def test_every_probe_has_the_unit_of_its_part(variable, said):
+    assert unit(variable) == said
+
+
+@pytest.mark.parametrize(("name", "states"), [
+    ("air-valve", {"air": "kg", "mass": "kg"}), ("pump-trip", {"speed": "-", "forward[0]": "kg/s"}),
+    ("pressure-reducing", {"opening": "-"}), ("hydraulic-drive", {"position": "m", "velocity": "m/s", "excess": "kg"}),
+])  # fmt: skip
+def test_every_state_has_its_unit(name, states):
+    found = linearise(case(name), outputs=(), scheme="upwind")
+    units = dict(zip((state.rsplit(".", 1)[1] for state in found.states), found.state_units, strict=True))
+    assert states.items() <= units.items()
+
+
+# what is expected before a run ----------------------------------------------------------------------------------
+
+
+def test_check_names_the_pipe_that_sets_the_step_and_knows_what_cavities_cost():
+    cavities, plain = (fvsolve.build(case(name)).checks for name in ("adelaide", "pump-trip"))
+    assert cavities["step_set_by"].startswith("links.main:")
+    cost = [one["expected_seconds"] / one["steps"] / one["cells"] for one in (cavities, plain)]
+    assert cost[0] > 5.0 * cost[1]
+
+
+# order ----------------------------------------------------------------------------------------------------------
+
+
+def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeypatch, tmp_path):
+    few = case("relief-on-closed-main", links__main__cells=64)
+    whole = affordable(few, None, None, 3, None, "auto", None)
+    assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
+    monkeypatch.setattr(afford, "LONGEST", 1e-6)
+    made = affordable(few, None, None, 3, None, "auto", Points(tmp_path))
+    assert [level.cells for level in made.levels] == [8, 16, 32] and "begun on 8 of 64 cells" in made.words
+    assert affordable(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
+    monkeypatch.undo()
+    assert affordable(few, None, None, 3, None, "auto", Points(tmp_path)) == made  # a study that goes on
+
+
+def test_errors_that_fall_quicker_than_scheme_and_method_can_make_them_are_said_to_show_no_order():
+    sizes = [2.0**-k for k in range(5)]
+    assert "show no order" in plausible(fit(sizes, [h**8 for h in sizes]), 4.0).note
+    assert not plausible(fit(sizes, [h**4 for h in sizes]), 4.0).note
+
+
+def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
+    keys = otherwise(case("adelaide", links__main__cells=10), ("muscl",), "both", 4.0)
+    assert keys["numerics.scheme"] == "muscl" and keys["links.main.cells"] == 40
+
+
+# chart ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_chart_leaves_out_what_does_not_follow_cavities():
+    found, coarse = case("adelaide"), Coarse(25, 800.0, 800, 0.0)
+    made = settings(found, coarse, None, None, [50], None, None)
+    assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(found) == "muscl rk4"
+    assert left_out(found, None) == ["upwind5", "weno5"] and not left_out(found, ["weno5"])
+    assert not left_out(case("pump-trip"), None)
+
+
+def test_with_cavities_both_references_of_a_chart_can_be_run():
+    few = case("adelaide", links__main__cells=8)
+    found = [outcome(few, keys[0]).ok for keys in candidates(few, 4, False).values()]
+    assert found == [True, True]
+
+
+def test_a_chart_of_dear_rates_has_fewer_cells():
+    cheap, dear = (Coarse(25, 800.0, 800, 0.0, dearness).levels for dearness in (1.0, 30.0))
+    assert max(dear) < max(cheap) and len(dear) == len(cheap)
