@@ -65,7 +65,7 @@ def rhs_seconds(model) -> float:
     """CPU time of one call of the compiled rates, waves running [s]."""
     y = TRIED * model.scale * np.random.default_rng(1).choice([-1.0, 1.0], model.y_size)
     dydt, out = np.zeros(model.y_size), model.new_out()
-    rhs, t, handle, found, calls = model.functions()[0], float(model.case.numerics.start), model.handle, math.inf, 1
+    rhs, t, handle, found, calls = model.functions.rhs, float(model.case.numerics.start), model.handle, math.inf, 1
     for _ in range(5):
         spent = 0.0
         while spent < LONG:
