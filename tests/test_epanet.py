@@ -103,6 +103,13 @@ def test_steady_heads_and_flows_are_epanets(name, hour, tmp_path):
     assert lost < 1e-3 and off < 1e-4  # ten times closer than was asked for
 
 
+@pytest.mark.parametrize("name, hour", [("ky4", 12), ("ky10", 10)])
+def test_tanks_that_epanet_fills_to_their_rim_are_read(name, hour):
+    """Its levels pass the rim by rounding: 31.659582 m in a tank of 31.659576 m."""
+    case = load(tomllib.loads(import_network(SHIPPED / f"{name}.inp", hour).text))
+    assert any(node.level == node.height for node in case.nodes.values() if node.kind == "tank")
+
+
 @pytest.mark.parametrize(
     "formula, roughness, within",
     [("H-W", 110, 1e-3), ("C-M", 0.011, 0.05), ("D-W", 0.3, 0.1)],  # other constants: docs/epanet.md

@@ -240,3 +240,17 @@ def test_gas_that_expands_too_far_for_the_scheme_is_told_what_follows_it():
     fluid["cavitation"] = True
     result = fvsolve.run(scene(nodes, links, 5.0, {"rtol": 1e-6, "scheme": "muscl"}, ["g.pressure"], 0.1, fluid=fluid))
     assert result.ok
+
+
+def test_check_tells_the_wave_speed_with_the_gas_of_the_start():
+    """Wood's speed in a rigid pipe: 1 / c^2 = d rho / dp = rho (1 / beta + gas / p) / V^2, per volume of liquid."""
+    air, p, beta, rho = 5e-3, 5e5, 2.2e9, 1000.0
+    fluid = {"name": "user", "density": rho, "bulk_modulus": beta, "viscosity": 1e-3, "vapor_pressure": 2300.0}
+    fluid |= {"law": "mixture", "air_fraction": air}
+    case = scene(
+        {"a": reservoir(p), "b": junction()}, {"line": pipe("a", "b", 100.0, 0.1, 1483.2396974, 10)}, 1.0, {}, []
+    )
+    found = fvsolve.build(fvsolve.load(case | {"fluid": fluid})).checks["pipes"]["line"]
+    gas = air / (1.0 - air) * ATM / p
+    volume = 1.0 - (p - ATM) / beta + gas
+    assert found["wave_speed"] == approx((rho * (1.0 / beta + gas / p) / volume**2) ** -0.5, rel=1e-6)

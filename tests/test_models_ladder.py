@@ -190,6 +190,11 @@ def test_the_quickest_change_is_the_range_over_the_steepest_slope():
 def test_the_command_names_the_cheapest(fvs, tmp_path):
     code, out, _ = fvs("chart", "gradual-closure", "--models", "--target", "0.05", "--json")
     said = json.loads(out)
-    assert code == 0 and said["cheapest"]["error"] <= 0.05 and said["target"] == 0.05
+    within = [rung for rung in said["rungs"] if not rung["reason"] and rung["error"] <= 0.05]
+    assert code == 0 and said["cheapest"] == min(within, key=lambda rung: rung["seconds"]) and said["target"] == 0.05
     code, out, _ = fvs("chart", "gradual-closure", "--models", "--target", "0.05")
-    assert code == 0 and f"cheapest within 0.05: {said['cheapest']['name']}" in out
+    (named,) = [line for line in out.splitlines() if line.startswith("cheapest within 0.05: ")]
+    assert code == 0  # which of them was quickest is a matter of the clock
+    assert ", ".join(named.removeprefix("cheapest within 0.05: ").split(", ")[:2]) in {
+        f"{rung['name']}, {rung['law']}" for rung in within
+    }

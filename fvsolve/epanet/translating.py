@@ -100,7 +100,8 @@ class Translation:
         if node.vol_curve is not None:
             area = curve_slope(node.vol_curve.points, level)
             self.note("volume curve: taken as the area at its level", name)
-        return words.tank(self.elevation[name], area, round(level, 6), node.max_level, self.position(node))
+        level = min(round(level, 6), node.max_level)  # EPANET's own may be above it by rounding
+        return words.tank(self.elevation[name], area, level, node.max_level, self.position(node))
 
     # links ------------------------------------------------------------------------------------------------
 

@@ -34,14 +34,14 @@ def checks(model) -> dict[str, Any]:
         for name, row in zip(model.body_names, model.tables[rec.I_BODIES], strict=False)
     }
     pipes, remembered = {}, model.steady["unsteady"]
-    for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
+    for k, (mesh, row) in enumerate(zip(model.pipes, model.tables[rec.I_PIPES], strict=True)):
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
         law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
         loss = drag(*law) / row["area"] * mesh.length
         pipes[mesh.name] = {
-            "length": mesh.length, "cells": mesh.cells, "wave_speed": mesh.wave_speed,
-            "travel_time": mesh.length / mesh.wave_speed, "velocity": float(velocity),
+            "length": mesh.length, "cells": mesh.cells, "wave_speed": (speed := start_speed(model, k)),
+            "travel_time": mesh.length / speed, "velocity": float(velocity),
             "reynolds": float(rho * abs(velocity) * mesh.diameter / viscosity) if viscosity else None,
             "friction_factor": float(abs(loss) / dynamic) if dynamic > 0 else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
@@ -59,6 +59,18 @@ def checks(model) -> dict[str, Any]:
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
         "moving": model.steady["moving"], "warnings": model.warnings,
     }  # fmt: skip
+
+
+def start_speed(model, k: int) -> float:
+    """Wave speed of pipe k [m/s]: that of liquid and wall, or under `mixture` its mean along the pipe at the start."""
+    mesh = model.pipes[k]
+    if model.case.fluid.law != "mixture":
+        return mesh.wave_speed
+    from fvsolve.kernels.density import local_speed
+
+    st, floats, row = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS], model.tables[rec.I_PIPES][k]
+    pressures = model.cell_pressure(k, np.zeros(mesh.cells))
+    return mesh.cells / sum(1.0 / local_speed(st, floats, row, float(p)) for p in pressures)
 
 
 def rhs_seconds(model) -> float:
