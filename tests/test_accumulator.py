@@ -174,6 +174,32 @@ def test_an_empty_start_is_said():
     assert "a: empty at the start" in " ".join(model_of(case).warnings)
 
 
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
+    """Full of gas, its bladder stands in the neck, as stiff as fluid; then the line presses it in, as SciPy has it."""
+    case = swing(0.0, 2.0, law=law, probes=["a.pressure", "c.flow", "a.gas_volume", "a.gas_pressure"])
+    case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5, "exponent": N}
+    case["nodes"]["lake"] = reservoir({"time": [0.0, 0.5, 1.0], "value": [P0, P0, 12e5]})
+    result, stiff = fvsolve.run(case), WATER["bulk_modulus"] / (0.01 * 0.1)
+    shed = (9e5 - P0) / stiff
+
+    def rates(t, y):
+        p = P0 + stiff * y[1] if y[1] < shed else 9e5 * (1.0 - (y[1] - shed) / 0.1) ** -N
+        return (np.interp(t, [0.5, 1.0], [P0, 12e5]) - p) / INERTIA, y[0]
+
+    def lifts(t, y):
+        return y[1] - shed
+
+    exact = solve_ivp(rates, (0, 2.0), [0.0, 0.0], t_eval=result.t, events=lifts, rtol=1e-10, atol=1e-15, max_step=2e-4)
+    (event,) = result.summary["events"]
+    assert event["what"] == "holds fluid again" and [event["time"]] == pytest.approx(exact.t_events[0], rel=1e-4)
+    stands = result.t < event["time"]
+    assert (result["a.gas_volume"][stands] == 0.1).all() and result["a.pressure"][stands].max() < 9e5
+    assert result["a.gas_pressure"] == pytest.approx(9e5 * (0.1 / result["a.gas_volume"]) ** N, rel=1e-12)
+    if law == "linear":  # under the other the vessel's fluid is squeezed too
+        assert result["c.flow"] == pytest.approx(exact.y[0], abs=1e-6 * exact.y[0].max())
+
+
 @pytest.mark.parametrize(
     "wrong, said",
     [

@@ -23,6 +23,7 @@ from fvsolve.kernels.density import (
     density,
     enthalpy,
     impedance,
+    log_density,
     mass_of_pressure,
     pressure_of_enthalpy,
     pressure_of_log,
@@ -84,9 +85,12 @@ def stored_pressures_barotropic(t, y, out, tables):
             level = tank_level(node, floats, node["density"], y[node["y"]])
             out[at] = head_pressure(st, floats, level) - head_pressure(st, floats, node["level"])
         elif kind == CHAMBER:
-            q = np.log((node["mass"] + y[node["y"]]) / (st["rho"] * node["volume"]))
+            mass = node["mass"] + y[node["y"]]
+            p = pressure_of_log(st, floats, 0.0, np.log(mass / (st["rho"] * node["volume"])))
             q0 = np.log(node["mass"] / (st["rho"] * node["volume"]))
-            out[at] = pressure_of_log(st, floats, 0.0, q) - pressure_of_log(st, floats, 0.0, q0)
+            out[at] = p - pressure_of_log(st, floats, 0.0, q0)
+            if node["row"] >= 0:
+                out[layout["stiffness"] + node["row"]] = 1.0 / (log_density(st, floats, p)[1] * mass)
 
 
 @njit

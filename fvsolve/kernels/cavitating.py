@@ -5,24 +5,20 @@ reconstructed from both sides of a face, the flux is that of the Riemann problem
 profile's; so a front moves at its own speed, be it sound's in the liquid or a cavity's edge a thousand times slower.
 """
 
-from math import exp
-
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic import wall_force
 from fvsolve.kernels.barotropic_nodes import stored_pressures_barotropic
 from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.cavitating_nodes import balance_junctions, close_nodes_cavitating
-from fvsolve.kernels.density import local_speed, log_density, pressure_of_mass, thrust
+from fvsolve.kernels.density import local_speed, pressure_of_mass, thrust
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_volume
 from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
 from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import (
-    CHAMBER,
     I_FLOATS,
     I_LAYOUT,
     I_MARKS,
-    I_NODES,
     I_PIPES,
     I_PROFILE,
     I_SCRATCH,
@@ -149,17 +145,6 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 
 
 @njit
-def soften_chambers(out, tables):
-    """dp / dm of chambers at their pressures now [Pa/kg]: by it `greatest_rate` bounds the step."""
-    st, floats, nodes = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_NODES]
-    for i in range(nodes.size):
-        if nodes[i]["kind"] == CHAMBER:
-            p = nodes[i]["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + i]
-            value, slope = log_density(st, floats, p)
-            nodes[i]["stiffness"] = 1.0 / (st["rho"] * exp(value) * slope * nodes[i]["volume"])
-
-
-@njit
 def rhs_cavitating(t, y, dydt, out, handle):
     """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch.
 
@@ -175,7 +160,6 @@ def rhs_cavitating(t, y, dydt, out, handle):
         end_states(st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch)
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
-    soften_chambers(out, tables)
     run(INFLOWS, t, y, dydt, out, handle)
     close_nodes_cavitating(t, y, out, tables)
     run(HOLD, t, y, dydt, out, handle)

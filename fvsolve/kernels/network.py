@@ -11,6 +11,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.pipes import family_of, pipe_rates
 from fvsolve.kernels.records import (
+    CHAMBER,
     FIXED,
     I_ARMED,
     I_COLUMNS,
@@ -101,7 +102,8 @@ def net_flows(out, tables):
 @njit(forceinline=True)
 def stiffness_of(nodes, layout, out, i):
     """Pressure per stored mass [Pa/kg] of node i now, 0 where it stores none."""
-    if nodes[i]["kind"] >= MOVING:
+    kind = nodes[i]["kind"]
+    if kind >= MOVING or (kind == CHAMBER and nodes[i]["row"] >= 0):  # a chamber that gas softens
         return out[layout["stiffness"] + nodes[i]["row"]]
     return nodes[i]["stiffness"]
 

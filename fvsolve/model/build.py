@@ -86,7 +86,7 @@ class Scene:
         table = np.zeros(len(self.case.places), rec.NODE)
         table["y"] = table["shape"] = table["schedule"] = table["row"] = -1
         table["full"] = np.inf
-        moving = 0
+        moving, gas = 0, self.fluid.air is not None and self.fluid.air.fraction > 0.0
         for i, (name, node) in enumerate(self.case.places.items()):
             row = table[i]
             row["elevation"] = self.case.elevation(name)
@@ -96,6 +96,8 @@ class Scene:
             if name in self.moving_names or (device is not None and device.vessel):
                 row["kind"], row["row"] = rec.MOVING if device is None else rec.VESSEL, moving
                 moving += 1
+            elif row["kind"] == rec.CHAMBER and gas:  # which softens it
+                row["row"], moving = moving, moving + 1
             if device is not None:
                 device.place(self, name, node, row)
         self.node_table, self.moving = table, moving

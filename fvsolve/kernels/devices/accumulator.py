@@ -95,5 +95,8 @@ def accumulator_value(y, tables, device, which):
     """Gas volume [m3], gas pressure [Pa]."""
     node = tables[I_NODES][device["node"]]
     st, floats = tables[I_SETTINGS][0], tables[I_FLOATS]
-    u, change, _ = gas_and_pressure(st, floats, node, device["data"], y[node["y"]])
-    return node["pressure"] + change if which == 1 else floats[device["data"] + GAS] * exp(u)
+    at, came = device["data"], y[node["y"]]
+    u, change, _ = gas_and_pressure(st, floats, node, at, came)
+    if floats[at + NECK] > 0.0 and came < floats[at + EMPTY]:  # the bladder stands in its neck, and holds its precharge
+        change = floats[at + SHED]
+    return node["pressure"] + change if which == 1 else floats[at + GAS] * exp(u)
