@@ -9,12 +9,14 @@ import pytest
 import fvsolve
 from fvsolve.cli.order import unit
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.accuracy import afford
+from fvsolve.studies.accuracy import afford, models
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import fit
 from fvsolve.studies.accuracy.judge import plausible
+from fvsolve.studies.accuracy.models import change_time
 from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings
 from fvsolve.studies.accuracy.reference import otherwise
+from fvsolve.studies.accuracy.rungs import Misfit, restated
 from fvsolve.studies.accuracy.witnesses import candidates
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.outcome import outcome
@@ -23,6 +25,7 @@ from fvsolve.studies.stability import stability as room
 from fvsolve.studies.stability.carried import TooLarge
 from fvsolve.studies.stability.stability import stability
 
+RHO_WATER = 998.2
 CASES = Path(__file__).parent.parent / "cases"
 
 
@@ -145,3 +148,26 @@ def test_with_cavities_both_references_of_a_chart_can_be_run():
 def test_a_chart_of_dear_rates_has_fewer_cells():
     cheap, dear = (Coarse(25, 800.0, 800, 0.0, dearness).levels for dearness in (1.0, 30.0))
     assert max(dear) < max(cheap) and len(dear) == len(cheap)
+
+
+# models ---------------------------------------------------------------------------------------------------------
+
+
+def test_what_acts_on_a_pump_that_trips_is_its_run_down():
+    model = fvsolve.build(case("pump-trip", links__main__cells=10))
+    pump = model.case.links["pump"]
+    torque = RHO_WATER * 9.80665 * 46.658e-3 * (71.999 - 2.0) / (pump.efficiency * pump.rated_speed)
+    assert change_time(model) == pytest.approx(pump.inertia * pump.rated_speed / torque, rel=0.05)
+
+
+def test_a_vessel_is_not_said_by_a_volume():
+    with pytest.raises(Misfit, match="top would take the place of the air-valve"):
+        restated(case("air-valve"), "lumped volume")
+    with pytest.raises(Misfit, match="all ends hold their pressure"):
+        restated(case("pump-trip-air-vessel"), "column and volume")
+
+
+def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
+    monkeypatch.setattr(models, "PATIENCE", 0.0)
+    with pytest.raises(FvsolveError, match="the case itself does not run: not tried: already 1 cell was given up"):
+        models.ladder(case("relief-on-closed-main", links__main__cells=4))
