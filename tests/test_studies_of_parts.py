@@ -20,6 +20,8 @@ from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, setti
 from fvsolve.studies.accuracy.reference import otherwise
 from fvsolve.studies.accuracy.rungs import Misfit, restated
 from fvsolve.studies.accuracy.witnesses import candidates
+from fvsolve.studies.failure.converged import converged
+from fvsolve.studies.failure.eigen_limit import spectrum
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.outcome import outcome
 from fvsolve.studies.points import Points
@@ -188,3 +190,13 @@ def test_a_network_whose_plan_has_not_the_scale_of_its_heights_is_pressed_flat_t
     assert lowered(*town)[2] == pytest.approx(0.5 * FLAT * 30) and lowered(*town)[0] == 30
     assert lowered((0, 0, 0), (0, 0, 70))[2] == 70  # one upright pipe
     assert lowered((0, 0, 0), (300, 50, 70))[2] == 70
+
+
+# map ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_map_of_cavities_has_a_reference_and_a_limit():
+    few = case("adelaide", links__main__cells=8)
+    found = converged(few, {}, False)
+    assert found.words.startswith("muscl van-leer on 24 cells") and 0.0 < found.doubt < 1.0
+    assert np.array_equal(spectrum(few, {}), spectrum(few, {"numerics.scheme": "upwind"}))
