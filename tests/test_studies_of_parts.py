@@ -19,9 +19,12 @@ from fvsolve.studies.accuracy.models import change_time
 from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings
 from fvsolve.studies.accuracy.reference import otherwise
 from fvsolve.studies.accuracy.rungs import Misfit, restated
+from fvsolve.studies.accuracy.timing import GIVEN_UP
 from fvsolve.studies.accuracy.witnesses import candidates
+from fvsolve.studies.failure import watched as watched_runs
 from fvsolve.studies.failure.converged import converged
 from fvsolve.studies.failure.eigen_limit import spectrum
+from fvsolve.studies.failure.verdict import SKIPPED, Measures, verdict
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.outcome import outcome
 from fvsolve.studies.points import Points
@@ -200,3 +203,11 @@ def test_a_map_of_cavities_has_a_reference_and_a_limit():
     found = converged(few, {}, False)
     assert found.words.startswith("muscl van-leer on 24 cells") and 0.0 < found.doubt < 1.0
     assert np.array_equal(spectrum(few, {}), spectrum(few, {"numerics.scheme": "upwind"}))
+
+
+def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(monkeypatch):
+    late, off = Measures(f"{GIVEN_UP} 10 s", False), Measures("finished", True, error=0.5, farthest=0.0)
+    assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == SKIPPED
+    monkeypatch.setattr(watched_runs, "LONGEST", 0.0)
+    found, _ = watched_runs.watched(case("relief-on-closed-main", links__main__cells=4))
+    assert found.reason.startswith(GIVEN_UP) and not found.ok

@@ -26,6 +26,10 @@ class Capped(Run):
     def pause(self, spent: float) -> None:
         """As of every run, until it is given up."""
         super().pause(spent)
+        self.check()
+
+    def check(self) -> None:
+        """Give up where it has cost too much."""
         if self.processor > self.most_seconds or self.loop.memory[told.STEPS] > self.most_steps:
             raise GivenUp
 
