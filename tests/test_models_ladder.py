@@ -15,7 +15,8 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import ladder
-from fvsolve.studies.accuracy.models import change_time, restated, structures
+from fvsolve.studies.accuracy.models import change_time
+from fvsolve.studies.accuracy.rungs import restated, structures
 
 LENGTH, DIAMETER, SPEED, FACTOR = 300.0, 0.2, 1000.0, 0.02
 AREA = math.pi / 4 * DIAMETER**2

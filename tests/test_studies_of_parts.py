@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fvsolve
 from fvsolve.cli.order import unit
+from fvsolve.draw.view import FLAT, lower
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.accuracy import afford
+from fvsolve.studies.accuracy import afford, models
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import fit
 from fvsolve.studies.accuracy.judge import plausible
+from fvsolve.studies.accuracy.models import change_time
 from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings
 from fvsolve.studies.accuracy.reference import otherwise
+from fvsolve.studies.accuracy.rungs import Misfit, restated
+from fvsolve.studies.accuracy.timing import GIVEN_UP
 from fvsolve.studies.accuracy.witnesses import candidates
+from fvsolve.studies.failure import watched as watched_runs
+from fvsolve.studies.failure.converged import converged
+from fvsolve.studies.failure.eigen_limit import spectrum
+from fvsolve.studies.failure.verdict import SKIPPED, Measures, verdict
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.outcome import outcome
 from fvsolve.studies.points import Points
@@ -23,6 +32,7 @@ from fvsolve.studies.stability import stability as room
 from fvsolve.studies.stability.carried import TooLarge
 from fvsolve.studies.stability.stability import stability
 
+RHO_WATER = 998.2
 CASES = Path(__file__).parent.parent / "cases"
 
 
@@ -145,3 +155,59 @@ def test_with_cavities_both_references_of_a_chart_can_be_run():
 def test_a_chart_of_dear_rates_has_fewer_cells():
     cheap, dear = (Coarse(25, 800.0, 800, 0.0, dearness).levels for dearness in (1.0, 30.0))
     assert max(dear) < max(cheap) and len(dear) == len(cheap)
+
+
+# models ---------------------------------------------------------------------------------------------------------
+
+
+def test_what_acts_on_a_pump_that_trips_is_its_run_down():
+    model = fvsolve.build(case("pump-trip", links__main__cells=10))
+    pump = model.case.links["pump"]
+    torque = RHO_WATER * 9.80665 * 46.658e-3 * (71.999 - 2.0) / (pump.efficiency * pump.rated_speed)
+    assert change_time(model) == pytest.approx(pump.inertia * pump.rated_speed / torque, rel=0.05)
+
+
+def test_a_vessel_is_not_said_by_a_volume():
+    with pytest.raises(Misfit, match="top would take the place of the air-valve"):
+        restated(case("air-valve"), "lumped volume")
+    with pytest.raises(Misfit, match="all ends hold their pressure"):
+        restated(case("pump-trip-air-vessel"), "column and volume")
+
+
+def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
+    monkeypatch.setattr(models, "PATIENCE", 0.0)
+    with pytest.raises(FvsolveError, match="the case itself does not run: not tried: already 1 cell was given up"):
+        models.ladder(case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001))
+
+
+# pictures -------------------------------------------------------------------------------------------------------
+
+
+def test_a_network_whose_plan_has_not_the_scale_of_its_heights_is_pressed_flat_to_be_seen_from_above():
+    def lowered(*points):
+        points = np.array(points, float)
+        lower(points)
+        return np.ptp(points, axis=0)
+
+    town = [(0, 0, 0), (30, 5, 70), (10, 25, 20)]
+    assert lowered(*town)[2] == pytest.approx(0.5 * FLAT * 30) and lowered(*town)[0] == 30
+    assert lowered((0, 0, 0), (0, 0, 70))[2] == 70  # one upright pipe
+    assert lowered((0, 0, 0), (300, 50, 70))[2] == 70
+
+
+# map ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_map_of_cavities_has_a_reference_and_a_limit():
+    few = case("adelaide", links__main__cells=8)
+    found = converged(few, {}, False)
+    assert found.words.startswith("muscl van-leer on 24 cells") and 0.0 < found.doubt < 1.0
+    assert np.array_equal(spectrum(few, {}), spectrum(few, {"numerics.scheme": "upwind"}))
+
+
+def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(monkeypatch):
+    late, off = Measures(f"{GIVEN_UP} 10 s", False), Measures("finished", True, error=0.5, farthest=0.0)
+    assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == SKIPPED
+    monkeypatch.setattr(watched_runs, "LONGEST", 0.0)
+    found, _ = watched_runs.watched(case("relief-on-closed-main", links__main__cells=4))
+    assert found.reason.startswith(GIVEN_UP) and not found.ok

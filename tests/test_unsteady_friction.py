@@ -18,8 +18,8 @@ from fvsolve import exact
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.model import unsteady
-from fvsolve.studies.accuracy.models import column
 from fvsolve.studies.accuracy.reference import start_of
+from fvsolve.studies.accuracy.rungs import column
 from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.ports.response import response
 

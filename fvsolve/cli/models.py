@@ -17,9 +17,10 @@ def show_models(case, target: float, as_json: bool) -> None:
         print_json(found.plain())
         return
     console = terminal.console()
-    heads = ["model", "law", "states", "error", "greatest", "time [ms]", "calls of f"]
+    heads = ["model", "law", "states", "error", "of", "greatest", "time [ms]", "calls of f"]
     rows = [
-        [one.name, one.law, *map(_number, (one.states, one.error, one.greatest, 1e3 * one.seconds, one.rhs))]
+        [one.name, one.law, *map(_number, (one.states, one.error)), one.worst,
+         *map(_number, (one.greatest, 1e3 * one.seconds, one.rhs))]
         for one in found.rungs if one.error is not None
     ]  # fmt: skip
     terminal.table(heads, rows, console)

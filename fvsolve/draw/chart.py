@@ -57,6 +57,8 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
                            color=style.DOUBT, in_layout=False)  # fmt: skip
     for axes, name in zip(grid[-1], columns, strict=True):
         axes.set_xlabel(name, fontsize=8.5, color=style.INK)
+    for axes in grid.flat:
+        style.label_decades(axes)
     _legend(figure, colours, markers, curves)
     style.title(figure, title)
     return figure

@@ -35,6 +35,17 @@ def dress(axes) -> None:
     axes.yaxis.get_offset_text().set(fontsize=8, color=MUTED)
 
 
+def label_decades(axes) -> None:
+    """On logarithmic axes labels at powers of ten alone, unless an axis spans less than a decade."""
+    from matplotlib.ticker import NullFormatter
+
+    axes.tick_params(which="minor", labelcolor=INK, labelsize=7)
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = sorted(axis.get_view_interval())
+        if axis.get_scale() == "log" and high >= 10.0 * low:
+            axis.set_minor_formatter(NullFormatter())
+
+
 def legend(axes) -> None:
     """The legend beside the axes, where it covers no line."""
     if axes.get_legend_handles_labels()[0]:

@@ -14,6 +14,7 @@ UNITS = {"pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s"}
 UNITS |= {"least_pressure": "Pa", "greatest_pressure": "Pa"}
 TUBE = 0.006  # radius of a pipe as part of the picture's diagonal
 FLAT = 0.08  # a network lower than this part of its width is looked at from above
+SHIFT = 0.12  # of half the height of the picture
 REMEDY = (
     "PyVista found no OpenGL to draw with off screen; on Debian or Ubuntu "
     "`apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
@@ -46,6 +47,7 @@ def draw(frame: str, field: str, out: str, caption: str) -> None:
     import pyvista
 
     mesh = pyvista.read(frame)
+    lower(mesh.points)
     mesh.set_active_scalars(field, preference="cell")
     wide = max(mesh.length, 1e-9)
     plotter = pyvista.Plotter(off_screen=True, window_size=SIZE)
@@ -67,7 +69,7 @@ def draw(frame: str, field: str, out: str, caption: str) -> None:
 BAR = {
     "color": "#1f2933",
     "fmt": "%.4g",
-    "n_labels": 5,
+    "n_labels": 4,  # none below the title
     "title_font_size": 22,
     "label_font_size": 18,
     "width": 0.5,
@@ -86,7 +88,25 @@ def _look(plotter, bounds) -> None:
         plotter.view_xz()
     else:
         plotter.view_isometric()
-    plotter.camera.zoom(1.25)
+    plotter.camera.zoom(1.1)
+    lift(plotter.camera)
+
+
+def lower(points) -> None:
+    """Press a network that is taller than wide flat, to be looked at from above: its plan has not the scale of heights.
+
+    points : float[n, 3], changed; a network in one upright plane stays as it is
+    """
+    x, y, z = points.max(axis=0) - points.min(axis=0)
+    if z > max(x, y) and min(x, y) > FLAT * z:
+        points[:, 2] *= 0.5 * FLAT * max(x, y) / z
+
+
+def lift(camera) -> None:
+    """Raise what is seen above the bar of colours."""
+    up = [SHIFT * camera.parallel_scale * part for part in camera.up]
+    camera.position = [a - b for a, b in zip(camera.position, up, strict=True)]
+    camera.focal_point = [a - b for a, b in zip(camera.focal_point, up, strict=True)]
 
 
 if __name__ == "__main__":

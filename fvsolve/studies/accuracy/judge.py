@@ -15,6 +15,7 @@ from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fi
 from fvsolve.studies.accuracy.order import Order, Row
 from fvsolve.studies.accuracy.reference import ROUNDING, WORTH, Reference, of_run, reference
 from fvsolve.studies.accuracy.refine import Level, Plan, greatest_rate, pipes
+from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.outcome import Outcome, Told, outcome, prepared
 from fvsolve.studies.points import Points
 
@@ -87,7 +88,7 @@ class Judge:
 
     def run(self, level: Level) -> Outcome:
         """The run of a row."""
-        return outcome(self.case, recorded(self.case, level.set), best_of=BEST_OF, budget=BRIEF)
+        return outcome(self.case, recorded(self.case, level.set), best_of=BEST_OF, run=lasting, budget=BRIEF)
 
     def sizes(self) -> dict[str, float]:
         """How large each variable is, by the first row that runs: rounding is measured against it."""

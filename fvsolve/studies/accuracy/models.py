@@ -1,6 +1,6 @@
 """The ladder of models of one case, from a rigid column to the full line, linear to tabled: what each one errs, costs.
 
-Knows how a pipe is said with less; leaves the runs to `outcome`.
+Knows rungs and laws; leaves the runs to `outcome`.
 """
 
 from __future__ import annotations
@@ -15,19 +15,17 @@ import numpy as np
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.friction import drag
 from fvsolve.kernels.schedules import schedule_value
-from fvsolve.studies.outcome import Outcome, outcome, prepared
+from fvsolve.model.checks import velocities
+from fvsolve.studies.accuracy.rungs import Misfit, restated, structures
+from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
+from fvsolve.studies.outcome import Outcome, outcome
 
 TARGET = 1e-2
-WITHOUT_CELLS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
-BEST_OF = 3
+BEST_OF, BRIEF = 3, 0.3  # timings of a rung; [s] that the first may take for there to be others
+PATIENCE = 8.0  # [s] of CPU time after which a rung is given up
 BEYOND = 3.0  # times dp/K: from there on the laws differ by something else
 SAMPLES = 4001  # of each schedule, to find how quickly it changes
-
-
-class Misfit(Exception):
-    """Why a case cannot be said by a rung."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +48,11 @@ class Rung:
     seconds: float | None = None
     rhs: int | None = None
 
+    @property
+    def worst(self) -> str:
+        """The probe that errs most."""
+        return max(self.errors, key=self.errors.get, default="")
+
 
 @dataclass(frozen=True)
 class Apart:
@@ -57,6 +60,7 @@ class Apart:
 
     error : root mean square over time; start : at the start of the run; moves : the range over the greatest value [-]
     level : greatest pressure at the start over the stiffness [-]
+    swift : velocity head of the quickest pipe at the start, rho v^2 / 2 [Pa], which the linear law leaves out
     """
 
     probe: str
@@ -64,6 +68,7 @@ class Apart:
     start: float
     moves: float
     level: float
+    swift: float
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,7 @@ class Ladder:
         if apart.start >= 0.5 * apart.error:
             why = f"{apart.start:.3g} is there from the start: pressures of {apart.level:.2g} K put the laws that far "
             why += f"apart, and all that {apart.probe} moves is {apart.moves:.2g} of itself"
+        why += f"; linear leaves out the velocity head, {apart.swift:.3g} Pa at the start" if apart.swift > 0.0 else ""
         return f"{said}, more than dp/K = {self.strain:.2g}: {why}"
 
     def plain(self) -> dict[str, Any]:
@@ -135,10 +141,13 @@ def ladder(
 
     case, told = load(case, dict(set or {})), progress or (lambda *_: None)
     asked = [(rung, law) for rung in structures(case) for law in laws(case)]
-    runs = []
+    runs, dear = [], {}  # dear: law -> the rung with cells that was given up under it
     for at, (rung, law) in enumerate(asked):
         told(at, len(asked), f"{rung}, {law}")
-        runs.append(_run(case, rung, law))
+        late = f"not tried: already {dear[law]} was given up" if law in dear else ""
+        runs.append(Outcome(late, refused=True) if late else _run(case, rung, law))
+        if runs[-1].reason.startswith(GIVEN_UP) and rung.endswith(("cell", "cells")):
+            dear[law] = rung
     at = max((k for k, one in enumerate(runs) if one.ok and asked[k][0] == asked[-1][0]), default=None)
     if at is None:
         raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
@@ -171,102 +180,18 @@ def laws(case) -> list[str]:
     return [law for law in LAWS if law in found]
 
 
-def structures(case) -> list[str]:
-    """Names of the rungs of a case, poorest first."""
-    pipes = [link for link in case.links.values() if link.kind == "pipe"]
-    if not pipes:
-        return ["as it is"]
-    most = max(pipe.cells for pipe in pipes)
-    counts = [2**k for k in range(20) if 2 ** (k + 1) <= most]
-    cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
-    return ["rigid column", "lumped volume", "column and volume", *cells, "full line"]
-
-
 def _run(case, rung: str, law: str) -> Outcome:
     try:
-        return outcome(case, {**restated(case, rung), "fluid.law": law}, best_of=BEST_OF)
+        return outcome(case, {**restated(case, rung), "fluid.law": law}, best_of=BEST_OF, run=patient, budget=BRIEF)
     except (CaseError, Misfit) as error:
         return Outcome(f"skipped: {error}", refused=True)
 
 
-# how a scene is said with less ------------------------------------------------------------------------------
-
-
-def restated(case, rung: str) -> dict[str, Any]:
-    """The keys that say a case by a rung; raises Misfit where it cannot be."""
-    if rung in ("full line", "as it is"):
-        return {}
-    pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
-    if rung.endswith(("cell", "cells")):
-        count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
-        return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}
-    found = {"expect": {}, "compare": {}, **WITHOUT_CELLS}
-    found["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
-    if rung != "lumped volume":
-        found |= {f"links.{name}": column(case, name) for name in pipes}
-    else:
-        model = prepared(case)
-        found |= {f"links.{name}": resistance(case, model, name) for name in pipes}
-    if rung != "rigid column":
-        found |= volumes(case, pipes)
-    return found
-
-
-def _survives(probe, pipes: dict) -> bool:
-    return probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
-
-
-def column(case, name: str) -> dict[str, Any]:
-    """A pipe as a rigid column."""
-    keys = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
-    said = case.raw["links"][name]
-    found = {"type": "rigid-column", **{key: said[key] for key in keys if key in said}}
-    if found.get("friction", {}).get("model") == "unsteady":  # a column has no memory
-        kept = {key: value for key, value in found["friction"].items() if key in ("roughness", "factor")}
-        found["friction"] = {"model": "quasi-steady", **kept}
-    return found
-
-
-def resistance(case, model, name: str) -> dict[str, Any]:
-    """A pipe as the drop that its friction takes from the flow of the start, dp = zeta rho v^2 / 2."""
-    row = model.tables[rec.I_PIPES][[pipe.name for pipe in model.pipes].index(name)]
-    law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
-    flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * row["dx"] * row["cells"]
-    if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
-        raise Misfit(f"{name} is at rest at the start, so what its friction takes is not known")
-    zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
-    if not zeta > 0.0:
-        raise Misfit(f"{name} has no friction, so nothing is left of it between two volumes")
-    said = case.raw["links"][name]
-    return {"type": "orifice", "from": said["from"], "to": said["to"], "diameter": said["diameter"],
-            "loss_coefficient": zeta}  # fmt: skip
-
-
-def volumes(case, pipes: dict) -> dict[str, Any]:
-    """The junctions that pipes touch as chambers that hold half of each, wall and all: V beta / K."""
-    held: dict[str, float] = {}
-    fluid = case.properties
-    for name, pipe in pipes.items():
-        stiff = fluid.density * case.wave_speed(name) ** 2
-        half = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiff
-        for end in pipe.ports.values():
-            held[end] = held.get(end, 0.0) + half
-    found = {}
-    for name, volume in held.items():
-        node = case.places[name]
-        if node.kind in ("reservoir", "tank"):
-            continue
-        if name not in case.nodes:
-            raise Misfit(f"{name} belongs to a cylinder and holds no more than its own volume")
-        said = case.raw["nodes"][name]
-        if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
-            raise Misfit(f"flow enters or leaves at {name}, which a volume does not do by itself")
-        keys = {key: said[key] for key in ("elevation", "position", "initial_pressure") if key in said}
-        own = node.volume if node.kind == "chamber" else 0.0
-        found[f"nodes.{name}"] = {"type": "chamber", "volume": own + volume, **keys}
-    if not found:
-        raise Misfit("all ends hold their pressure, so there is no volume between them")
-    return found
+def patient(model, state, sink, progress) -> Capped:
+    """A run of PATIENCE at most."""
+    made = Capped(model, state, sink, progress)
+    made.most_seconds = PATIENCE
+    return made
 
 
 # what a rung amounts to -------------------------------------------------------------------------------------
@@ -308,7 +233,12 @@ def apart(plain: Outcome, richest: Outcome) -> Apart | None:
     truth = richest.rows[:, 1 + richest.probes.index(probe)]
     level = max((float(abs(change[0])) for change in pressures(richest)), default=0.0) / stiffness(richest)
     moves = float(np.ptp(truth) / np.max(np.abs(truth)))
-    return Apart(probe, _rms(gaps[probe]), float(gaps[probe][0]), moves, level)
+    return Apart(probe, _rms(gaps[probe]), float(gaps[probe][0]), moves, level, velocity_head(richest.model))
+
+
+def velocity_head(model) -> float:
+    """Greatest rho v^2 / 2 of a pipe at the start [Pa]; 0 without pipes."""
+    return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
 
 
 def travel_time(model) -> float:
@@ -317,19 +247,36 @@ def travel_time(model) -> float:
 
 
 def change_time(model) -> float:
-    """Of the quickest schedule: its range over its steepest slope; 0 where one jumps, infinite where none moves [s]."""
+    """Of what acts quickest: a schedule, its range over its steepest slope, or a pump that trips, by its run-down.
+
+    0 where a schedule jumps, infinite where nothing acts [s].
+    """
     numerics = model.case.numerics
     if any(jump for t, jump in model.breaks if t > numerics.start):
         return 0.0
     times = np.unique([*np.linspace(numerics.start, numerics.end, SAMPLES), *(t for t, _ in model.breaks)])
     model.tables[rec.I_SETTINGS][0]["limit"] = np.inf  # from where on schedules hold their left limit
-    quickest = math.inf
+    trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
+    quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
     for index in range(len(model.tables[rec.I_SCHEDULES])):
+        if any(np.ptp([schedule_value(model.tables, index, at) for at in (before(t), t)]) for t in trips.values()):
+            continue  # it says that a pump has tripped
         values = np.array([schedule_value(model.tables, index, t) for t in times])
         steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
         if steepest > 0.0:
             quickest = min(quickest, float(np.ptp(values)) / steepest)
     return quickest
+
+
+def before(t: float) -> float:
+    """A time just before another [s]."""
+    return math.nextafter(t, -math.inf)
+
+
+def run_down_time(model, name: str, t: float) -> float:
+    """In which a pump that trips would stand still, were its torque to stay [s]."""
+    rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
+    return float(model.case.links[name].speed.value[0]) / abs(rate) if rate != 0.0 else math.inf
 
 
 def strain(one: Outcome) -> float:

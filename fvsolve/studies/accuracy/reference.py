@@ -18,6 +18,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, averaged, differences, fields, recorded, size_of, waves
 from fvsolve.studies.accuracy.refine import greatest_rate, pipes
+from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.outcome import Outcome, outcome
 
 SCHEMES = ("upwind5", "weno5", "upwind3", "fromm", "muscl")  # of references, in this order; with cavities the last
@@ -138,7 +139,12 @@ def start_of(model) -> room.Start:
 # finer runs -------------------------------------------------------------------------------------------------------
 
 
-def finer_reference(case, avoid: tuple[str, ...], way: str, finer: int = FINER, run: Callable = outcome) -> Reference:
+def once(case, keys: Mapping) -> Outcome:
+    """A run that is given up where it costs too much."""
+    return outcome(case, keys, run=lasting)
+
+
+def finer_reference(case, avoid: tuple[str, ...], way: str, finer: int = FINER, run: Callable = once) -> Reference:
     """A run that is finer and made otherwise, with its own error from two coarser ones of its kind."""
     runs = [run(case, otherwise(case, avoid, way, share * finer / FINER)) for share in (1, 2, 4)]
     bad = next((one for one in runs if not one.ok), None)

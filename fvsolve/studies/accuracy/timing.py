@@ -13,6 +13,7 @@ from fvsolve.studies.outcome import Outcome, outcome
 MOST = 5  # runs of which the quickest counts
 BUDGET = 0.4  # [s] that they may take together, the first excepted
 LIMIT = 30.0  # [s] of CPU time after which a run is given up
+LASTING = 120.0  # the same of one that others are measured against
 TASTE = 20_000  # steps after which a run that only compiles is
 GIVEN_UP = "given up after"
 
@@ -25,6 +26,10 @@ class Capped(Run):
     def pause(self, spent: float) -> None:
         """As of every run, until it is given up."""
         super().pause(spent)
+        self.check()
+
+    def check(self) -> None:
+        """Give up where it has cost too much."""
         if self.processor > self.most_seconds or self.loop.memory[told.STEPS] > self.most_steps:
             raise GivenUp
 
@@ -44,6 +49,13 @@ def capped(model, state, sink, progress) -> Run:
     """A run of LIMIT seconds at most."""
     made = Capped(model, state, sink, progress)
     made.most_seconds = LIMIT
+    return made
+
+
+def lasting(model, state, sink, progress) -> Run:
+    """A run of LASTING seconds at most."""
+    made = Capped(model, state, sink, progress)
+    made.most_seconds = LASTING
     return made
 
 

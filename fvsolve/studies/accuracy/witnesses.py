@@ -14,7 +14,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.studies.accuracy.distance import Distance, Track, distance, extremes_apart, ranges, track
 from fvsolve.studies.accuracy.reference import exact_reference
 from fvsolve.studies.accuracy.setting import cell_keys
-from fvsolve.studies.accuracy.timing import finished
+from fvsolve.studies.accuracy.timing import finished, lasting, tasted
 from fvsolve.studies.outcome import Outcome, prepared
 
 FINER = 4  # times the cells of the finest run that is judged
@@ -150,14 +150,14 @@ def _sharp(case: Case, keys: dict) -> bool:
     rates, span = model.wave_rates, case.numerics.end - case.numerics.start
     if np.ptp(rates) > 1e-9 * rates.max():
         return False
-    return finished(model).counts["steps"] <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
+    return finished(model, tasted).counts["steps"] <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
 
 
 def _witness(case: Case, name: str, runs: list[dict]) -> Witness:
     """A candidate, run; FvsolveError says why it did not finish."""
     tracks = []
     for keys in runs:
-        found = finished(prepared(case, keys))
+        found = finished(prepared(case, keys), lasting)
         if not found.ok:
             raise FvsolveError(f"{name}: {found.reason}")
         tracks.append(track(found))

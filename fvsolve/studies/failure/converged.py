@@ -16,6 +16,10 @@ WAVES = (
     {"scheme": "weno5", "method": "rk4", "courant": 0.6},
     {"scheme": "upwind5", "method": "ssp-rk3", "courant": 0.5},
 )
+CAVITIES = (
+    {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk3", "courant": 0.5},
+    {"scheme": "muscl", "limiter": "minmod", "method": "rk4", "courant": 0.5},
+)
 STIFF_WAVES = (
     {"scheme": "weno5", "method": "radau-iia-5", "rtol": 1e-6},
     {"scheme": "upwind5", "method": "rodas-5p", "rtol": 1e-6},
@@ -43,7 +47,9 @@ def converged(case, set: dict, stiff: bool) -> Converged:
     Raises FvsolveError where either does not finish.
     """
     model = prepared(case, set)
-    if model.cells:
+    if model.cells and model.cavitates:
+        settings = CAVITIES
+    elif model.cells:
         settings = STIFF_WAVES if stiff else WAVES
     else:
         settings = STIFF_NO_PIPES if stiff else NO_PIPES
@@ -61,7 +67,8 @@ def _numerics(settings: dict) -> dict:
 
 def _words(settings: dict, cells: int) -> str:
     control = next(f"{name} {settings[name]:g}" for name in ("courant", "rtol") if name in settings)
-    where = f"{settings['scheme']} on {FINER * cells} cells with " if cells else ""
+    scheme = " ".join(settings[name] for name in ("scheme", "limiter") if name in settings)
+    where = f"{scheme} on {FINER * cells} cells with " if cells else ""
     return f"{where}{settings['method']} at {control}"
 
 

@@ -19,14 +19,18 @@ def spectrum(case, set: dict) -> np.ndarray | None:
     from fvsolve.studies.outcome import prepared
 
     model = prepared(case, set)
-    scheme = model.case.numerics.scheme
-    if scheme in LINEAR_TWIN:
-        model = prepared(case, {**set, "numerics.scheme": LINEAR_TWIN[scheme]})
+    if (scheme := model.case.numerics.scheme) in LINEAR_TWIN:
+        model = prepared(case, {**set, "numerics.scheme": twin(model.case, scheme)})
     if model.y_size > MOST_STATES:
         return None
     rest = np.zeros(model.y_size)
     times = (model.case.numerics.start, model.case.numerics.end)
     return np.concatenate([np.linalg.eigvals(model.jacobian(t, rest)) for t in times])
+
+
+def twin(case, scheme: str) -> str:
+    """The linear scheme that stands for a limited one: what it is where all is smooth, or at its steepest."""
+    return LINEAR_TWIN[scheme] if LINEAR_TWIN[scheme] in case.schemes else "upwind"
 
 
 def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:

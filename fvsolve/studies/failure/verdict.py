@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.studies.accuracy.timing import GIVEN_UP
+
 STABLE, RINGING, COARSE, WRONG, BLOWN, REFUSED, SKIPPED = (
     "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
 )  # fmt: skip
@@ -18,7 +20,7 @@ VERDICTS = {
     WRONG: "finite, error above the tolerance, and neither half nor a quarter of the step helps",
     BLOWN: "not finite, or three ranges of a probe beyond what the reference reaches",
     REFUSED: "the program refused the case, or stopped by name",
-    SKIPPED: "would take too many implicit steps",
+    SKIPPED: "would take too many implicit steps, or was given up after too long",
 }
 FAR = 3.0  # ranges of a probe outside the reference's span: beyond, a run has blown up
 SWINGS = 8  # changes in a row that alternate in sign: ringing
@@ -51,6 +53,8 @@ def verdict(one: Measures, shorter: Callable[[], Measures], tolerance: float) ->
 
     It is asked only where the error is above the tolerance.
     """
+    if one.reason.startswith(GIVEN_UP):
+        return SKIPPED
     if one.refused or (not one.ok and "not finite" not in one.reason):
         return REFUSED
     if not one.ok or not one.farthest <= FAR:
@@ -60,7 +64,13 @@ def verdict(one: Measures, shorter: Callable[[], Measures], tolerance: float) ->
     if one.error <= tolerance:
         return STABLE
     enough = max(tolerance, HELPS * one.error)
-    return COARSE if any(shorter().error <= enough for _ in range(2)) else WRONG
+    for _ in range(2):
+        half = shorter()
+        if half.reason.startswith(GIVEN_UP):
+            return SKIPPED
+        if half.error <= enough:
+            return COARSE
+    return WRONG
 
 
 def ringing(bursts: Sequence[np.ndarray], ranges: np.ndarray) -> float:

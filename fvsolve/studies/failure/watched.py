@@ -6,15 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fvsolve.solve.solve import Run
 from fvsolve.steppers import orders as told
+from fvsolve.studies.accuracy.timing import Capped
 from fvsolve.studies.outcome import Outcome, outcome
 
 WINDOW = 9  # steps looked at in a row, at least
+LONGEST = 10.0  # [s] of CPU time after which a run is given up
 SPARSE = 30  # windows of long runs lie a thirtieth of the steps so far apart
 
 
-class Watched(Run):
+class Watched(Capped):
     """A run that stops after every step of a window and notes its probes; the steps are those of any run.
 
     bursts : lists of float64[probes] [SI], the probes after steps that follow each other
@@ -24,9 +25,11 @@ class Watched(Run):
         super().__init__(*given)
         self.bursts: list[list[np.ndarray]] = [[]]
         self.budget = self.left = 1.0
+        self.most_seconds = LONGEST
 
     def pause(self, spent: float) -> None:
-        """Note the probes; after a window of a long run, let it run on to the next one."""
+        """Note the probes; after a window of a long run, let it run on to the next one, or give it up."""
+        self.check()
         model, stepper = self.model, self.loop.stepper
         values = np.zeros(len(model.probes))
         self.loop.observe(self.loop.t, self.loop.now, stepper.out, model.handle, values)

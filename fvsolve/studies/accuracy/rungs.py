@@ -1,0 +1,108 @@
+"""A scene said with less: rigid columns, lumped volumes, few cells, as keys of a case. Knows parts; runs nothing."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.friction import drag
+from fvsolve.studies.outcome import prepared
+
+WITHOUT_CELLS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
+
+
+class Misfit(Exception):
+    """Why a case cannot be said by a rung."""
+
+
+def structures(case) -> list[str]:
+    """Names of the rungs of a case, poorest first."""
+    pipes = [link for link in case.links.values() if link.kind == "pipe"]
+    if not pipes:
+        return ["as it is"]
+    most = max(pipe.cells for pipe in pipes)
+    counts = [2**k for k in range(20) if 2 ** (k + 1) <= most]
+    cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
+    return ["rigid column", "lumped volume", "column and volume", *cells, "full line"]
+
+
+def restated(case, rung: str) -> dict[str, Any]:
+    """The keys that say a case by a rung; raises Misfit where it cannot be."""
+    if rung in ("full line", "as it is"):
+        return {}
+    pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
+    if rung.endswith(("cell", "cells")):
+        count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
+        return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}
+    found = {"expect": {}, "compare": {}, **WITHOUT_CELLS}
+    found["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
+    if rung != "lumped volume":
+        found |= {f"links.{name}": column(case, name) for name in pipes}
+    else:
+        model = prepared(case)
+        found |= {f"links.{name}": resistance(case, model, name) for name in pipes}
+    if rung != "rigid column":
+        found |= volumes(case, pipes)
+    return found
+
+
+def _survives(probe, pipes: dict) -> bool:
+    return probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
+
+
+def column(case, name: str) -> dict[str, Any]:
+    """A pipe as a rigid column."""
+    keys = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
+    said = case.raw["links"][name]
+    found = {"type": "rigid-column", **{key: said[key] for key in keys if key in said}}
+    if found.get("friction", {}).get("model") == "unsteady":  # a column has no memory
+        kept = {key: value for key, value in found["friction"].items() if key in ("roughness", "factor")}
+        found["friction"] = {"model": "quasi-steady", **kept}
+    return found
+
+
+def resistance(case, model, name: str) -> dict[str, Any]:
+    """A pipe as the drop that its friction takes from the flow of the start, dp = zeta rho v^2 / 2."""
+    row = model.tables[rec.I_PIPES][[pipe.name for pipe in model.pipes].index(name)]
+    law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
+    flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * row["dx"] * row["cells"]
+    if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
+        raise Misfit(f"{name} is at rest at the start, so what its friction takes is not known")
+    zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
+    if not zeta > 0.0:
+        raise Misfit(f"{name} has no friction, so nothing is left of it between two volumes")
+    said = case.raw["links"][name]
+    return {"type": "orifice", "from": said["from"], "to": said["to"], "diameter": said["diameter"],
+            "loss_coefficient": zeta}  # fmt: skip
+
+
+def volumes(case, pipes: dict) -> dict[str, Any]:
+    """The junctions that pipes touch as chambers that hold half of each, wall and all: V beta / K."""
+    held: dict[str, float] = {}
+    fluid = case.properties
+    for name, pipe in pipes.items():
+        stiff = fluid.density * case.wave_speed(name) ** 2
+        half = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiff
+        for end in pipe.ports.values():
+            held[end] = held.get(end, 0.0) + half
+    found = {}
+    for name, volume in held.items():
+        node = case.nodes.get(name, case.places[name])
+        if node.kind in ("reservoir", "tank", "accumulator"):
+            continue
+        if node.kind not in ("junction", "inflow", "chamber"):
+            raise Misfit(f"a volume at {name} would take the place of the {node.kind}")
+        if name not in case.nodes:
+            raise Misfit(f"{name} belongs to a cylinder and holds no more than its own volume")
+        said = case.raw["nodes"][name]
+        if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
+            raise Misfit(f"flow enters or leaves at {name}, which a volume does not do by itself")
+        keys = {key: said[key] for key in ("elevation", "position", "initial_pressure") if key in said}
+        own = node.volume if node.kind == "chamber" else 0.0
+        found[f"nodes.{name}"] = {"type": "chamber", "volume": own + volume, **keys}
+    if not found:
+        raise Misfit("all ends hold their pressure, so there is no volume between them")
+    return found
