@@ -16,7 +16,7 @@ from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import fit
 from fvsolve.studies.accuracy.judge import plausible
 from fvsolve.studies.accuracy.models import change_time
-from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings
+from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings, work
 from fvsolve.studies.accuracy.reference import otherwise
 from fvsolve.studies.accuracy.rungs import Misfit, restated
 from fvsolve.studies.accuracy.timing import GIVEN_UP
@@ -139,7 +139,7 @@ def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
 
 
 def test_a_chart_leaves_out_what_does_not_follow_cavities():
-    found, coarse = case("adelaide"), Coarse(25, 800.0, 800, 0.0)
+    found, coarse = case("adelaide"), Coarse(25, 800.0, 800, [1e6], 0.0)
     made = settings(found, coarse, None, None, [50], None, None)
     assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(found) == "muscl rk4"
     assert left_out(found, None) == ["upwind5", "weno5"] and not left_out(found, ["weno5"])
@@ -152,8 +152,14 @@ def test_with_cavities_both_references_of_a_chart_can_be_run():
     assert found == [True, True]
 
 
+def test_the_work_of_a_chart_counts_pipes_of_one_cell_once():
+    found = case("pump-trip")
+    assert work(found, 400) == pytest.approx(4 * work(found, 200))
+    assert work(case("net3-pump-trip"), 400) < 3 * work(case("net3-pump-trip"), 200)
+
+
 def test_a_chart_of_dear_rates_has_fewer_cells():
-    cheap, dear = (Coarse(25, 800.0, 800, 0.0, dearness).levels for dearness in (1.0, 30.0))
+    cheap, dear = (Coarse(25, 800.0, 800, [8e6, 2e6, 5e5, 1e5], 0.0, dearness).levels for dearness in (1.0, 30.0))
     assert max(dear) < max(cheap) and len(dear) == len(cheap)
 
 

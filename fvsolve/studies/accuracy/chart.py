@@ -252,9 +252,7 @@ def _aim(target: float, point: Point) -> Aim:
 
 def _useless(case: Case, points: list[Point], floor: dict) -> str:
     finest = min(errors_of(points), default=math.nan)
-    told = (
-        f"all errors (least {finest:.2g})" if math.isfinite(finest) else "what can be told, for no run reached the end"
-    )
+    told = f"all errors (least {finest:.2g})" if math.isfinite(finest) else "what can be told, for no run came near"
     way = "fewer --cells (references have four times the finest)" if longest(case) else "a larger --rtol"
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
             f"{floor['trajectory']:.2g}, more than {told}; try {way}, or end the run earlier")  # fmt: skip

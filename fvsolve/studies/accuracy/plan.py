@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fvsolve.case import load
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME, SCHEMES
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.model.checks import rhs_seconds
 from fvsolve.steppers.methods import AUTO, METHODS
-from fvsolve.studies.accuracy.setting import Setting, adaptive, longest, with_cells, without_cells
+from fvsolve.studies.accuracy.refine import greatest_rate, pipes
+from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest, with_cells, without_cells
 from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
 from fvsolve.studies.outcome import prepared
 
@@ -22,19 +24,21 @@ STEPS = tuple(32 * 4**k for k in range(7))  # of methods that estimate no error
 LEVELS, MOST_CELLS = 5, 400
 MOST_WORK = 1e7  # cells times steps of the finest run
 STIFF = 3.0  # times the steps that waves ask for
-CALL, CELL = 1e-6, 1e-8  # [s] that a call of the rates takes beside its cells, and a cell
+CELL = 1e-8  # [s] that a call of the rates usually takes for a cell
 
 
 @dataclass(frozen=True)
 class Coarse:
     """A coarse run of a case with pipes: its cells, the steps that its waves ask for, and the steps it took.
 
+    works : cells times steps of runs with MOST_CELLS, half as many, a quarter ..., where pipes of one cell keep it
     compile_seconds : what it took beyond a second run [s]; dearness : of its rates, a cell, in usual ones
     """
 
     cells: int
     waves: float
     steps: int
+    works: list[float]
     compile_seconds: float
     dearness: float = 1.0
 
@@ -47,10 +51,9 @@ class Coarse:
     def levels(self) -> list[int]:
         """Five numbers of cells, each twice the one before, the finest as fine as a minute allows."""
         finest = MOST_CELLS
-        while finest > 2**LEVELS:
-            finer = 16 * finest / MOST_CELLS
-            stiff = self.steps * self.cells * finer if self.stiff else 0.0
-            if self.dearness * max(self.waves * self.cells * finer**2, stiff / 10) <= MOST_WORK:
+        for work in self.works:
+            stiff = self.steps * self.cells * 16 * finest / MOST_CELLS if self.stiff else 0.0
+            if self.dearness * max(work, stiff / 10) <= MOST_WORK:
                 break
             finest //= 2
         return [finest // 2**k for k in range(LEVELS - 1, -1, -1)]
@@ -63,8 +66,19 @@ def coarse(case: Case) -> Coarse:
     waves, spent = span * float(model.wave_rates.max()) / DEFAULT_COURANT, compile_seconds(model)
     found = finished(model, capped)
     done = (found.t - case.numerics.start) / span  # less than 1 where it was given up
-    dearness = max(1.0, (rhs_seconds(model) - CALL) / (CELL * model.cells))
-    return Coarse(model.cells, waves, round(found.counts["steps"] / done) if done > 0.0 else 0, spent, dearness)
+    twice = prepared(case, with_cells(case, default_scheme(case), DEFAULT_METHOD, MOST_CELLS // 8).keys)
+    more = (rhs_seconds(twice) - rhs_seconds(model)) / max(1, twice.cells - model.cells)  # a cell: nodes cost too
+    dearness = max(1.0, more / CELL)
+    works = [work(case, MOST_CELLS >> k) for k in range(MOST_CELLS.bit_length() - LEVELS)]
+    steps = round(found.counts["steps"] / done) if done > 0.0 else 0
+    return Coarse(model.cells, waves, steps, works, spent, dearness)
+
+
+def work(case: Case, cells: int) -> float:
+    """Cells times steps of a run with so many in the pipe that a wave crosses last."""
+    made = load(case, cell_keys(case, cells))
+    counts = {name: pipe.cells for name, pipe in pipes(made).items()}
+    return sum(counts.values()) * (case.numerics.end - case.numerics.start) * greatest_rate(made, counts)
 
 
 def default_scheme(case: Case) -> str:
