@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,3 +103,12 @@ def test_a_run_interrupted_and_resumed_is_the_unbroken_one_of_the_general_path(t
 def test_only_upwind_and_euler_leap_and_only_pipes(case, allowed):
     model = build(load(case))
     assert LOOP.leap_allowed(model, method_named(model.case.numerics.method)) is allowed
+
+
+def test_scenes_with_events_are_stepped_one_by_one_and_end():
+    """A leap that an event cut short stood still for ever."""
+    plain = {"numerics.scheme": "upwind", "numerics.method": "euler", "numerics.courant": 1.0}
+    case = Path(__file__).parent.parent / "cases" / "relief-on-closed-main.toml"
+    result = fvsolve.run(case, set=plain)
+    assert result.ok and result.summary["events"]
+    assert not LOOP.leap_allowed(build(load(case, plain)), method_named("euler"))

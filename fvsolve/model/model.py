@@ -125,8 +125,13 @@ class Model:
         return np.zeros(int(self.layout["size"]))
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
-        """dy/dt = f(t, y) : float64[n]; schedules take their right-hand value."""
-        return self.evaluate(t, y)[0]
+        """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there."""
+        armed = self.tables[rec.I_ARMED]
+        kept = armed.copy()
+        armed[:] = 0.0
+        found = self.evaluate(t, y)[0]
+        armed[:] = kept
+        return found
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""

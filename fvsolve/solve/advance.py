@@ -33,21 +33,23 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop = Loop(held, lambda: model.structure)  # which does not depend on what is held
     loop.now[:] = state.y
     loop.memory[told.T] = state.t
+    known = state.memory.size == 2 + loop.armed.size
+    loop.armed[:] = state.memory[2:] if known else 0.0
     adaptive = loop.orders[told.CONTROL] == told.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
         loop.begin(end, NO_LIMIT)
-        if first and adaptive and state.memory.size == 2:
-            loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory
+        if first and adaptive and known:
+            loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory[:2]
         code = loop.run(NO_LIMIT)
         while code == told.CHUNK and automatic.wants_change(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
         if code != told.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
-    return State(loop.t, loop.now.copy(), loop.memory[[told.STEP, told.ERROR_OLD]].copy())
+    return State(loop.t, loop.now.copy(), np.append(loop.memory[[told.STEP, told.ERROR_OLD]], loop.armed))
 
 
 class Input(NamedTuple):

@@ -126,11 +126,11 @@ class Loop:
 
 
 def leap_allowed(model: Model, method: Method) -> bool:
-    """Whether steps can be taken whole: upwind and Euler, pipes alone, no friction or a given factor."""
+    """Whether steps can be taken whole: upwind and Euler, pipes alone, no events, no friction or a given factor."""
     settings, numerics = model.tables[rec.I_SETTINGS][0], model.case.numerics
     plain = np.isin(model.tables[rec.I_PIPES]["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
     return bool(
         settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and plain
+        and model.y_size == 2 * model.cells and plain and model.tables[rec.I_ARMED].size == 0
     )  # fmt: skip
