@@ -53,12 +53,12 @@ def network(table: dict[str, Any]) -> Found:
         if table.get(group) == {}:
             yield (group,), "is empty; wanted two places and a link between them at least"
     touched = {place for places in ends.values() for place in places}
-    for name in nodes:
-        if name not in touched:
+    for name, node in nodes.items():
+        if _own_places(name, node) is None and name not in touched:
             yield ("nodes", name), "no link touches it"
     if not complete:
         return  # what hangs together is not known
-    islands = _islands(ends)
+    islands = _islands({name: own for name, node in nodes.items() if (own := _own_places(name, node))} | ends)
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
         yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
@@ -159,10 +159,19 @@ def _owned(name: str, link: Any) -> dict[str, str]:
     return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
 
 
+def _own_places(name: str, node: Any) -> list[str] | None:
+    """Places in a node's stead, as others name them; None where it is a place itself."""
+    kind = _kind("nodes", node)
+    own = kind.own_places(_dict(node)) if kind else None
+    return None if own is None else [f"{name}.{one}" for one in own]
+
+
 def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | None]:
     """Every place -> its domain, None where its type is at fault."""
-    kinds = {name: _kind("nodes", node) for name, node in nodes.items()}
-    found = {name: kind.domain if kind else None for name, kind in kinds.items()}
+    found: dict[str, str | None] = {}
+    for name, node in nodes.items():
+        kind, own = _kind("nodes", node), _own_places(name, node)
+        found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
     return found | {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
 
 

@@ -17,7 +17,7 @@ from fvsolve.case.raw import Raw, override, read_raw
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
-from fvsolve.parts import KINDS, Chamber, Friction, Pipe
+from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe
 from fvsolve.parts.pipe import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -92,6 +92,10 @@ class _Reader:
         kinds = {group: self.kinds(group) for group in parts}
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
+        for name, kind in [*kinds["nodes"].items()]:
+            given = self.raw.table["nodes"].get(name)
+            own = kind.own_places(given) if kind and isinstance(given, dict) else None
+            kinds["nodes"] |= {f"{name}.{one}": Chamber for one in own or ()}
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.raw.table))
@@ -99,7 +103,7 @@ class _Reader:
             check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
         )
         if numerics is not None:
-            has_cells = any(kind is Pipe for kind in kinds["links"].values())
+            has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
             self.add(check.claims(expect, numerics))

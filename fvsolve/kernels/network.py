@@ -26,6 +26,7 @@ from fvsolve.kernels.records import (
     JUNCTION,
     MOVING,
     OK,
+    PATCH,
     RATE,
     STATUS,
     TANK,
@@ -114,7 +115,7 @@ def stored_rates(y, dydt, out, tables):
     layout, nodes, armed = tables[I_LAYOUT][0], tables[I_NODES], tables[I_ARMED]
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
-        if kind == JUNCTION:
+        if kind == JUNCTION or kind == PATCH:
             continue
         supply = 0.0
         if kind == FIXED:

@@ -11,6 +11,7 @@ import numpy as np
 # Codes of kinds, as the kernels see them.
 FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
 MOVING, VESSEL = 4, 5  # stores whose pressure is there before nodes are closed: of a piston, of a device
+PATCH = 6  # of a basin, which sets its pressure and takes its flow
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
 UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
     0,
@@ -306,6 +307,29 @@ PROBE = np.dtype(
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 
+BASIN = np.dtype(
+    [
+        ("nx", "i8"),
+        ("ny", "i8"),
+        ("dx", "f8"),
+        ("dy", "f8"),
+        ("y", "i8"),  # first state: depths, then flows along x and y
+        ("plan", "i8"),  # offset in `plane` of what is fixed, rows of cells
+        ("work", "i8"),
+        ("limiter", "i8"),
+    ],
+    align=True,
+)
+PATCHES = np.dtype(
+    [
+        ("basin", "i8"),
+        ("node", "i8"),
+        ("first", "i8"),  # of its cells in `integers`
+        ("count", "i8"),
+    ],
+    align=True,
+)
+
 RECORDS = {
     "settings": SETTINGS,
     "layout": LAYOUT,
@@ -321,8 +345,10 @@ RECORDS = {
     "stops": STOP,
     "pistons": PISTON,
     "devices": DEVICE,
+    "basins": BASIN,
+    "patches": PATCHES,
 }
-ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare")  # int64[:], then float64[:]
+ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare", "plane")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
 TABLES = (*RECORDS, *ARRAYS, *MATRICES)
 (
@@ -340,6 +366,8 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_STOPS,
     I_PISTONS,
     I_DEVICES,
+    I_BASINS,
+    I_PATCHES,
     I_INTEGERS,
     I_FLOATS,
     I_PROFILE,
@@ -347,6 +375,7 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_MARKS,
     I_ARMED,
     I_SPARE,
+    I_PLANE,
     I_PIECES,
     I_ENVELOPE,
     I_EXTREMES,

@@ -64,6 +64,7 @@ ROOMS = {
         before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
+    "basins": Room(before="plane.basin: patch_pressures", after="plane.basin: basin_rates"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
@@ -85,6 +86,7 @@ class Scene:
     bodies: bool = False
     memory: bool = False
     kinds: tuple[int, ...] = ()
+    basins: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -100,6 +102,8 @@ class Scene:
         for kind in self.kinds:
             loops = loops_of(kind)
             yield Room(**{job: f"{loops.__name__}: {job}" for job in vars(Room()) if hasattr(loops, job)})
+        if self.basins:
+            yield ROOMS["basins"]
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
         yield ALWAYS

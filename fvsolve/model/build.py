@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError, Fault
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins import basins_of, behind_dam, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.density import add_law, cavity_pressure
@@ -96,7 +97,7 @@ class Scene:
             if name in self.moving_names or (device is not None and device.vessel):
                 row["kind"], row["row"] = rec.MOVING if device is None else rec.VESSEL, moving
                 moving += 1
-            elif row["kind"] == rec.CHAMBER and gas:  # which softens it
+            elif row["kind"] == rec.PATCH or (row["kind"] == rec.CHAMBER and gas):  # which softens it
                 row["row"], moving = moving, moving + 1
             if device is not None:
                 device.place(self, name, node, row)
@@ -145,6 +146,9 @@ class Scene:
         row["row"] = self.tanks
         self.tanks += 1
         row["y"] = self.states([f"{name}.mass"], 0.1 * rho * row["area"])
+
+    def node_patch(self, name, node, row) -> None:
+        row["kind"], row["level"] = rec.PATCH, node.level
 
     def node_chamber(self, name, node, row) -> None:
         row["kind"], row["volume"] = rec.CHAMBER, node.volume
@@ -266,6 +270,7 @@ class Scene:
 
     def settle(self) -> None:
         sort_nodes(self)
+        lower_basins(self)
         self.check()
         self.profiles: dict[int, np.ndarray] = {}  # pipe -> pressure of the profile at centres [Pa]
         self.pack(np.zeros(self.profile_size()))
@@ -322,10 +327,10 @@ class Scene:
         self.tables = (
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,
-            self.device_table,
+            self.device_table, self.basin_table, self.patch_table,
             np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
             np.zeros(max(4 * most + 64, system, 2 * len(self.body_table))), marks,
-            np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at),
+            np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at), self.plane,
             pieces, envelope, extremes,
         )  # fmt: skip
 
@@ -334,6 +339,13 @@ class Scene:
         for row in self.column_table:
             k = stiff[row["from_node"]] + stiff[row["to_node"]]
             yield math.sqrt(k * row["area"] / row["length"])
+
+    def start_state(self) -> np.ndarray:
+        """No deviation from the profile, but in basins with a dam."""
+        found = np.zeros(self.size)
+        for row, basin in zip(self.basin_table, basins_of(self.case).values(), strict=True):
+            found[row["y"] : row["y"] + row["nx"] * row["ny"]] = behind_dam(basin)
+        return found
 
     def model(self) -> Model:
         case = self.case
@@ -344,7 +356,7 @@ class Scene:
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
             self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
-            self.steady, self.profiles, self.devices, self.events,
+            self.steady, self.profiles, self.devices, self.start_state(), self.events,
         )  # fmt: skip
 
 

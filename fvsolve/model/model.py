@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins import basin_fields
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
@@ -67,7 +68,13 @@ class Model:
     steady: dict[str, Any]  # what the start looks like, for `check`
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
     devices: list[tuple]  # (name, part, what it is lowered by), as their table has them
+    start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
+
+    @property
+    def basin_names(self) -> list[str]:
+        """Basins, as their table has them."""
+        return [name for name, node in self.case.nodes.items() if node.kind == "basin"]
 
     @property
     def y_size(self) -> int:
@@ -97,8 +104,10 @@ class Model:
         from fvsolve.kernels.rooms import Scene
 
         kinds = tuple(int(kind) for kind in np.unique(self.tables[rec.I_DEVICES]["kind"]))
-        there = [len(self.tables[at]) > 0 for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
-        return functions(Scene(self.case.fluid.law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds))
+        law, many = self.case.fluid.law, [len(table) > 0 for table in self.tables]
+        there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
+        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, many[rec.I_BASINS])
+        return functions(scene)
 
     @property
     def layout(self):
@@ -239,6 +248,8 @@ class Model:
             }  # fmt: skip
         nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
+        for name, row in zip(self.basin_names, self.tables[rec.I_BASINS], strict=True):
+            found[name] = basin_fields(self, row, y)
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
@@ -264,6 +275,11 @@ class Model:
             if row["y"] >= 0:
                 initial += float(row["mass"])
                 change += float(y[row["y"]])
+        for row in self.tables[rec.I_BASINS]:
+            n, cell = int(row["nx"] * row["ny"]), fluid.density * float(row["dx"] * row["dy"])
+            own, at = slice(row["y"], row["y"] + n), int(row["plan"])
+            initial += cell * float(np.sum(self.tables[rec.I_PLANE][at : at + n] + self.start[own]))
+            change += cell * float(np.sum(y[own] - self.start[own]))
         for row in self.tables[rec.I_PISTONS]:  # what moving chambers hold is their excess and what was swept
             places = self.tables[rec.I_BODIES][[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)

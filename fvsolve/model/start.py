@@ -85,7 +85,7 @@ class Start:
 
     def given_pressure(self, row, node) -> float:
         """Pressure [Pa] of a reservoir or tank at the start."""
-        if row["kind"] == rec.TANK:
+        if row["kind"] in (rec.TANK, rec.PATCH):
             return self.case.ambient_pressure + self.weight * node.level
         return schedule_value(self.scene.tables, int(row["schedule"]), self.t)
 
@@ -155,7 +155,7 @@ class Start:
         """Potentials that are held (nan: to be found) and demands of junctions [kg/s]."""
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
-            if row["kind"] in (rec.FIXED, rec.TANK):
+            if row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH):
                 held[i] = self.potential_of(self.given_pressure(row, node), row["elevation"])
             elif getattr(node, "at_ambient", False):
                 held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
@@ -310,7 +310,7 @@ class Start:
     def fill_nodes(self) -> None:
         self.nodes["pressure"] = self.answer.potential - self.weight * self.nodes["elevation"]
         for node, row in zip(self.case.places.values(), self.nodes, strict=True):
-            if row["kind"] in (rec.FIXED, rec.TANK):
+            if row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH):
                 row["pressure"] = self.given_pressure(row, node)
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
         fluid = self.scene.fluid
@@ -410,7 +410,9 @@ class Start:
             if inflow == 0.0 or row["kind"] == rec.FIXED:
                 continue
             flow = inflow / fluid.density
-            if row["kind"] == rec.TANK:
+            if row["kind"] == rec.PATCH:
+                moving.append(f"basin {name}: {flow:.4g} m3/s flow in")
+            elif row["kind"] == rec.TANK:
                 what = "rises" if flow > 0 else "falls"
                 moving.append(f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s")
             elif row["kind"] in STORED:

@@ -27,7 +27,8 @@ class FieldSeries:
     def __init__(self, folder: Path, model):
         self.folder = folder
         self.frames = 0
-        self.points, self.lines = geometry(model)
+        self.points, self.lines = geometry(model) if model.pipes else (np.zeros((0, 3)), np.zeros((0, 2), dtype=int))
+        self.basins = {name: quads(model.case.nodes[name]) for name in model.basin_names}
         self.pipes = [pipe.name for pipe in model.pipes]
         cells = [pipe.cells for pipe in model.pipes]
         self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
@@ -41,11 +42,12 @@ class FieldSeries:
         """Keep the first `frames` of a series, drop what came after its checkpoint."""
         listed = self.folder / "fields.pvd"
         lines = listed.read_text().splitlines() if listed.is_file() else []
-        kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:frames]
-        if len(kept) < frames:
+        many = frames * (len(self.basins) + (1 if self.pipes else 0))
+        kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:many]
+        if len(kept) < many:
             raise RunError(f"{listed} lacks frames; start the run again with --force")
         for path in (self.folder / "fields").glob("*.vtu"):
-            if int(path.stem) >= frames:
+            if int(path.stem.rpartition("-")[2]) >= frames:
                 path.unlink()
         listed.write_bytes((HEAD + "".join(kept) + TAIL).encode())
         self.frames = frames
@@ -54,9 +56,17 @@ class FieldSeries:
         """Add the frame at time `t` [s]: pipe -> quantity -> float64[cells], SI."""
         import meshio
 
+        name = f"fields/{self.frames:06d}.vtu"
+        for part, (basin, (points, cells)) in enumerate(self.basins.items(), 1):
+            file = f"fields/{basin}-{self.frames:06d}.vtu"
+            found = {key: [value] for key, value in frame[basin].items()}
+            meshio.Mesh(points, [("quad", cells)], cell_data=found).write(self.folder / file)
+            self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
+        if not self.pipes:
+            self.frames += 1
+            return
         data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in QUANTITIES}
         data["pipe"] = [self.pipe]
-        name = f"fields/{self.frames:06d}.vtu"
         meshio.Mesh(self.points, [("line", self.lines)], cell_data=data).write(self.folder / name)
         self._list(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
         self.frames += 1
@@ -87,6 +97,17 @@ def geometry(model) -> tuple[np.ndarray, np.ndarray]:
         lines.append(np.column_stack([chain[:-1], chain[1:]]))
         count += pipe.cells - 1
     return np.concatenate(points), np.concatenate(lines)
+
+
+def quads(basin) -> tuple[np.ndarray, np.ndarray]:
+    """Corners float64[n, 3] [m] of a basin's cells, on their bed, and their numbers int[cells, 4], anticlockwise."""
+    (nx, ny), (wide, deep) = basin.cells, basin.size
+    x, y = np.meshgrid(np.linspace(0.0, wide, nx + 1), np.linspace(0.0, deep, ny + 1))
+    bed = (basin.elevation or 0.0) + basin.bed_slope[0] * x + basin.bed_slope[1] * y
+    origin = basin.position or (0.0, 0.0)
+    corner = (np.arange(ny)[:, None] * (nx + 1) + np.arange(nx)).ravel()
+    points = np.column_stack([origin[0] + x.ravel(), origin[1] + y.ravel(), bed.ravel()])
+    return points, np.column_stack([corner, corner + 1, corner + nx + 2, corner + nx + 1])
 
 
 def read_series(path: Path) -> list[tuple[float, Path]]:

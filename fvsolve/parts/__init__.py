@@ -2,6 +2,7 @@
 
 from fvsolve.parts.accumulator import Accumulator
 from fvsolve.parts.air_valve import AirValve
+from fvsolve.parts.basin import Basin
 from fvsolve.parts.chamber import Chamber
 from fvsolve.parts.check_valve import CheckValve
 from fvsolve.parts.cylinder import Cylinder
@@ -33,8 +34,8 @@ from fvsolve.parts.valve import Characteristic, Valve
 KINDS = {"nodes": Node.kinds, "links": Link.kinds}
 
 __all__ = [
-    "EDGES", "KINDS", "Accumulator", "AirValve", "AreaTable", "Chamber", "Characteristic", "CheckValve", "Cylinder",
-    "Damper", "EndStop", "FlowControl", "Force", "Frame", "Friction", "Inflow", "Junction", "Leak", "Link", "Mass",
+    "EDGES", "KINDS", "Accumulator", "AirValve", "AreaTable", "Basin", "Chamber", "Characteristic", "CheckValve",
+    "Cylinder", "Damper", "EndStop", "FlowControl", "Force", "Frame", "Friction", "Inflow", "Junction", "Leak", "Link", "Mass",
     "Node", "Orifice", "Pipe", "PressureReducing", "PressureSustaining", "Pump", "ReliefValve", "Reservoir",
     "RigidColumn", "Schedule", "SpoolValve", "Spring", "Tank", "Torque", "Valve", "Wall",
 ]  # fmt: skip

@@ -25,6 +25,11 @@ class Node(Table):
     elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = None
     position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None
 
+    @classmethod
+    def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
+        """Names of places in its stead, as the file says them; None where it is a place itself."""
+        return None
+
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
         """(places, links) of the fluid that it stands for, by name: itself, and what it owns as `NAME.PLACE`."""
         return {name: self}, {}

@@ -28,8 +28,8 @@ PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS, rec.I_ARMED)
 
 
 def initial_state(model: Model) -> State:
-    """The state a model starts from: no deviation from its profile."""
-    return State(model.case.numerics.start, np.zeros(model.y_size))
+    """The state a model starts from: no deviation from its profile, but where a dam breaks."""
+    return State(model.case.numerics.start, model.start.copy())
 
 
 def solve(model: Model, state: State, sink, progress=None) -> Summary:

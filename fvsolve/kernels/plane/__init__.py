@@ -1,0 +1,1 @@
+"""Fields in the plane; loaded and compiled by scenes with basins alone."""
