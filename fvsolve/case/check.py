@@ -13,6 +13,7 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import (
     KINDS,
     Accumulator,
+    Basin,
     Chamber,
     Cylinder,
     EndStop,
@@ -135,6 +136,34 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
     if has_cells and air is not None and air.cavitation and numerics.scheme not in CAVITY_SCHEMES:
         able = " or ".join(map(show, CAVITY_SCHEMES))
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
+
+
+def basins(nodes: dict[str, Any], numerics: Numerics, fluid: Any) -> Found:
+    """Faults of patches beside their basin or over one another, of dams, and of what basins do not go with yet."""
+    found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
+    method = METHODS.get(numerics.method or "")
+    if found and (numerics.method == AUTO or (method is not None and not method.explicit)):
+        yield ("numerics", "method"), f"{show(numerics.method)} is implicit; basins are stepped by explicit methods"
+    if found and fluid is not None and fluid.law != "linear":
+        yield (
+            ("fluid", "law"),
+            f'{show(fluid.law)} does not go with basins, whose water has one density; wanted "linear"',
+        )
+    for name, basin in found.items():
+        taken: dict[int, str] = {}
+        for patch, one in basin.patches.items():
+            along = basin.size[1] if one.side in ("west", "east") else basin.size[0]
+            key = ("nodes", name, "patches", patch)
+            if one.span is not None and not one.span[0] < one.span[1] <= along * (1.0 + 1e-9):
+                what = f"{one.span[0]:g} m to {one.span[1]:g} m is no stretch of the {one.side} side"
+                yield (*key, "span"), f"{what}, 0 m to {along:g} m"
+                continue
+            other = next((taken[cell] for cell in basin.span_of(patch).tolist() if cell in taken), None)
+            if other is not None:
+                yield key, f"has cells of {other}; patches share none"
+            taken |= dict.fromkeys(basin.span_of(patch).tolist(), patch)
+        if basin.dam is not None and basin.dam.x >= basin.size[0]:
+            yield ("nodes", name, "dam", "x"), f"{basin.dam.x:g} m lies beyond the basin, 0 m to {basin.size[0]:g} m"
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:

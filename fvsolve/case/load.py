@@ -106,6 +106,7 @@ class _Reader:
             has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
+            self.add(check.basins(parts["nodes"], numerics, properties))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
         links = self.cells(parts["links"], properties, numerics)

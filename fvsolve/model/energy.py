@@ -82,6 +82,8 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     """
     from scipy.sparse import csr_array
 
+    if len(model.tables[rec.I_BASINS]):
+        raise FvsolveError("the energy of basins is not booked yet")
     y = np.zeros(model.y_size) if y is None else y
     own = energy_weights(model)
     names = [name.rsplit(".", 1)[0] for name in model.state_names]

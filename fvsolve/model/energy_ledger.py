@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.model import Model
 
@@ -29,6 +30,8 @@ class Accounts:
 
     def __init__(self, model: Model) -> None:
         self.model, case = model, model.case
+        if len(model.tables[rec.I_BASINS]):
+            raise FvsolveError("the energy of basins is not booked yet")
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # of stored energy: rows of `stored`

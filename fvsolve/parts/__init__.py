@@ -35,7 +35,7 @@ KINDS = {"nodes": Node.kinds, "links": Link.kinds}
 
 __all__ = [
     "EDGES", "KINDS", "Accumulator", "AirValve", "AreaTable", "Basin", "Chamber", "Characteristic", "CheckValve",
-    "Cylinder", "Damper", "EndStop", "FlowControl", "Force", "Frame", "Friction", "Inflow", "Junction", "Leak", "Link", "Mass",
-    "Node", "Orifice", "Pipe", "PressureReducing", "PressureSustaining", "Pump", "ReliefValve", "Reservoir",
+    "Cylinder", "Damper", "EndStop", "FlowControl", "Force", "Frame", "Friction", "Inflow", "Junction", "Leak", "Link",
+    "Mass", "Node", "Orifice", "Pipe", "PressureReducing", "PressureSustaining", "Pump", "ReliefValve", "Reservoir",
     "RigidColumn", "Schedule", "SpoolValve", "Spring", "Tank", "Torque", "Valve", "Wall",
 ]  # fmt: skip

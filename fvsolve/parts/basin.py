@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.parts.node import Node
-from fvsolve.parts.table import Table
+from fvsolve.parts.table import Table, misfits
 from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Value, nonnegative, positive
 from fvsolve.units import show
 
@@ -52,9 +52,10 @@ class Patches(Value):
         for name, one in given.items():
             try:
                 found[name] = one if isinstance(one, Patch) else Patch.model_validate(one, context=setting)
+            except Misfit as error:
+                faults += [((name, *below), message) for below, message in error.faults]
             except ValueError as error:
-                details = error.errors() if hasattr(error, "errors") else [{"loc": (), "msg": str(error)}]
-                faults += [((name, *one["loc"]), one["msg"]) for one in details]
+                faults += [((name, *below), message) for below, message in misfits(error, Patch.keys())]
         if faults:
             raise Misfit(faults)
         return found
@@ -88,8 +89,8 @@ class Place(Node):
 class Basin(Node, kind="basin"):
     """Water over a bed between walls, h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed).
 
-    Places: its patches (pressure over the bed there, flow). Stored energy: rho times the integral of g h^2 / 2 + g h bed +
-    q^2 / (2 h) over the area [J].
+    Places: its patches (pressure over the bed there, flow). Stored energy: rho times the integral of g h^2 / 2 + g h
+    bed + q^2 / (2 h) over the area [J].
     """
 
     fixes_pressure: ClassVar[bool] = True

@@ -133,7 +133,7 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the contents."""
     nodes = model.tables[rec.I_NODES]
     initial, change = model.contents(y)
-    tanks = [(x, row["full"]) for x, row in zip(ledger, nodes, strict=True) if row["kind"] == rec.TANK]
+    tanks = [(x, row["full"]) for x, row in zip(ledger, nodes, strict=True) if row["kind"] in (rec.TANK, rec.PATCH)]
     spilled = sum(-x for x, full in tanks if x < 0 and full < np.inf)
     made_up = sum(x for x, full in tanks if x > 0 or full == np.inf)
     outside = [(name, float(x)) for name, x, row in zip(model.node_names, ledger, nodes, strict=True)

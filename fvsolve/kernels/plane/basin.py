@@ -14,6 +14,7 @@ from fvsolve.kernels.records import (
     RATE,
 )
 
+SHALLOW = 1e-3  # depth at a patch below which no more than a share of what is asked can leave [m]
 UNSPLIT = 2.0  # Courant numbers count half cells, so that no depth falls below zero at one
 
 
@@ -48,15 +49,27 @@ def basin_rates(t, y, dydt, out, handle):
             dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
         )  # fmt: skip
         out[RATE] = max(out[RATE], UNSPLIT * rate)
-    for k in range(tables[I_PATCHES].size if dydt.size > 0 else 0):
+    for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
-        basin = tables[I_BASINS][patch["basin"]]
-        n, o, plan = basin["nx"] * basin["ny"], basin["y"], basin["plan"]
-        flow = out[net + patch["node"]] / (st["rho"] * patch["count"] * basin["dx"] * basin["dy"])  # [m/s] of depth
+        basin, asked = tables[I_BASINS][patch["basin"]], out[net + patch["node"]]
+        n, o, plan, first = basin["nx"] * basin["ny"], basin["y"], basin["plan"], patch["first"]
+        depth = 0.0
         for m in range(patch["count"]):
-            i = o + integers[patch["first"] + m]
+            depth += (tables[I_PLANE][plan + integers[first + m]] + y[o + integers[first + m]]) / patch["count"]
+        share, area = 1.0, patch["count"] * basin["dx"] * basin["dy"]
+        if asked < 0.0:  # 1.5, the steepest slope of the share
+            out[RATE] = max(out[RATE], -1.5 * asked / (st["rho"] * area * max(depth, SHALLOW)))
+        if asked < 0.0 and depth < SHALLOW:  # less and less of it can still be had, the rest comes from outside
+            s = max(depth, 0.0) / SHALLOW
+            share = s * s * (3.0 - 2.0 * s)
+        supply = (share - 1.0) * asked
+        out[tables[I_LAYOUT][0]["supply"] + patch["node"]] = supply
+        if dydt.size == 0:
+            continue
+        flow = (asked + supply) / (st["rho"] * area)  # [m/s] of depth
+        for m in range(patch["count"]):
+            i = o + integers[first + m]
             dydt[i] += flow
-            depth = tables[I_PLANE][plan + integers[patch["first"] + m]] + y[i]
             if flow < 0.0 and depth > 0.0:  # water that leaves takes its momentum along
                 dydt[i + n] += flow * y[i + n] / depth
                 dydt[i + 2 * n] += flow * y[i + 2 * n] / depth

@@ -1,0 +1,210 @@
+"""Shallow water in a basin: exact dams, a lake at rest, closed sloshing, symmetry, and its join to the network."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pytest import approx
+from truth.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+
+import fvsolve
+from fvsolve.errors import CaseError, FvsolveError
+
+PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
+
+
+def basin(size, cells, level, **more) -> dict:
+    return {"type": "basin", "size": list(size), "cells": list(cells), "level": level, **more}
+
+
+def alone(pool: dict, end: float, **numerics) -> dict:
+    """A basin beside a network that has nothing to do with it: a shut valve at its eastern side."""
+    pool = {**pool, "patches": {"east": {"side": "east"}}}
+    nodes = {"pool": pool, "out": reservoir(AMBIENT)}
+    links = {"shut": valve("pool.east", "out", 0.01, opening=0.0) | {"opening": 0.0}}
+    return scene(nodes, links, end, PLANE | numerics, ["pool.east.head"], end)
+
+
+def depths(case: dict) -> tuple[np.ndarray, np.ndarray]:
+    """(depth, flows) of the basin of a case at its end, row by row."""
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
+    nx, ny = case["nodes"]["pool"]["cells"]
+    found = model.frame(state.y, model.new_out())["pool"]
+    return found["depth"].reshape(ny, nx), found["velocity"].reshape(ny, nx, 3)
+
+
+def dam(x, t, high, low):
+    """Depth of Stoker's dam (1957), of Ritter's (1892) where low is 0, at x from the dam and t."""
+    c = math.sqrt(GRAVITY * high)
+    if low == 0.0:
+        return np.where(x < -c * t, high, np.where(x < 2 * c * t, (2 * c - x / t) ** 2 / (9 * GRAVITY), 0.0))
+    a, b = low, high
+    for _ in range(200):  # bisection on the middle depth: rarefaction on the left, shock on the right
+        h = 0.5 * (a + b)
+        u = 2 * (c - math.sqrt(GRAVITY * h))
+        if u > (h - low) * math.sqrt(0.5 * GRAVITY * (h + low) / (h * low)):
+            a = h
+        else:
+            b = h
+    s = h * u / (h - low)
+    fan = (2 * c - x / t) ** 2 / (9 * GRAVITY)
+    rest = np.where(x < s * t, h, low)
+    return np.where(x < -c * t, high, np.where(x < (u - math.sqrt(GRAVITY * h)) * t, fan, rest))
+
+
+@pytest.mark.parametrize("low", [0.4, 0.0], ids=["wet", "dry"])
+def test_a_dam_breaks_as_in_the_exact_solution(low):
+    """L1 of the depth falls at the order of fronts, two thirds or more, and mass stays."""
+    errors = []
+    for nx in (100, 200, 400):
+        h, _ = depths(alone(basin((20.0, 1.0), (nx, 3), 1.0, dam={"x": 10.0, "level": low}), 1.2))
+        x = (np.arange(nx) + 0.5) * 20.0 / nx - 10.0
+        errors.append(np.abs(h[1] - dam(x, 1.2, 1.0, low)).mean() * 20.0)
+        assert h.min() >= 0.0 and np.array_equal(h[0], h[2])
+        assert h.mean() == approx(0.5 * (1.0 + low), rel=1e-13)
+    assert errors[-1] < 0.02 and errors[0] / errors[2] > 4.0 ** (2.0 / 3.0)
+
+
+def test_a_lake_at_rest_does_not_move_by_one_bit_on_a_bank_and_behind_a_shut_valve():
+    case = alone(basin((20.0, 10.0), (40, 20), 1.0, bed_slope=[0.13, 0.07]), 20.0)
+    model = fvsolve.build(fvsolve.load(case))
+    assert (model.frame(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0).sum() > 100  # dry bank
+    state = fvsolve.advance(model, fvsolve.initial_state(model), 20.0)
+    assert not state.y.any()
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_small_waves_slosh_at_the_periods_of_long_waves(mode):
+    """Standing wave a cos(k x) of a closed box: period 2 L / (n sqrt(g h)); a hundredth of a millimetre high."""
+    size, nx = 10.0, 80
+    pool = basin((size, 2.0), (nx, 4), 1.0)
+    model = fvsolve.build(fvsolve.load(alone(pool, 10.0)))
+    x = (np.arange(nx) + 0.5) * size / nx
+    state = fvsolve.initial_state(model)
+    shape = 1e-5 * np.cos(mode * math.pi * x / size)
+    state.y[: 4 * nx] = np.tile(shape, 4)
+    period = 2.0 * size / (mode * math.sqrt(GRAVITY))
+    found = fvsolve.advance(model, state, 2.0 * period).y[:nx]
+    turned = np.dot(found, shape) / np.dot(shape, shape)
+    assert turned == approx(1.0, abs=0.01)
+    quarter = fvsolve.advance(model, state, 1.25 * period).y[:nx]
+    assert abs(np.dot(quarter, shape)) < 0.02 * np.dot(shape, shape)
+
+
+def test_a_mirrored_and_a_turned_basin_have_the_same_bits():
+    lying = alone(basin((12.0, 6.0), (24, 12), 1.0, bed_slope=[0.1, 0.0]), 1.0)
+    model = fvsolve.build(fvsolve.load(lying))
+    standing = fvsolve.build(fvsolve.load(alone(basin((6.0, 12.0), (12, 24), 1.0, bed_slope=[0.0, 0.1]), 1.0)))
+    rng = np.random.default_rng(3)
+    h, u, v = 0.1 * rng.random((3, 12, 24))
+    y = np.concatenate([h.ravel(), u.ravel(), v.ravel()])
+    rates = model.rhs(0.0, y).reshape(3, 12, 24)
+    up = np.concatenate([h[::-1].ravel(), u[::-1].ravel(), -v[::-1].ravel()])
+    mirrored = model.rhs(0.0, up).reshape(3, 12, 24)
+    assert np.array_equal(mirrored[:2, ::-1], rates[:2]) and np.array_equal(mirrored[2, ::-1], -rates[2])
+    turned = standing.rhs(0.0, np.concatenate([h.T.ravel(), v.T.ravel(), u.T.ravel()])).reshape(3, 24, 12)
+    scale = np.abs(rates).max()
+    assert np.abs(turned[0].T - rates[0]).max() < 1e-13 * scale  # sums in another order
+    assert np.abs(turned[1].T - rates[2]).max() < 1e-13 * scale
+
+
+def drained(place: str, nodes: dict, end: float) -> dict:
+    links = {"tap": valve(place, "out", 0.012, ramp(0.0, 20.0, 0.0, 1.0))}
+    return scene(nodes | {"out": reservoir(AMBIENT)}, links, end, {}, ["tap.flow"], 1.0)
+
+
+def test_a_deep_and_quiet_basin_drains_as_its_tank_and_as_torricelli():
+    pool = basin((10.0, 4.0), (20, 8), 2.0, patches={"outlet": {"side": "east", "span": [1.0, 3.0]}})
+    case = drained("pool.outlet", {"pool": pool}, 200.0)
+    case["numerics"] |= PLANE
+    found = fvsolve.run(case)
+    twin = fvsolve.run(drained("pool", {"pool": tank(40.0, 2.0)}, 200.0))
+    assert found.ok and found["tap.flow"] == approx(twin["tap.flow"], rel=2e-3, abs=2e-4)
+    assert abs(found.ledger["mass"]["relative"]) < 1e-13
+    level = (
+        math.sqrt(2.0) - 0.012 * math.sqrt(2 * GRAVITY) / 80.0 * 190.0
+    ) ** 2  # the ramp counts for half of its 20 s
+    assert found["tap.flow"][-1] == approx(0.012 * math.sqrt(2 * GRAVITY * level), rel=3e-3)
+
+
+def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero():
+    pool = basin((4.0, 2.0), (8, 4), 0.2, patches={"outlet": {"side": "east"}}, elevation=5.0)
+    nodes = {"pool": pool, "out": reservoir(AMBIENT) | {"elevation": 0.0}}
+    case = scene(nodes, {"tap": valve("pool.outlet", "out", 0.02)}, 60.0, PLANE, ["tap.flow"], 1.0)
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), 60.0)
+    depth = model.frame(state.y, model.new_out())["pool"]["depth"]
+    assert depth.min() >= 0.0 and depth.max() < 5e-3
+    result = fvsolve.run(case)
+    mass = result.ledger["mass"]
+    assert mass["relative"] < 1e-13 and mass["final"] == approx(depth.mean() * 8000.0, rel=1e-9)
+    assert mass["outflow"] == approx(1600.0 - mass["final"] + mass["made_up"], rel=1e-12)
+    assert [mark["place"] for mark in result.summary["marks"]] == ["pool.outlet"]
+
+
+def test_a_pipe_that_discharges_into_one_of_two_joined_basins_keeps_all_mass(tmp_path):
+    west = basin((6.0, 3.0), (12, 6), 1.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}}, elevation=0.0)
+    east = basin((3.0, 3.0), (6, 6), 1.0, patches={"gate": {"side": "west"}}, elevation=0.0)
+    nodes = {"west": west, "east": east, "lake": lake(3.0, elevation=0.0), "end": junction(elevation=0.0)}
+    links = {
+        "main": pipe("lake", "end", 200.0, 0.3, 1000.0, 20, friction={"model": "steady", "factor": 0.02}),
+        "tap": valve("end", "west.in", 0.02, ramp(1.0, 2.0, 0.0, 1.0)),
+        "hole": valve("west.gate", "east.gate", 0.05),
+    }
+    numerics = PLANE | {"scheme": "muscl"}
+    case = scene(nodes, links, 20.0, numerics, ["west.gate.head", "east.gate.head", "hole.flow"], 0.5, fluid=WATER)
+    case["output"]["fields"] = 3
+    result = fvsolve.run(case, out=tmp_path / "run")
+    assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-13
+    assert result["hole.flow"][-1] > 0.0 and result["east.gate.head"][-1] > 1.01
+    import meshio
+    import pyvista
+
+    for name, cells in (("west", 72), ("east", 36)):
+        file = tmp_path / "run" / "fields" / f"{name}-000003.vtu"
+        assert meshio.read(file).cell_data["depth"][0].shape == (cells,)
+        assert pyvista.read(file)["surface"].min() > 0.9
+
+
+def test_what_the_network_gives_a_basin_gets():
+    """Inflow through a patch: the contents rise by it, whatever the waves do."""
+    pool = basin((5.0, 5.0), (10, 10), 0.5, patches={"in": {"side": "south", "span": [2.0, 3.0]}})
+    nodes = {"pool": pool, "pump": {"type": "inflow", "flow": 0.05}}
+    case = scene(nodes, {"way": valve("pump", "pool.in", 0.1)}, 10.0, PLANE, ["pool.in.head"], 1.0)
+    h, _ = depths(case)
+    assert h.mean() * 25.0 == approx(0.5 * 25.0 + 0.5, rel=1e-13)
+
+
+FAULTS = {
+    "span": ({"patches": {"east": {"side": "east", "span": [1.0, 9.0]}}}, "no stretch of the east side"),
+    "side": ({"patches": {"east": {"side": "wst"}}}, r'patches.east.side: no side named "wst"; did you mean "west"'),
+    "shared": ({"patches": {"east": {"side": "east"}, "b": {"side": "east", "span": [0.0, 1.0]}}}, "has cells of east"),
+    "cells": ({"cells": [4.5, 3]}, "no pair of numbers of cells"),
+    "dam": ({"dam": {"x": 30.0, "level": 0.1}}, "lies beyond the basin"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults(name):
+    change, words = FAULTS[name]
+    case = alone(basin((4.0, 2.0), (8, 4), 0.2), 1.0)
+    case["nodes"]["pool"] |= change
+    with pytest.raises(CaseError, match=words):
+        fvsolve.load(case)
+
+
+def test_what_basins_do_not_go_with_yet_is_said():
+    case = alone(basin((4.0, 2.0), (8, 4), 0.2), 1.0)
+    for change, words in (({"method": "radau-iia-5"}, "explicit methods"), ({"law": "log"}, "one density")):
+        part = "numerics" if "method" in change else "fluid"
+        other = case | {part: {**case[part], **change}}
+        if part == "numerics":
+            other["numerics"].pop("courant")
+        with pytest.raises(CaseError, match=words):
+            fvsolve.load(other)
+    model = fvsolve.build(fvsolve.load(case))
+    with pytest.raises(FvsolveError, match="explicit methods"):
+        _ = model.structure
