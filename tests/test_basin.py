@@ -142,7 +142,7 @@ def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero(
     mass = result.ledger["mass"]
     assert mass["relative"] < 1e-13 and mass["final"] == approx(depth.mean() * 8000.0, rel=1e-9)
     assert mass["outflow"] == approx(1600.0 - mass["final"] + mass["made_up"], rel=1e-12)
-    assert [mark["place"] for mark in result.summary["marks"]] == ["pool.outlet"]
+    assert [mark["place"] for mark in result.summary["marks"]] == ["nodes.pool.outlet"]
 
 
 def test_a_pipe_that_discharges_into_one_of_two_joined_basins_keeps_all_mass(tmp_path):

@@ -11,9 +11,10 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 
 SIZE = (1500, 900)  # of the picture [pixels]
 UNITS = {"pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s"}
-UNITS |= {"least_pressure": "Pa", "greatest_pressure": "Pa"}
+UNITS |= {"least_pressure": "Pa", "greatest_pressure": "Pa", "depth": "m", "surface": "m", "bed": "m"}
 TUBE = 0.006  # radius of a pipe as part of the picture's diagonal
 FLAT = 0.08  # a network lower than this part of its width is looked at from above
+WET = 1e-4  # depth from which there is water to be seen [m]
 SHIFT = 0.12  # of half the height of the picture
 REMEDY = (
     "PyVista found no OpenGL to draw with off screen; on Debian or Ubuntu "
@@ -21,8 +22,8 @@ REMEDY = (
 )
 
 
-def view(frame: Path, field: str, out: Path, caption: str) -> None:
-    """Write the picture `out` of `field` on the pipes of the .vtu file `frame`.
+def view(frames: list[Path], field: str, out: Path, caption: str) -> None:
+    """Write the picture `out` of `field` on the pipes and basins of .vtu files, water at its surface over the bed.
 
     Drawn in a process of its own: without an OpenGL library VTK ends the process it is in. FvsolveError where
     the field is unknown or nothing can be drawn.
@@ -33,7 +34,7 @@ def view(frame: Path, field: str, out: Path, caption: str) -> None:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([package, *sys.path])}
     if sys.platform.startswith("linux") and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    command = [sys.executable, "-m", __spec__.name, str(frame), field, str(out), caption]
+    command = [sys.executable, "-m", __spec__.name, os.pathsep.join(map(str, frames)), field, str(out), caption]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode < 0 or "OSMesa" in done.stderr or "EGL" in done.stderr:
         raise FvsolveError(REMEDY)
@@ -42,27 +43,31 @@ def view(frame: Path, field: str, out: Path, caption: str) -> None:
         raise FvsolveError(f"{out} could not be drawn: {last}")
 
 
-def draw(frame: str, field: str, out: str, caption: str) -> None:
+def draw(frames: str, field: str, out: str, caption: str) -> None:
     """Draw in this process."""
     import pyvista
 
-    mesh = pyvista.read(frame)
-    lower(mesh.points)
-    mesh.set_active_scalars(field, preference="cell")
-    wide = max(mesh.length, 1e-9)
+    meshes = [pyvista.read(frame) for frame in frames.split(os.pathsep)]
+    pools = [mesh for mesh in meshes if "depth" in mesh.cell_data]
+    meshes = [mesh for mesh in meshes if field in mesh.cell_data]
+    if not meshes:
+        sys.exit(f"nothing here has a {field}")
     plotter = pyvista.Plotter(off_screen=True, window_size=SIZE)
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     plotter.enable_parallel_projection()
-    plotter.add_mesh(
-        mesh.extract_surface(algorithm=None).tube(radius=TUBE * wide),
-        scalars=field,
-        cmap="viridis",
-        smooth_shading=True,
-        scalar_bar_args={"title": f"{field.replace('_', ' ')} [{UNITS[field]}]", **BAR},
-    )
+    least = min(mesh[field].min() for mesh in meshes)
+    greatest = max(mesh[field].max() for mesh in meshes)
+    for pool in pools:
+        plotter.add_mesh(pool.copy(), color="#c9b99a")
+    for mesh in meshes:
+        shape = raised(mesh) if "depth" in mesh.cell_data else tube(mesh)
+        plotter.add_mesh(
+            shape, scalars=field, cmap="viridis", clim=[least, greatest], smooth_shading=True,
+            scalar_bar_args={"title": f"{field.replace('_', ' ')} [{UNITS[field]}]", **BAR},
+        )  # fmt: skip
     plotter.add_text(caption, font_size=12, color="#1f2933", position="upper_left")
-    _look(plotter, mesh.bounds)
+    _look(plotter, plotter.bounds, bool(pools))
     plotter.screenshot(out)
 
 
@@ -79,10 +84,25 @@ BAR = {
 }
 
 
-def _look(plotter, bounds) -> None:
+def tube(mesh):
+    """Pipes as tubes."""
+    lower(mesh.points)
+    return mesh.extract_surface(algorithm=None).tube(radius=TUBE * max(mesh.length, 1e-9))
+
+
+def raised(mesh):
+    """The wet cells of a basin at the surface of their water."""
+    found = mesh.cell_data_to_point_data(pass_cell_data=True)
+    found.points[:, 2] = found.point_data["surface"]
+    return found.threshold(WET, scalars="depth", preference="cell")
+
+
+def _look(plotter, bounds, aslant: bool = False) -> None:
     """From above where the network is flat, from the side where it is one straight line, else aslant."""
     x, y, z = bounds[1] - bounds[0], bounds[3] - bounds[2], bounds[5] - bounds[4]
-    if z <= FLAT * max(x, y):
+    if aslant:
+        plotter.view_isometric()
+    elif z <= FLAT * max(x, y):
         plotter.view_xy()
     elif y <= FLAT * max(x, z):
         plotter.view_xz()

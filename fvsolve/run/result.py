@@ -194,10 +194,11 @@ class Result:
             figure.savefig(path)
         return figure
 
-    def view(self, time: float | None = None, field: str = "pressure", path=None) -> Path:
-        """Draw `field` on the pipes at the frame nearest to `time` [s] (the last by default) with PyVista.
+    def view(self, time: float | None = None, field: str | None = None, path=None) -> Path:
+        """Draw `field` at the frame nearest to `time` [s] (the last by default) with PyVista.
 
-        The path of the picture; RunError where there are no frames, FvsolveError where nothing can be drawn.
+        Left out, `field` is pressure, or depth where there are no pipes. The path of the picture; RunError where there
+        are no frames, FvsolveError where nothing can be drawn.
         """
         from fvsolve.draw.view import view
 
@@ -206,9 +207,15 @@ class Result:
         frames = read_series(self.directory / "fields.pvd")
         if not frames:
             raise RunError(f"{self.directory / 'fields.pvd'} lists no frames")
-        t, frame = frames[-1] if time is None else min(frames, key=lambda one: abs(one[0] - time))
+        t = frames[-1][0] if time is None else min(frames, key=lambda one: abs(one[0] - time))[0]
+        field = field or ("pressure" if any(link.kind == "pipe" for link in self.case.links.values()) else "depth")
         out = Path(path) if path else self.directory / f"{field}.png"
-        view(frame, field, out, f"{self.summary['title']}\n{field.replace('_', ' ')} at t = {t:.6g} s")
+        view(
+            [file for at, file in frames if at == t],
+            field,
+            out,
+            f"{self.summary['title']}\n{field.replace('_', ' ')} at t = {t:.6g} s",
+        )
         return out
 
     def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
