@@ -143,18 +143,17 @@ def grouped(
     for name, members in groups.items():
         place = f"groups.{name}"
         if not members.size:
-            faults.append(Fault(place, "no line in the file is in it; wanted lines of the boundary, or no such group"))
+            remedy = "wanted lines of the boundary; Gmsh leaves them out under Mesh.SaveAll = 1"
+            faults.append(Fault(place, f"no line in the file is in it; {remedy}"))
             continue
         wanted = key_of(lines[members], len(draft.points))
         spot = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
         missed = keys[spot] != wanted
         if missed.any():
             many = "none of its" if missed.all() else f"{missed.sum()} of its"
-            ends = lines[members][missed][0]
-            how = "lies between two cells" if np.isin(wanted[missed][0], edges.key) else "is no side of a cell"
             text = f"{many} {members.size} lines {'is a face' if missed.all() else 'are no faces'} of the boundary"
-            where = draft.face(ends).removeprefix("the face ")
-            faults.append(Fault(place, f"{text}: the one {where} {how}; wanted a curve of the boundary"))
+            how = _beside(draft, edges, lines[members][missed][0])
+            faults.append(Fault(place, f"{text}: {how}; wanted a curve of the boundary"))
         spot = spot[~missed]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:
@@ -164,3 +163,12 @@ def grouped(
             faults.append(Fault(place, f"shares {taken.size} faces with {others}, {where}; wanted each in one group"))
         patch[spot] = names.index(name)
     return faults, names, patch
+
+
+def _beside(draft: Draft, edges: Edges, ends: np.ndarray) -> str:
+    """Where a line lies that is no face of the boundary."""
+    if (ends < 0).any():
+        return "one ends in a point that no cell has"
+    where = draft.face(ends).removeprefix("the face ")
+    inside = np.isin(key_of(ends[None], len(draft.points)), edges.key).any()
+    return f"the one {where} {'lies between two cells' if inside else 'is no side of a cell'}"

@@ -17,7 +17,7 @@ from fvsolve.errors import Fault, MeshError, did_you_mean, listing
 
 PLANE = {"triangle": 3, "quad": 4}
 IGNORED = {"vertex", "line", *PLANE}
-TAGS = ("gmsh:physical", "medit:ref")  # numbers of groups, as formats call them
+TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # numbers of groups, as formats call them
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def _ask_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     except (Exception, SystemExit) as error:  # meshio exits, and raises whatever its parsers stumble over
         text = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
     text = _plain(text)
-    remedy = 'a Gmsh file of another version may do: "Mesh.MshFileVersion = 2.2;"' if path.suffix == ".msh" else ""
+    remedy = "Gmsh: try Mesh.SaveAll = 0, or Mesh.MshFileVersion = 2.2" if path.suffix == ".msh" else ""
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
         remedy = f"wanted a name that ends in {listing(known, 40)}"
@@ -103,7 +103,7 @@ def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
     if solid:
         return [Fault("cells", f"they are of three dimensions ({held}); {wanted}: a mesh of one plane surface")]
     if other:
-        remedy = 'Gmsh writes them with "Mesh.ElementOrder = 1;"' if re.search(r"\d", "".join(other)) else "split them"
+        remedy = "Gmsh: Mesh.ElementOrder = 1" if re.search(r"\d", "".join(other)) else "split them"
         return [Fault("cells", f"{', '.join(other)} cannot be used ({held}); {wanted}; {remedy}")]
     if not set(kinds) & set(PLANE):
         return [Fault("cells", f"there are no cells of two dimensions ({held}); {wanted}; was the surface meshed?")]
@@ -135,7 +135,8 @@ def _groups(found: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
             unnamed |= {tag} - set(name_of)
             members.setdefault(name_of.get(tag, str(tag)), []).append(first + which)
         first += len(block.data)
-    notes = tuple(f'group {tag} of lines has no name in the file: its patch is "{tag}"' for tag in sorted(unnamed))
+    called = f"groups of lines without a name in the file: their patches are {', '.join(map(str, sorted(unnamed)))}"
+    notes = (called,) if unnamed else ()
     empty = [np.empty(0, np.int64)]
     return {name: np.unique(np.concatenate(which or empty)) for name, which in members.items()}, notes
 

@@ -77,9 +77,8 @@ def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Seq
         if not (two(given) and all(sound(value) for value in given))
     ]
     if not faults and any(n == 1 and g != 1.0 for n, g in zip(cells, grading, strict=True)):
-        faults.append(
-            Fault("grading", f"{_shown(grading)} with cells {_shown(cells)}: one cell has no grading; wanted 1")
-        )
+        text = f"{_shown(grading)} with cells {_shown(cells)}; wanted 1 where there is one cell"
+        faults.append(Fault("grading", text))
     return faults
 
 
