@@ -39,6 +39,10 @@ class CaseError(FvsolveError):
         return "\n".join([head, *(f"  {fault}" for fault in self.faults)])
 
 
+class MeshError(CaseError):
+    """A mesh that cannot be had as asked: all its faults at once; `file` is its file, or "rectangle"."""
+
+
 class FluidError(FvsolveError):
     """A fluid that cannot be had as asked; `key` is the key of `[fluid]` that is to blame."""
 

@@ -1,0 +1,74 @@
+"""How cells hang together: their edges, and who lies beyond. Knows numbers of points; knows no places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+ALONE, CROWDED = -1, -2  # mates that are none: nobody beyond the edge; more than one, or one on the same side
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges of all cells, by cell and corner, anticlockwise.
+
+    cell : int64[e]; start, stop : int64[e]  points; key : int64[e]  the same for both ways round
+    mate : int64[e]  the same edge as the cell beyond has it, ALONE on the boundary, CROWDED where cells overlap
+    """
+
+    cell: np.ndarray
+    start: np.ndarray
+    stop: np.ndarray
+    key: np.ndarray
+    mate: np.ndarray
+
+    @cached_property
+    def inner(self) -> np.ndarray:
+        """Edges with a mate, each pair once, by the cell of the lower number."""
+        return np.flatnonzero(np.arange(self.mate.size) < self.mate)
+
+    @cached_property
+    def outer(self) -> np.ndarray:
+        """Edges on the boundary."""
+        return np.flatnonzero(self.mate == ALONE)
+
+    def pieces(self, cells: int) -> np.ndarray:
+        """int64[cells]: to which piece a cell belongs, where flow passes through faces only."""
+        pair = self.cell[self.inner], self.cell[self.mate[self.inner]]
+        graph = coo_array((np.ones(self.inner.size, np.int8), pair), shape=(cells, cells))
+        return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def edges_of(cells: np.ndarray, points: int) -> Edges:
+    """The edges of int64[n, 4] cells over so many points."""
+    stop = np.roll(cells, -1, axis=1)
+    triangle = cells[:, 3] < 0
+    stop[triangle, 2] = cells[triangle, 0]
+    real = (cells >= 0).ravel()
+    cell = np.repeat(np.arange(len(cells)), 4)[real]
+    start, stop = cells.ravel()[real], stop.ravel()[real]
+    key = np.minimum(start, stop) * points + np.maximum(start, stop)
+    return Edges(cell, start, stop, key, _mates(key, start))
+
+
+def _mates(key: np.ndarray, start: np.ndarray) -> np.ndarray:
+    order = np.argsort(key, kind="stable")
+    runs = np.flatnonzero(np.diff(key[order], prepend=-1))
+    count = np.diff(runs, append=key.size)
+    mate = np.full(key.size, CROWDED)
+    mate[order[runs[count == 1]]] = ALONE
+    pairs = runs[count == 2]
+    one, other = order[pairs], order[pairs + 1]
+    opposite = start[one] != start[other]
+    one, other = one[opposite], other[opposite]
+    mate[one], mate[other] = other, one
+    return mate
+
+
+def key_of(ends: np.ndarray, points: int) -> np.ndarray:
+    """The keys of int64[k, 2] pairs of points, as in Edges."""
+    return ends.min(axis=1) * points + ends.max(axis=1)

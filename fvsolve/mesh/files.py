@@ -1,0 +1,157 @@
+"""The only door to meshio reading: what a file says of a plane mesh, as arrays. Knows no geometry."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import Fault, MeshError, did_you_mean, listing
+
+PLANE = {"triangle": 3, "quad": 4}
+IGNORED = {"vertex", "line", *PLANE}
+TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # numbers of groups, as formats call them
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """points : float64[p, 3] as the file has them; cells : int64[n, 4], -1 last in a triangle; lines : int64[k, 2];
+    groups : name -> int64 numbers of lines, in the order of the file."""
+
+    points: np.ndarray
+    cells: np.ndarray
+    lines: np.ndarray
+    groups: dict[str, np.ndarray]
+    notes: tuple[str, ...]
+
+
+def load(path: Path) -> Content:
+    """The triangles, quadrilaterals and named lines of a file; raises MeshError where it holds no plane mesh."""
+    found, notes = _ask_meshio(path)
+    kinds: dict[str, int] = {}
+    for block in found.cells:
+        kinds[block.type] = kinds.get(block.type, 0) + len(block.data)
+    faults = _bad_kinds({kind: count for kind, count in kinds.items() if count})
+    points = np.zeros((len(found.points), 3))
+    shape = np.shape(found.points)
+    if len(shape) == 2 and shape[1] in (2, 3):
+        points[:, : shape[1]] = found.points
+    else:
+        faults.append(Fault("points", f"an array of shape {shape}; wanted two or three coordinates per point"))
+    if faults:
+        raise MeshError(faults, path.name)
+    cells = [_padded(block.data) for block in found.cells if block.type in PLANE]
+    lines = [block.data for block in found.cells if block.type == "line"]
+    groups, unnamed = _groups(found)
+    content = Content(
+        points,
+        np.concatenate(cells).astype(np.int64),
+        np.concatenate(lines).astype(np.int64) if lines else np.empty((0, 2), np.int64),
+        groups,
+        (*notes, *unnamed),
+    )
+    beyond = [
+        Fault(place, f"number {int(which[0])} names a point that the file does not hold; it holds {len(points)}")
+        for place, table, least in (("cells", content.cells, -1), ("lines", content.lines, 0))
+        if (which := np.flatnonzero(_strange(table, least, len(points)))).size
+    ]
+    if beyond:
+        raise MeshError(beyond, path.name)
+    return content
+
+
+def _ask_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """(meshio's mesh, what it said of the file)."""
+    import meshio
+
+    if not path.is_file():
+        near = [one.name for one in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise MeshError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path))
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = meshio.read(path)
+        return found, tuple(f"meshio: {_plain(line)}" for line in said.getvalue().split("Warning:") if line.strip())
+    except (Exception, SystemExit) as error:  # meshio exits, and raises whatever its parsers stumble over
+        text = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
+    text = _plain(text)
+    remedy = "Gmsh: try Mesh.SaveAll = 0, or Mesh.MshFileVersion = 2.2" if path.suffix == ".msh" else ""
+    known = sorted(meshio.extension_to_filetypes)
+    if path.suffix.lower() not in known:
+        remedy = f"wanted a name that ends in {listing(known, 40)}"
+    raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read it ({text})", remedy])))], path.name)
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"\s+", " ", text).strip(" .").removeprefix("Error: ")
+
+
+def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
+    """Cells of another dimension or order, or none at all."""
+    held = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"
+    solid = [kind for kind in kinds if re.match("tetra|hexa|wedge|pyramid|polyhedron", kind)]
+    other = [kind for kind in kinds if kind not in IGNORED and kind not in solid]
+    wanted = "wanted triangle and quad"
+    if solid:
+        return [Fault("cells", f"they are of three dimensions ({held}); {wanted}: a mesh of one plane surface")]
+    if other:
+        remedy = "Gmsh: Mesh.ElementOrder = 1" if re.search(r"\d", "".join(other)) else "split them"
+        return [Fault("cells", f"{', '.join(other)} cannot be used ({held}); {wanted}; {remedy}")]
+    if not set(kinds) & set(PLANE):
+        return [Fault("cells", f"there are no cells of two dimensions ({held}); {wanted}; was the surface meshed?")]
+    return []
+
+
+def _padded(cells: np.ndarray) -> np.ndarray:
+    return np.pad(np.asarray(cells, np.int64), ((0, 0), (0, 4 - cells.shape[1])), constant_values=-1)
+
+
+def _strange(table: np.ndarray, least: int, points: int) -> np.ndarray:
+    low = np.where(np.arange(table.shape[1]) == 3, least, 0)
+    return np.any((table < low) | (table >= points), axis=1)
+
+
+def _groups(found: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """The named groups of lines, and notes on those whose name the file does not tell."""
+    name_of = {int(tag): name for name, (tag, dimension) in _declared(found.field_data)}
+    members: dict[str, list[np.ndarray]] = {name: [] for name in name_of.values()}
+    unnamed: set[int] = set()
+    first = 0
+    for k, block in enumerate(found.cells):
+        if block.type != "line":
+            continue
+        for name, sets in (found.cell_sets or {}).items():
+            if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
+                members.setdefault(name, []).append(first + np.asarray(sets[k], np.int64))
+        for tag, which in _tagged(found.cell_data, k):
+            unnamed |= {tag} - set(name_of)
+            members.setdefault(name_of.get(tag, str(tag)), []).append(first + which)
+        first += len(block.data)
+    called = f"groups of lines without a name in the file: their patches are {', '.join(map(str, sorted(unnamed)))}"
+    notes = (called,) if unnamed else ()
+    empty = [np.empty(0, np.int64)]
+    return {name: np.unique(np.concatenate(which or empty)) for name, which in members.items()}, notes
+
+
+def _declared(field_data: Any) -> Iterable[tuple[str, np.ndarray]]:
+    """(name, (number, dimension)) of the groups of lines that the file names."""
+    for name, entry in (field_data or {}).items():
+        if np.shape(entry) == (2,) and int(entry[1]) == 1:
+            yield name, entry
+
+
+def _tagged(cell_data: Any, k: int) -> Iterable[tuple[int, np.ndarray]]:
+    """(number, lines of block k that bear it); 0 is no group."""
+    for key in TAGS:
+        if key in cell_data:
+            tags = np.asarray(cell_data[key][k]).astype(np.int64)
+            for tag in np.unique(tags[tags != 0]):
+                yield int(tag), np.flatnonzero(tags == tag)

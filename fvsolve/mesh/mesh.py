@@ -1,0 +1,64 @@
+"""What a plane mesh is: cells, faces and named patches, all SI. Knows no files, and not how it came about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+WALL = "wall"  # the patch of every boundary face that no name claims
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The lines behind a rectangle.
+
+    nx, ny : columns and rows; x : float64[nx + 1], y : float64[ny + 1]  their edges [m];
+    index : int64[ny, nx]  the number of a cell, -1 in a hole; without holes j nx + i.
+    """
+
+    nx: int
+    ny: int
+    x: np.ndarray
+    y: np.ndarray
+    index: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Cells and the faces between them; inner faces stand first, then the boundary's, patch by patch.
+
+    points : float64[p, 2]  corners [m]
+    cells : int64[n, 4]  points of a cell, anticlockwise; -1 in the last column for a triangle
+    area : float64[n]  [m2]; centre : float64[n, 2]  centroids [m]
+    left : int64[f]  cell; right : int64[f]  cell of a higher number, or -1 - k on the boundary, k the patch
+    normal : float64[f, 2]  unit, from left to right or outward; length : float64[f]  [m]
+    middle : float64[f, 2]  [m]; ends : int64[f, 2]  points, anticlockwise around left
+    patches : their names, the last one always "wall"; grid : of rectangles only
+    notes : what a reader of the file should know
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    area: np.ndarray
+    centre: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    normal: np.ndarray
+    length: np.ndarray
+    middle: np.ndarray
+    ends: np.ndarray
+    patches: tuple[str, ...]
+    grid: Grid | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def inner(self) -> int:
+        """How many faces lie between two cells; the rest is boundary."""
+        return int(np.count_nonzero(self.right >= 0))
+
+    def patch(self, name: str) -> slice:
+        """The faces of a patch; raises ValueError for a name that is none."""
+        k = self.patches.index(name)
+        first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # inner faces count 0 or less, in any order
+        return slice(int(first), int(last))

@@ -1,0 +1,112 @@
+"""A mesh from a file, with every check; repairs nothing but the sense of rotation, and says so. Knows no formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import Fault, MeshError
+from fvsolve.mesh.checks import Draft, contact_faults, grouped, overlap_faults, piece_faults, shape_faults
+from fvsolve.mesh.edges import edges_of
+from fvsolve.mesh.files import Content, load
+from fvsolve.mesh.mesh import WALL, Mesh
+from fvsolve.mesh.shapes import assemble
+from fvsolve.units import find
+
+PLANE = 1e-6  # of the extent: how far z may wander
+LARGE, SMALL = 1e4, 1e-3  # extents that speak for another unit [m]
+
+
+def read(path: str | Path, unit: str = "m") -> Mesh:
+    """The plane mesh of a file that meshio reads, its coordinates in `unit`.
+
+    Triangles and quadrilaterals are cells, physical groups of lines are patches.
+    Raises MeshError with all faults that can be told apart.
+    """
+    path = Path(path)
+    factor = _factor(unit, path)
+    content = load(path)
+    faults = _place_faults(content, unit)
+    if faults:
+        raise MeshError(faults, path.name)
+    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)  # -1 stands first
+    cells = renumbered[:-1].reshape(-1, 4) - 1
+    notes = list(content.notes)
+    spare = len(content.points) + 1 - used.size
+    if spare:
+        notes.append(f"{spare} of {len(content.points)} points in the file belong to no cell: left out")
+    lines = _renumber(content.lines, used[1:])
+    draft = Draft(content.points[used[1:], :2], cells, unit)
+    faults, bad, clockwise = shape_faults(draft)
+    cells[clockwise] = _turned(cells[clockwise])
+    if clockwise.any():
+        notes.append(f"{draft.list(np.flatnonzero(clockwise))} ran clockwise: turned")
+    number = np.flatnonzero(~bad)
+    edges = edges_of(cells[number], len(draft.points))
+    faults += overlap_faults(draft, edges, number)
+    if faults:
+        raise MeshError(faults, path.name)
+    faults, names, patch = grouped(draft, edges, lines, content.groups)
+    touching = contact_faults(draft, edges, patch >= 0)
+    faults += touching or piece_faults(draft, edges)
+    if faults:
+        raise MeshError(faults, path.name)
+    notes += _notes(draft, factor, patch, bool(content.groups))
+    patch = np.where(patch < 0, len(names) - 1, patch)
+    return assemble(factor * draft.points, cells, edges, names, patch, notes=notes)
+
+
+def _factor(unit: str, path: Path) -> float:
+    """Metres per unit."""
+    try:
+        return find(unit, "length").read("1")
+    except ValueError as error:
+        raise MeshError([Fault("unit", str(error))], path.name) from None
+
+
+def _place_faults(content: Content, unit: str) -> list[Fault]:
+    """Points that are nowhere, or not in one plane z = constant."""
+    used = np.unique(content.cells[content.cells >= 0])
+    points = content.points[used]
+    lost = used[~np.isfinite(points).all(axis=1)]
+    if lost.size:
+        return [Fault("points", f"{lost.size} of {used.size} are not finite, first point {lost[0]}")]
+    extent = np.ptp(points, axis=0)
+    near = PLANE * extent.max()
+    if extent[2] <= near:
+        return []
+    far = content.points[:, 2] - points[:, 2].min() > 0.5 * extent[2]
+    cell = int(np.argmax(far[content.cells].any(axis=1)))
+    text = f"z runs from {points[:, 2].min():.6g} to {points[:, 2].max():.6g} {unit}, beyond the middle in cell {cell}"
+    constant = "".join(
+        f"; {axis} is constant: turn the mesh" for axis, e in zip("xy", extent, strict=False) if e <= near
+    )
+    return [Fault("points", f"{text}; wanted a mesh in one plane, z = constant{constant}")]
+
+
+def _renumber(lines: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Lines over the used points only; -1 for a point that no cell has."""
+    spot = np.minimum(np.searchsorted(used, lines), used.size - 1)
+    return np.where(used[spot] == lines, spot, -1)
+
+
+def _turned(cells: np.ndarray) -> np.ndarray:
+    quad = cells[:, [0, 3, 2, 1]]
+    triangle = cells[:, [0, 2, 1, 3]]
+    return np.where(cells[:, 3:] < 0, triangle, quad)
+
+
+def _notes(draft: Draft, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
+    """What the file leaves unsaid: names of the boundary, and perhaps its unit."""
+    notes = []
+    unnamed = int((patch < 0).sum())
+    if not grouped:
+        notes.append(f'the file names no group of lines: all {unnamed} faces of the boundary are "{WALL}"')
+    elif unnamed:
+        notes.append(f'{unnamed} of {patch.size} faces of the boundary are in no group: they are "{WALL}"')
+    extent = factor * np.ptp(draft.points, axis=0).max()
+    if draft.unit == "m" and not SMALL <= extent <= LARGE:
+        guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'
+        notes.append(f"the mesh is {extent:.6g} m across: is the file in another unit? then say so, perhaps {guess}")
+    return notes
