@@ -71,8 +71,8 @@ class Device:
         """Whether its restriction dissipates drop times flow; else that is energy supplied."""
         return True
 
-    def settle(self, armed: np.ndarray, row, y: np.ndarray) -> None:
-        """Put into y what an event of its own, which has just happened, does at once."""
+    def settle(self, model, row, y: np.ndarray, scale: np.ndarray) -> None:
+        """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
         """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.

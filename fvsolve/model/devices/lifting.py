@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope
@@ -33,7 +31,8 @@ class Lifting(Device, kind=""):
     def scales(self, scene, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
-    def settle(self, armed, row, y: np.ndarray) -> None:
+    def settle(self, model, row, y, scale) -> None:
+        armed = model.tables[rec.I_ARMED]
         if row["states"] == 2 and (armed[row["event"]] > 0.0 or armed[row["event"] + 2] > 0.0):
             y[row["y"] + 1] = 0.0
 
