@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from truth.scenes import AMBIENT, RHO, WATER, area, junction, pipe, reservoir, scene, valve
+from truth.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model.sparsity import sparsity
@@ -130,6 +130,22 @@ def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
     assert texts[:2] == ["opens", "shuts"] and len(texts) <= 8
     assert texts == (["opens", "shuts"] * 4)[: len(texts)]
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_it_opens_again_from_the_very_volume_at_which_it_shut():
+    """Beside a pump's shut check valve nothing moves its fluid meanwhile."""
+    curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
+    friction = {"model": "quasi-steady", "roughness": 1e-4}
+    links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "rated_speed": 150.0, "inertia": 0.1,
+                   "trip": 1.0, "check_valve": True},
+             "m": pipe("a", "o", 800.0, 0.2, 1000.0, 40, friction=friction)}  # fmt: skip
+    nodes = {"s": lake(2.0), "a": {"type": "air-valve", "elevation": 5.0, "inlet": 0.05, "outlet": 0.005}}
+    result = fvsolve.run(scene(nodes | {"o": lake(40.0)}, links, 15.0, {}, ["a.air_volume"]))
+    texts = [event["what"] for event in result.summary["events"] if event["name"] == "a"]
+    assert result.ok and texts == ["opens", "shuts", "opens", "shuts"]
+    opens, shuts = (result.summary["events"][k]["time"] for k in (3, 4))
+    between = (result.t > opens + 0.01) & (result.t < shuts - 0.01)
+    assert between.any() and np.all(result["a.air_volume"][between] > result["a.air_volume"][0])
 
 
 @pytest.mark.parametrize("numerics", [{"method": "euler", "step": 0.001}, {"method": "rk4", "step": 0.01}])

@@ -18,6 +18,7 @@ class Accumulator(Device, kind="accumulator"):
     vessel = True
     quantities = ("gas_volume", "gas_pressure")
     events = ("is empty", "holds fluid again")
+    remedy = "give it a connection, whose loss brakes what comes and goes"
 
     def place(self, scene, name, node, row) -> None:
         row["y"] = scene.states([f"{name}.mass"], 0.1 * scene.fluid.density * node.volume)

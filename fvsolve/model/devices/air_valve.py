@@ -20,6 +20,7 @@ class AirValve(Device, kind="air-valve"):
     states = ("air",)
     quantities = ("air_volume", "air_mass", "air_pressure")
     events = ("opens", "shuts")
+    remedy = "give it another volume"
 
     def place(self, scene, name, node, row) -> None:
         row["density"] = scene.law.tank_density

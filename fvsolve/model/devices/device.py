@@ -14,7 +14,7 @@ class Device:
 
     code : of their law in kernels.devices; states : names of what each holds
     quantities : probes, in the order in which `device_value` numbers them
-    events : what it means that each event function falls to zero
+    events : what it means that each event function falls to zero; remedy : what to try where they go to and fro
     """
 
     kinds: ClassVar[dict[str, Device]] = {}
@@ -22,6 +22,7 @@ class Device:
     states: ClassVar[tuple[str, ...]] = ()
     quantities: ClassVar[tuple[str, ...]] = ()
     events: ClassVar[tuple[str, ...]] = ()
+    remedy: ClassVar[str] = "give it a time_constant"
     vessel: ClassVar[bool] = False  # a place whose pressure it computes
 
     def __init_subclass__(cls, kind: str) -> None:

@@ -21,6 +21,7 @@ class Lifting(Device, kind=""):
 
     quantities = ("opening",)
     events = STOPS
+    remedy = "give it a greater overpressure"
 
     def numbers(self, scene, name, part) -> list[float]:
         """At the start: lift, where the pressures draw it, what it feels; then its span, and how its disc moves."""
