@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices import disc as law
 from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope
 from fvsolve.model.devices.device import Device
@@ -12,6 +13,7 @@ from fvsolve.model.devices.regulator import opening_of
 from fvsolve.steady import Edge
 
 LIFTING, OPEN = "lifting", "open"  # in `start.shut`, shut
+SEATED = 1e-12  # lift below its seat of a disc that has slammed, so that rounding does not open it
 SMALL_LIFT = 1e-9  # of a lift, what is rounding
 STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat")
 
@@ -33,8 +35,10 @@ class Lifting(Device, kind=""):
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
     def settle(self, model, row, y, scale) -> None:
-        armed = model.tables[rec.I_ARMED]
-        if row["states"] == 2 and (armed[row["event"]] > 0.0 or armed[row["event"] + 2] > 0.0):
+        stop, seat = (model.tables[rec.I_ARMED][row["event"] + k] > 0.0 for k in (0, 2))
+        if self.states and seat and law.disc_lift(y, model.tables, row) > 0.0:  # it has slammed
+            y[row["y"]] = -model.tables[rec.I_FLOATS][row["data"] + law.LIFT] - SEATED
+        if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 
     def part(self, start, k: int):
