@@ -197,10 +197,19 @@ def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
     assert not np.any((np.abs(model.jacobian(0.0, y)) > 1e-9) & ~pattern)
 
 
+def test_open_at_the_start_it_says_so():
+    links = {"m": pipe("lake", "v", 100.0, 0.1, 1000.0, 4), "n": pipe("v", "low", 100.0, 0.1, 1000.0, 4)}
+    nodes = {"lake": lake(0.0), "v": {"type": "air-valve", "elevation": 2.0, "inlet": 0.05, "outlet": 0.05}}
+    model = fvsolve.build(fvsolve.load(scene(nodes | {"low": lake(0.0)}, links, 1.0, {})))
+    (said,) = [warning for warning in model.warnings if warning.startswith("v: the air valve is open at the start")]
+    assert f"{RHO * 9.80665 * 2.0:.4g} Pa below ambient" in said
+
+
 @pytest.mark.parametrize(
     "wrong, said",
     [
         ({"inlet": 0.0}, "out of range"),
+        ({"inlet": 50}, 'above 0, 1 at most, in m; did you mean "50 mm"?'),
         ({"outlet": None}, "outlet is missing"),
         ({"volume": -1.0}, "out of range"),
         ({"discharge_coefficient": 1.5}, "out of range"),
