@@ -47,7 +47,7 @@ from fvsolve.steppers.orders import (
     STORE,
     TOLERANCE,
 )
-from fvsolve.steppers.step import combine, copy, error_norm
+from fvsolve.steppers.step import combine, copy, error_norm, small
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 from fvsolve.steppers.tableau import Method
@@ -263,7 +263,7 @@ def filtered_error(
         solve(shape, store, d)
         found = 0.0
         for e in range(n):
-            w = d[e] / (orders[SIZE] * (scale[e] + max(abs(y[now, e]), abs(y[new, e]))))
+            w = d[e] / (orders[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
             found += w * w
         found = sqrt(found / max(n, 1))
         if found < 1.0 or turn == 1 or not doubt:

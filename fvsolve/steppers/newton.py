@@ -29,7 +29,7 @@ from fvsolve.steppers.orders import (
     TOLERANCE,
     WORST,
 )
-from fvsolve.steppers.step import copy
+from fvsolve.steppers.step import copy, small
 
 # Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
 # what a stage starts from (Rosenbrock: df/dt); then, for fully implicit methods, transformed increments, f and
@@ -58,7 +58,7 @@ def begin(k, y, scale, orders, memory, work, vectors):
     tolerance = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
     weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
     for i in range(n):
-        weights[i] = 1.0 / (tolerance * (scale[i] + abs(y[i])))
+        weights[i] = 1.0 / (tolerance * small(scale[i], y[i]))
         last[i], first[i] = first[i], k[0, i]
     for j in range(1, s):
         copy(k[j], vectors[j])
