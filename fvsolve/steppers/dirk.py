@@ -12,10 +12,13 @@ from fvsolve.steppers.newton import (
     FAILED,
     INCREMENT,
     MOST,
+    MOVED,
     RATE,
     WEIGHTS,
     begin,
     book_increment,
+    damp,
+    evaluate,
     find_worst,
     renew,
     size_of,
@@ -24,13 +27,13 @@ from fvsolve.steppers.newton import (
 from fvsolve.steppers.orders import (
     CALLS,
     CONTROL,
+    DAMPED,
     FACTORS,
     HAS,
     HEADER,
     KNOWN,
     LAST,
     MADE,
-    NEWTON,
     NEWTON_FAILED,
     SHIFT,
     SIZE,
@@ -71,14 +74,7 @@ def solve_stage(
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     before, why, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
     for turn in range(MOST):
-        for j in range(n):
-            y_stage[j] = base[j] + h_gamma * ki[j]
-        rhs(t, y_stage, f, out, handle)
-        memory[CALLS] += 1.0
-        memory[NEWTON] += 1.0
-        for j in range(n):
-            d[j] = f[j] - ki[j]
-        solve(shape, store, d)
+        evaluate(rhs, solve, handle, shape, t, h_gamma, base, ki, y_stage, f, out, memory, d, store)
         for j in range(n):
             ki[j] += shift * d[j]
         size = sqrt(size_of(d, weights) / max(n, 1))
@@ -97,11 +93,11 @@ def solve_stage(
 
 @inner
 def try_stages(
-    rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, orders, memory, nnz,
-    work, vectors, store,
+    rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, scale, orders, memory,
+    nnz, work, vectors, store,
 ):  # fmt: skip
-    """All stages in turn with the Jacobian at hand; returns CONVERGED or FAILED."""
-    s = k.shape[0]
+    """All stages in turn with the Jacobian at hand, damped where it is fresh; returns CONVERGED or FAILED."""
+    s, fresh = k.shape[0], work[MADE] == memory[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
         row = row_of(coefficients, s, i)
@@ -128,9 +124,35 @@ def try_stages(
             rhs, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, orders, memory,
             nnz, work, vectors, store,
         )  # fmt: skip
+        if why == FAILED and fresh:
+            for j in range(y.size):
+                k[i, j] = shift * (y[j] - base[j])
+            why = damp(
+                rhs, factor, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, scale,
+                orders, memory, nnz, work, vectors, store,
+            )  # fmt: skip
         if why == FAILED:
             return FAILED
     return CONVERGED
+
+
+@inner
+def smoothed_error(solve, shape, h, error, y, now, new, k, scale, orders, work, vectors, store):
+    """The error by the last factors, (I - h g J)^-1 h sum e_j k_j: f at its start tells no more of a step so stiff.
+
+    (Hosea and Shampine 1996.)
+    """
+    s, n = k.shape
+    d, total = vectors[s + INCREMENT], 0.0
+    for i in range(n):
+        d[i] = 0.0
+        for j in range(s):
+            d[i] += work[SHIFT] * h * error[j] * k[j, i]
+    solve(shape, store, d)
+    for i in range(n):
+        w = d[i] / (orders[SIZE] * (scale[i] + max(abs(y[now, i]), abs(y[new, i]))))
+        total += w * w
+    return sqrt(total / max(n, 1))
 
 
 @njit
@@ -147,10 +169,13 @@ def attempt(
     begin(k, y[now], scale, orders, memory, work, vectors)
     while True:
         if work[HAS] == 0.0:
-            renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+            renew(
+                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
+                vectors[s + RATE],
+            )  # fmt: skip
         why = try_stages(
-            rhs, factor, solve, handle, coefficients, shape, t, h, y[now], y[3], k, supply, where, out, orders, memory,
-            nnz, work, vectors, store,
+            rhs, factor, solve, handle, coefficients, shape, t, h, y[now], y[3], k, supply, where, out, scale, orders,
+            memory, nnz, work, vectors, store,
         )  # fmt: skip
         if why == CONVERGED:
             break
@@ -160,4 +185,8 @@ def attempt(
     combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:
         return 0.0
+    if work[DAMPED] == memory[STEPS]:
+        return smoothed_error(
+            solve, shape, h, error_of(coefficients, s), y, now, new, k, scale, orders, work, vectors, store
+        )
     return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])

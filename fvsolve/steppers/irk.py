@@ -20,6 +20,7 @@ from fvsolve.steppers.newton import (
     FAILED,
     INCREMENT,
     MOST,
+    MOVED,
     RATE,
     STAGES,
     WEIGHTS,
@@ -291,7 +292,10 @@ def attempt(
     begin(k, y[now], scale, orders, memory, work, vectors)
     while True:
         if work[HAS] == 0.0:
-            renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+            renew(
+                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
+                vectors[s + RATE],
+            )  # fmt: skip
         why = FAILED
         if work[SHIFT] != 1.0 / h:
             factors = (store.size + store_complex.size - n) // max(int(work[STORE]), 1)
