@@ -22,6 +22,7 @@ from fvsolve.steppers.newton import (
     find_worst,
     renew,
     size_of,
+    smoothed_error,
     verdict,
 )
 from fvsolve.steppers.orders import (
@@ -74,7 +75,8 @@ def solve_stage(
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     before, why, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
     for turn in range(MOST):
-        evaluate(rhs, solve, handle, shape, t, h_gamma, base, ki, y_stage, f, out, memory, d, store)
+        evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
+        solve(shape, store, d)
         for j in range(n):
             ki[j] += shift * d[j]
         size = sqrt(size_of(d, weights) / max(n, 1))
@@ -136,25 +138,6 @@ def try_stages(
     return CONVERGED
 
 
-@inner
-def smoothed_error(solve, shape, h, error, y, now, new, k, scale, orders, work, vectors, store):
-    """The error by the last factors, (I - h g J)^-1 h sum e_j k_j: f at its start tells no more of a step so stiff.
-
-    (Hosea and Shampine 1996.)
-    """
-    s, n = k.shape
-    d, total = vectors[s + INCREMENT], 0.0
-    for i in range(n):
-        d[i] = 0.0
-        for j in range(s):
-            d[i] += work[SHIFT] * h * error[j] * k[j, i]
-    solve(shape, store, d)
-    for i in range(n):
-        w = d[i] / (orders[SIZE] * (scale[i] + max(abs(y[now, i]), abs(y[new, i]))))
-        total += w * w
-    return sqrt(total / max(n, 1))
-
-
 @njit
 def attempt(
     rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
@@ -187,6 +170,7 @@ def attempt(
         return 0.0
     if work[DAMPED] == memory[STEPS]:
         return smoothed_error(
-            solve, shape, h, error_of(coefficients, s), y, now, new, k, scale, orders, work, vectors, store
-        )
+            rhs, factor, solve, handle, shape, where, t, h, y[now], y[new], k, supply, error_of(coefficients, s),
+            1.0 / (h * row_of(coefficients, s, s - 1)[s - 1]), scale, out, orders, memory, work, vectors, store,
+        )  # fmt: skip
     return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])
