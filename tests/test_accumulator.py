@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, RHO, WATER, area, reservoir, scene
+from truth.scenes import AMBIENT, RHO, WATER, area, lake, reservoir, scene
 
 import fvsolve
 from fvsolve.model.sparsity import sparsity
@@ -220,3 +220,21 @@ def test_what_is_wrong_with_an_accumulator_is_said(wrong, said):
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(case)
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("precharge, switches", [(4.01e5, 3), (7e5, 2)], ids=["emptied", "empty from the start"])
+def test_a_check_valve_beside_an_empty_bladder_opens_once(precharge, switches):
+    """Where n^2 70 m is the lift of 28 m: what the neck alone holds is nothing, and what goes in comes out."""
+    curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
+    speed = {"time": [1.0, 1.5, 5.0, 6.0], "value": [1.0, 0.3, 0.3, 1.0]}
+    links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "speed": speed, "check_valve": True},
+             "g": {"type": "valve", "from": "a", "to": "o", "area": 0.003}}  # fmt: skip
+    nodes = {"s": lake(2.0), "a": {"type": "accumulator", "volume": 0.2, "precharge": precharge}, "o": lake(30.0)}
+    result = fvsolve.run(scene(nodes, links, 5.485, {}, ["p.flow", "g.flow"], every=1e-3))
+    events = result.summary["events"]
+    times = [event["time"] for event in events if event["what"] == "check valve opens"]
+    assert times == pytest.approx([5.0 + (math.sqrt(0.4) - 0.3) / 0.7], abs=1e-5)  # it is reluctant by 1 Pa
+    assert len(events) == switches
+    late = result.t > times[0] + 5e-4
+    assert np.count_nonzero(late) > 5
+    np.testing.assert_allclose(result["p.flow"][late], result["g.flow"][late], rtol=1e-3)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from truth.scenes import AMBIENT, RHO, WATER, area, junction, pipe, reservoir, scene, valve
+from truth.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model.sparsity import sparsity
@@ -132,6 +132,22 @@ def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
+def test_it_opens_again_from_the_very_volume_at_which_it_shut():
+    """Beside a pump's shut check valve nothing moves its fluid meanwhile."""
+    curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
+    friction = {"model": "quasi-steady", "roughness": 1e-4}
+    links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "rated_speed": 150.0, "inertia": 0.1,
+                   "trip": 1.0, "check_valve": True},
+             "m": pipe("a", "o", 800.0, 0.2, 1000.0, 40, friction=friction)}  # fmt: skip
+    nodes = {"s": lake(2.0), "a": {"type": "air-valve", "elevation": 5.0, "inlet": 0.05, "outlet": 0.005}}
+    result = fvsolve.run(scene(nodes | {"o": lake(40.0)}, links, 15.0, {}, ["a.air_volume"]))
+    texts = [event["what"] for event in result.summary["events"] if event["name"] == "a"]
+    assert result.ok and texts == ["opens", "shuts", "opens", "shuts"]
+    opens, shuts = (result.summary["events"][k]["time"] for k in (3, 4))
+    between = (result.t > opens + 0.01) & (result.t < shuts - 0.01)
+    assert between.any() and np.all(result["a.air_volume"][between] > result["a.air_volume"][0])
+
+
 @pytest.mark.parametrize("numerics", [{"method": "euler", "step": 0.001}, {"method": "rk4", "step": 0.01}])
 def test_fixed_explicit_steps_open_it_once(numerics):
     """A body of the size that such valves have gives a chamber no quicker than the steps: no chatter where it opens."""
@@ -181,10 +197,19 @@ def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
     assert not np.any((np.abs(model.jacobian(0.0, y)) > 1e-9) & ~pattern)
 
 
+def test_open_at_the_start_it_says_so():
+    links = {"m": pipe("lake", "v", 100.0, 0.1, 1000.0, 4), "n": pipe("v", "low", 100.0, 0.1, 1000.0, 4)}
+    nodes = {"lake": lake(0.0), "v": {"type": "air-valve", "elevation": 2.0, "inlet": 0.05, "outlet": 0.05}}
+    model = fvsolve.build(fvsolve.load(scene(nodes | {"low": lake(0.0)}, links, 1.0, {})))
+    (said,) = [warning for warning in model.warnings if warning.startswith("v: the air valve is open at the start")]
+    assert f"{RHO * 9.80665 * 2.0:.4g} Pa below ambient" in said
+
+
 @pytest.mark.parametrize(
     "wrong, said",
     [
         ({"inlet": 0.0}, "out of range"),
+        ({"inlet": 50}, 'above 0, 1 at most, in m; did you mean "50 mm"?'),
         ({"outlet": None}, "outlet is missing"),
         ({"volume": -1.0}, "out of range"),
         ({"discharge_coefficient": 1.5}, "out of range"),

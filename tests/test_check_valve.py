@@ -191,6 +191,24 @@ def test_a_disc_that_shuts_late_slams_as_waves_and_its_own_equation_say():
     assert result["check.flow"].min() < -1.0 and not result["check.flow"][after].any()
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_a_disc_that_slams_on_a_rigid_column_stops_it_dead_and_opens_again(rtol):
+    """Drawn by its own drop it shuts in no time on a column that still flows; it leaves its seat where heads say."""
+    head = {"time": [1.0, 3.0, 8.0, 10.0], "value": [22.0, 5.0, 5.0, 30.0]}
+    links = {"cv": check("up", "a", 0.0122, cracking_pressure=2e3, overpressure=4e4, time_constant=0.4),
+             "c": {"type": "rigid-column", "from": "a", "to": "o", "length": 300.0, "diameter": 0.2,
+                   "friction": FRICTION}}  # fmt: skip
+    case = scene({"up": lake(head), "a": junction(), "o": lake(20.0)}, links, 15.0, {"rtol": rtol}, ["c.flow"])
+    result = fvsolve.run(case)
+    assert result.ok and [mark["what"] for mark in result.summary["marks"]] == ["stopped dead"]
+    shuts, opens = result.summary["events"]
+    assert (shuts["what"], opens["what"]) == ("is shut", "leaves its seat")
+    lift = 20.0 + 2e3 / (RHO * GRAVITY)
+    assert opens["time"] == pytest.approx(8.0 + 2.0 * (lift - 5.0) / 25.0, rel=1e-9)
+    stands = (result.t > shuts["time"]) & (result.t < opens["time"])
+    assert np.all(result["c.flow"][stands] == 0.0) and result["c.flow"][-1] > 0.0
+
+
 @pytest.mark.parametrize("disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}])
 def test_a_disc_half_open_at_the_start_does_not_move(disc):
     case = hard("spring loaded", "linear", SMOOTH, 50.0, 0.5)

@@ -211,6 +211,10 @@ BAD = {
         SCENE + RIGID,
         "nodes.c: only rigid columns meet here, so nothing sets its pressure",
     ),
+    "a demand above its pressure between rigid columns": (
+        SCENE + RIGID.replace('type = "junction"', 'type = "junction"\ndemand = 0.1\nrequired_pressure = 3e5'),
+        "nothing sets its pressure, as above its required_pressure it takes the same at any",
+    ),
     # two of a kind
     "two step settings": (
         add("numerics", "step = 1e-3"),

@@ -211,6 +211,12 @@ def test_near_misses_are_refused(text, dimension, message):
     assert message in str(caught.value)
 
 
+@pytest.mark.parametrize("text, meant", [("0 bar", "0 barg"), ("-0.5 bar", "-0.5 barg"), ("-2 bar", "")])
+def test_a_vacuum_is_meant_as_gauge_only_where_that_is_none(text, meant):
+    said = units.vacuum(text, parse(text, "pressure")[0])
+    assert said == f'"{text}" is absolute, a vacuum' + (f'; did you mean "{meant}"?' if meant else "")
+
+
 def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
     values = np.array([0.0, 1.5e5])
     assert convert(values, "pressure", "barg", ambient=1e5) == approx([-1.0, 0.5])

@@ -262,7 +262,8 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
             touching.setdefault(place, set()).add(str(_dict(links[link]).get("type")))
     for name, node in nodes.items():
         if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {"rigid-column"}:
-            message = "only rigid columns meet here, so nothing sets its pressure; give it a chamber volume"
+            fixed = ", as above its required_pressure it takes the same at any" if "required_pressure" in node else ""
+            message = f"only rigid columns meet here, so nothing sets its pressure{fixed}; give it a chamber volume"
             yield ("nodes", name), message
 
 

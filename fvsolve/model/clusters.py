@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fvsolve.kernels import records as rec
@@ -86,9 +88,15 @@ def carries_its_column(scene, members, ks) -> bool:
 
 
 def soften(scene, ks) -> None:
-    """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10."""
+    """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10.
+
+    At a bladder accumulator, whose neck holds the least of pressures in hardly any mass, below a drop of 1 Pa.
+    """
+    places = list(scene.case.places.values())
     for k in ks:
         if scene.valve_table["transition"][k] == 0.0 and scene.valve_table["law"][k] <= rec.TWO_WAY:
             name = scene.valve_names[k]
             flow = scene.law.transition_flow(name, scene.case.conduits[name], 10.0, scene.fault)
-            scene.valve_table["transition"][k] = flow
+            row = scene.valve_table[k]
+            neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
+            row["transition"] = max(flow, math.sqrt(row["conductance"])) if neck else flow

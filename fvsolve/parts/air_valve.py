@@ -11,6 +11,7 @@ from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.value import Number, Quantity, between, positive
 
+BORE = between(0, 1, open=True)  # m: a bare 50 is meant in mm
 BODY = 3.0  # width and length of the float's chamber where its volume is not given, in diameters of the inlet
 WIDE = 30.0  # throat between fluid and air, in diameters of the inlet, of loss 1
 
@@ -28,8 +29,8 @@ class AirValve(Node, kind="air-valve"):
         **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",
     }  # fmt: skip
 
-    inlet: Annotated[float, Quantity("length", positive, "diameter of the bore for air in [m]")]
-    outlet: Annotated[float, Quantity("length", positive, "diameter of the bore for air out [m]")]
+    inlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air in [m]")]
+    outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air out [m]")]
     discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of both bores")] = 0.6
     volume: Annotated[float | None, Quantity("volume", positive, "of the float's chamber [m3]")] = None
     temperature: Annotated[float, Quantity("temperature", positive, "of the air [K]")] = 293.15

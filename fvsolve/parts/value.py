@@ -107,8 +107,13 @@ class Quantity(Value):
         if isinstance(value, tuple):
             value = value[0] + (setting.ambient if value[1] and self.dimension == "pressure" else 0.0)
             if self.dimension == "pressure" and value <= 0 and self.range is not nonnegative:
-                raise ValueError(units.vacuum(given, value))
-        self.range.check(value, given)
+                raise ValueError(units.vacuum(given, value, ambient=setting.ambient))
+        try:
+            self.range.check(value, given)
+        except ValueError as fault:
+            if self.dimension != "length" or isinstance(given, str) or value <= self.range.greatest:
+                raise
+            raise ValueError(f'{fault}, in m; did you mean "{given:g} mm"?') from None
         return value
 
     def json(self) -> dict[str, Any]:

@@ -34,7 +34,7 @@ class Loop:
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
         ledgers, structure = len(model.node_names), structure or (lambda: model.structure)
-        self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale)
+        self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
         sums = [*model.tables[rec.I_NODES]["y"], *model.tables[rec.I_BODIES]["y"]]  # travel is part of what is stored
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
@@ -73,6 +73,7 @@ class Loop:
         """Go on in a segment that ends at `end` [s]; rows due from `stop_at` on are not written by the loop."""
         self.orders[told.END], self.orders[told.STOP_AT] = end, stop_at
         self.flags[told.PHASE], self.flags[told.BEHIND] = told.FRESH, 0
+        self.settle()
         self.model.tables[rec.I_SETTINGS][0]["limit"] = end
 
     def run(self, budget: float) -> int:
@@ -100,8 +101,12 @@ class Loop:
         first, many = 2 * int(np.sum(self.model.tables[rec.I_NODES]["kind"] == rec.TANK)), len(self.model.events)
         now = self.armed[first : first + many] > before[first : first + many]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now)]
+        self.settle()
+
+    def settle(self) -> None:
+        """Have devices do what their events do at once."""
         for (_, _, device), row in zip(self.model.devices, self.model.tables[rec.I_DEVICES], strict=True):
-            device.settle(self.armed, row, self.now)
+            device.settle(self.model, row, self.now, self.stepper.scale)
 
     def switch(self, before: np.ndarray) -> bool:
         """Note the events that have just happened; False where they go to and fro at one time."""

@@ -265,8 +265,9 @@ class Run:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {loop.t:.6g} s"
         if code == told.CHATTERS:
-            names = listing(sorted({model.events[k][0] for t, k in loop.switched if t == loop.t}))
-            return f"stopped: {names} opens and shuts without end at {when}; give it inertia, or another size"
+            names = sorted({model.events[k][0] for t, k in loop.switched if t == loop.t})
+            found = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
+            return f"stopped: {listing(names)} opens and shuts without end at {when}; {', or '.join(found)}"
         if code == told.STOPPED:
             what = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
             return f"stopped: {what} at {when}, as below_vapor asks"

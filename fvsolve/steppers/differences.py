@@ -22,7 +22,7 @@ def differences(rhs, handle, shape, where, t, y, f, supply0, scale, y_work, f_wo
     for color in range(shape[COLORS]):
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
-            y_work[j] = y[j] + ROOT * max(abs(y[j]), scale[j])
+            y_work[j] = y[j] + ROOT * (max(abs(y[j]), scale[j]) if scale[j] >= 0.0 else -scale[j])
         rhs(t, y_work, f_work, out, handle)
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]

@@ -12,25 +12,29 @@ from fvsolve.steppers.newton import (
     FAILED,
     INCREMENT,
     MOST,
+    MOVED,
     RATE,
     WEIGHTS,
     begin,
     book_increment,
+    damp,
+    evaluate,
     find_worst,
     renew,
     size_of,
+    smoothed_error,
     verdict,
 )
 from fvsolve.steppers.orders import (
     CALLS,
     CONTROL,
+    DAMPED,
     FACTORS,
     HAS,
     HEADER,
     KNOWN,
     LAST,
     MADE,
-    NEWTON,
     NEWTON_FAILED,
     SHIFT,
     SIZE,
@@ -71,13 +75,7 @@ def solve_stage(
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     before, why, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
     for turn in range(MOST):
-        for j in range(n):
-            y_stage[j] = base[j] + h_gamma * ki[j]
-        rhs(t, y_stage, f, out, handle)
-        memory[CALLS] += 1.0
-        memory[NEWTON] += 1.0
-        for j in range(n):
-            d[j] = f[j] - ki[j]
+        evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
         solve(shape, store, d)
         for j in range(n):
             ki[j] += shift * d[j]
@@ -97,11 +95,11 @@ def solve_stage(
 
 @inner
 def try_stages(
-    rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, orders, memory, nnz,
-    work, vectors, store,
+    rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, scale, orders, memory,
+    nnz, work, vectors, store,
 ):  # fmt: skip
-    """All stages in turn with the Jacobian at hand; returns CONVERGED or FAILED."""
-    s = k.shape[0]
+    """All stages in turn with the Jacobian at hand, damped where it is fresh; returns CONVERGED or FAILED."""
+    s, fresh = k.shape[0], work[MADE] == memory[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
         row = row_of(coefficients, s, i)
@@ -128,6 +126,13 @@ def try_stages(
             rhs, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, orders, memory,
             nnz, work, vectors, store,
         )  # fmt: skip
+        if why == FAILED and fresh:
+            for j in range(y.size):
+                k[i, j] = shift * (y[j] - base[j])
+            why = damp(
+                rhs, factor, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, scale,
+                orders, memory, nnz, work, vectors, store,
+            )  # fmt: skip
         if why == FAILED:
             return FAILED
     return CONVERGED
@@ -147,10 +152,13 @@ def attempt(
     begin(k, y[now], scale, orders, memory, work, vectors)
     while True:
         if work[HAS] == 0.0:
-            renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+            renew(
+                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
+                vectors[s + RATE],
+            )  # fmt: skip
         why = try_stages(
-            rhs, factor, solve, handle, coefficients, shape, t, h, y[now], y[3], k, supply, where, out, orders, memory,
-            nnz, work, vectors, store,
+            rhs, factor, solve, handle, coefficients, shape, t, h, y[now], y[3], k, supply, where, out, scale, orders,
+            memory, nnz, work, vectors, store,
         )  # fmt: skip
         if why == CONVERGED:
             break
@@ -160,4 +168,9 @@ def attempt(
     combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:
         return 0.0
+    if work[DAMPED] == memory[STEPS]:
+        return smoothed_error(
+            rhs, factor, solve, handle, shape, where, t, h, y[now], y[new], k, supply, error_of(coefficients, s),
+            1.0 / (h * row_of(coefficients, s, s - 1)[s - 1]), scale, out, orders, memory, work, vectors, store,
+        )  # fmt: skip
     return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])

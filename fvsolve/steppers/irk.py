@@ -4,6 +4,7 @@ Z are the increments of the q stages and K = (h A)^-1 (Z - h a_0 k_0) their slop
 first stage. A^-1 = T L T^-1, L block diagonal with a real shift for every real eigenvalue and a complex one for every
 pair (Butcher 1976; Hairer and Wanner 1996, IV.8). With W = T^-1 Z Newton solves
 (L / h x I - I x J) dW = T^-1 (F - K), block by block.
+Where one Jacobian does not do for all stages, `sweeps.py` solves them in turn.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from fvsolve.steppers.newton import (
     FAILED,
     INCREMENT,
     MOST,
+    MOVED,
     RATE,
     STAGES,
     WEIGHTS,
@@ -27,11 +29,13 @@ from fvsolve.steppers.newton import (
     book_increment,
     find_worst,
     renew,
+    smoothed_error,
     verdict,
 )
 from fvsolve.steppers.orders import (
     CALLS,
     CONTROL,
+    DAMPED,
     FACTORS,
     HAS,
     HEADER,
@@ -47,19 +51,20 @@ from fvsolve.steppers.orders import (
     STORE,
     TOLERANCE,
 )
-from fvsolve.steppers.step import combine, copy, error_norm
+from fvsolve.steppers.step import combine, copy, error_norm, small
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
+from fvsolve.steppers.sweeps import lower, sweep
 from fvsolve.steppers.tableau import Method
 
 # Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
-T, BACK, BLOCKS, SLOPES, AHEAD, START = range(6)
+T, BACK, BLOCKS, SLOPES, AHEAD, LOWER, START = range(7)
 # Rows of `vectors` for all stages, from STAGES on, q at a time: W, F, residuals and what solves them.
 W, F, R = range(3)
 
 
 def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
-    """[T, T^-1, L, T L, P, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
+    """[T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
 
     Pairs in L stand as [[a, -b], [b, a]], b > 0. P, ahead : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of
     the j-th Lagrange polynomial on c: what the last step's slopes say of this one; zero where c repeats.
@@ -85,7 +90,7 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
     if len(np.unique(c)) == q:
         lagrange = np.linalg.inv(np.vander(c - 1.0, increasing=True))  # in x, by columns
         ahead = (lagrange / (1.0 + np.arange(q))[:, None]).T
-    parts = (t, back, blocks, t @ blocks, ahead, back @ inverse @ a0, inverse @ a0)
+    parts = (t, back, blocks, t @ blocks, ahead, lower(a), back @ inverse @ a0, inverse @ a0)
     return np.concatenate([part.ravel() for part in parts])
 
 
@@ -138,20 +143,21 @@ def predict(coefficients, h, h_last, s, room, vectors):
 
 @inner
 def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
-    """Factors for every block of L / h behind one another; False without a pivot."""
-    q, blocks, b, real, pair = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n
+    """Factors for every block of L / h behind one another; how many they are, or 0 without a pivot."""
+    q, blocks, b, real, pair, made = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
     jacobian, size = work[HEADER:], int(work[STORE])
     while b < q:
         shift = blocks[b * q + b] / h
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
             if factor_complex(shape, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), store_complex[pair:]) != 0:
-                return False
+                return 0
             b, pair = b + 2, pair + size
         else:
             if factor(shape, jacobian, shift, store[real:]) != 0:
-                return False
+                return 0
             b, real = b + 1, real + size
-    return True
+        made += 1
+    return made
 
 
 @inner
@@ -263,7 +269,7 @@ def filtered_error(
         solve(shape, store, d)
         found = 0.0
         for e in range(n):
-            w = d[e] / (orders[SIZE] * (scale[e] + max(abs(y[now, e]), abs(y[new, e]))))
+            w = d[e] / (orders[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
             found += w * w
         found = sqrt(found / max(n, 1))
         if found < 1.0 or turn == 1 or not doubt:
@@ -291,13 +297,16 @@ def attempt(
     begin(k, y[now], scale, orders, memory, work, vectors)
     while True:
         if work[HAS] == 0.0:
-            renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+            renew(
+                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
+                vectors[s + RATE],
+            )  # fmt: skip
         why = FAILED
         if work[SHIFT] != 1.0 / h:
-            factors = (store.size + store_complex.size - n) // max(int(work[STORE]), 1)
-            memory[FACTORS] += 0.0 if work[SHIFT] == -1.0 / h else factors
-            work[SHIFT] = 0.0
-            if factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
+            known, work[SHIFT] = work[SHIFT] == -1.0 / h, 0.0
+            made = factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n)
+            memory[FACTORS] += 0.0 if known else made
+            if made > 0:
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
             if work[KNOWN] == 1.0 and (q < 5 or h <= 2.0 * memory[LAST]):  # high powers of a long step mislead
@@ -311,14 +320,27 @@ def attempt(
                 orders, memory, work, vectors, store, store_complex,
             )  # fmt: skip
         if why == CONVERGED:
+            finish(coefficients, shape, nnz, h, k, supply, work, vectors)
             break
         if work[MADE] == memory[STEPS]:
-            return NEWTON_FAILED
+            low, room = matrix(coefficients, s, LOWER), s + STAGES + F * q
+            why = sweep(
+                rhs, factor, solve, handle, coefficients, low, shape, t, h, y[now], y[3], k, supply, where, out, scale,
+                orders, memory, nnz, room, work, vectors, store,
+            )  # fmt: skip
+            work[SHIFT] = 0.0  # the factors are those of a stage
+            if why == FAILED:
+                return NEWTON_FAILED
+            break
         work[HAS] = 0.0
-    finish(coefficients, shape, nnz, h, k, supply, work, vectors)
     combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:
         return 0.0
+    if work[DAMPED] == memory[STEPS]:
+        return smoothed_error(
+            rhs, factor, solve, handle, shape, where, t, h, y[now], y[new], k, supply, error,
+            matrix(coefficients, s, BLOCKS)[0] / h, scale, out, orders, memory, work, vectors, store,
+        )  # fmt: skip
     if error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0:
         return filtered_error(
             rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store,

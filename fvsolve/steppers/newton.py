@@ -1,10 +1,16 @@
 """What implicit steps share: Jacobian and factors and when to renew them, stopping of Newton. Knows no tableau.
 
+Newton is simplified, with the Jacobian of the step's start, as long as that converges. Where the slope of f changes by
+orders within a step, as a valve's does about zero drop, it goes to and fro: then it is damped, with the Jacobian of
+every iterate.
+
 Kept between steps: `work`, a header and the Jacobian; in `vectors` f at the last step's start; its stages. A restart
 stores them (`Stepper.memories`) and factors anew: factors follow from the Jacobian and the shift to the last bit.
 """
 
 from __future__ import annotations
+
+from math import sqrt
 
 import numpy as np
 
@@ -13,12 +19,16 @@ from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.orders import (
     CALLS,
     CONTROL,
+    DAMPED,
+    FACTORS,
     HAS,
     HEADER,
     JACOBIANS,
     KNOWN,
     LAST,
     MADE,
+    NEWTON,
+    NEWTON_FAILED,
     RATIO,
     SEEN,
     SHIFT,
@@ -29,7 +39,7 @@ from fvsolve.steppers.orders import (
     TOLERANCE,
     WORST,
 )
-from fvsolve.steppers.step import copy
+from fvsolve.steppers.step import copy, small
 
 # Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
 # what a stage starts from (Rosenbrock: df/dt); then, for fully implicit methods, transformed increments, f and
@@ -41,12 +51,14 @@ FIXED, FLOOR = 1e-13, 1e-7  # accuracy aimed at where the step is given, relativ
 ENOUGH = 0.05  # of the tolerance
 STALE = 0.03  # a Jacobian that gains less than this in an iteration is made anew for the next step
 CONVERGED, FAILED = 0, 1
+MOST_DAMPED, LEAST_PART = 40, 1e-4  # iterations, and what part of an increment is tried
 
 
 def forget(work: np.ndarray) -> None:
     """Keep nothing over a kink: no Jacobian, no stages to go on from."""
     work[:STORE] = 0.0
-    work[SEEN], work[SURE] = -1.0, 1.0
+    work[SEEN] = work[DAMPED] = -1.0
+    work[SURE] = 1.0
 
 
 @inner
@@ -58,7 +70,7 @@ def begin(k, y, scale, orders, memory, work, vectors):
     tolerance = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
     weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
     for i in range(n):
-        weights[i] = 1.0 / (tolerance * (scale[i] + abs(y[i])))
+        weights[i] = 1.0 / (tolerance * small(scale[i], y[i]))
         last[i], first[i] = first[i], k[0, i]
     for j in range(1, s):
         copy(k[j], vectors[j])
@@ -69,13 +81,9 @@ def begin(k, y, scale, orders, memory, work, vectors):
 
 
 @inner
-def renew(rhs, handle, shape, where, t, y, k, supply, scale, out, memory, work, vectors):
-    """The Jacobian at the start of the step, from the fresh f there."""
-    s = k.shape[0]
-    calls = differences(
-        rhs, handle, shape, where, t, y, k[0], supply[0], scale, vectors[s + MOVED], vectors[s + RATE], out,
-        work[HEADER:],
-    )  # fmt: skip
+def renew(rhs, handle, shape, where, t, y, f, supply, scale, out, memory, work, moved, rate):
+    """The Jacobian at y, from the fresh f and ledger rates there; moved, rate : room for a state and its rates."""
+    calls = differences(rhs, handle, shape, where, t, y, f, supply, scale, moved, rate, out, work[HEADER:])
     memory[CALLS] += calls
     memory[JACOBIANS] += 1.0
     work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, memory[STEPS], 0.0, 0.0
@@ -91,6 +99,41 @@ def size_of(d, weights):
 
 
 @inner
+def along(d, other, weights):
+    """(<d, other> / <d, d>, |other|^2 / |d|^2): how far along d the next increment goes, and how long it is."""
+    square = dot = size = 0.0
+    for i in range(weights.size):
+        w = weights[i] * weights[i]
+        square += w * d[i] * d[i]
+        dot += w * d[i] * other[i]
+        size += w * other[i] * other[i]
+    return dot / square, size / square
+
+
+@inner
+def shortened(part, ahead, size):
+    """What part of an increment to take, having tried `part`: the same where the next one is shorter or goes on.
+
+    The next one, by the same factors, is `ahead` along this one and of squared length `size`, both relative. Where it
+    turns back, the secant says where it would not (natural monotonicity: Deuflhard 2004, 3.3).
+    """
+    if not size < np.inf:
+        return 0.25 * part
+    if ahead >= 0.0 or size <= (1.0 - 0.25 * part) ** 2:
+        return part
+    return part * min(0.7, max(0.1, 1.0 / (1.0 - ahead)))
+
+
+@inner
+def goal(orders):
+    """(increment at which Newton may stop, and which it must reach), in units of the tolerance."""
+    if orders[CONTROL] == TOLERANCE:
+        enough = max(1e-15 / orders[SIZE], ENOUGH)
+        return enough, enough
+    return 1.0, FLOOR / FIXED
+
+
+@inner
 def find_worst(d, f, weights, memory):
     """Note the component whose rate is no number, else the one that moves most against its tolerance."""
     worst = -1.0
@@ -103,9 +146,7 @@ def find_worst(d, f, weights, memory):
 @inner
 def verdict(turn, size, before, orders, work):
     """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
-    enough, floor = 1.0, FLOOR / FIXED
-    if orders[CONTROL] == TOLERANCE:
-        enough = floor = max(1e-15 / orders[SIZE], ENOUGH)
+    enough, floor = goal(orders)
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
@@ -132,3 +173,93 @@ def book_increment(shape, nnz, d, supply, i, work):
     multiply(shape, work[HEADER : HEADER + nnz], d, product)
     for m in range(supply.shape[1]):
         supply[i, m] += product[n + m]
+
+
+@inner
+def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, residual):
+    """f at the stage whose slope is ki, and f - ki."""
+    for j in range(ki.size):
+        y_stage[j] = base[j] + h_gamma * ki[j]
+    rhs(t, y_stage, f, out, handle)
+    memory[CALLS] += 1.0
+    memory[NEWTON] += 1.0
+    for j in range(ki.size):
+        residual[j] = f[j] - ki[j]
+
+
+@inner
+def damp(
+    rhs, factor, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, scale, orders, memory, nnz, work,
+    vectors, store,
+):  # fmt: skip
+    """k[i] = f(t, base + h gamma k[i]) by damped Newton, a Jacobian for every iterate; returns CONVERGED or FAILED.
+
+    To the accuracy of a given step whatever the tolerance: the last iterations are quick.
+    """
+    s, n = k.shape
+    base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
+    other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
+    enough, floor = FIXED / orders[SIZE] if orders[CONTROL] == TOLERANCE else 1.0, goal(orders)[1]
+    evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
+    for turn in range(MOST_DAMPED):
+        for m in range(supply.shape[1]):
+            supply[i, m] = out[where + m]
+        renew(rhs, handle, shape, where, t, y_stage, f, supply[i], scale, out, memory, work, other, d)
+        memory[FACTORS] += 1.0
+        if factor(shape, work[HEADER:], shift, store) != 0:
+            break
+        work[SHIFT] = shift
+        for j in range(n):
+            d[j] = f[j] - ki[j]
+        solve(shape, store, d)
+        size = sqrt(size_of(d, weights) / max(n, 1))
+        if size <= (enough if turn < MOST_DAMPED - 1 else floor):
+            for j in range(n):
+                ki[j] += shift * d[j]
+            book_increment(shape, nnz, d, supply, i, work)
+            work[DAMPED], work[RATIO], work[SURE] = memory[STEPS], 1.0, 1.0
+            return CONVERGED
+        part, tried = 1.0, 0.0
+        while part != tried and part > LEAST_PART:
+            for j in range(n):
+                ki[j] += shift * (part - tried) * d[j]
+            evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, other)
+            solve(shape, store, other)
+            ahead, length = along(d, other, weights)
+            tried, part = part, shortened(part, ahead, length)
+        if part != tried or not size < np.inf:
+            break
+    find_worst(d, f, weights, memory)
+    work[HAS] = 0.0
+    return FAILED
+
+
+@inner
+def smoothed_error(
+    rhs, factor, solve, handle, shape, where, t, h, y, y_new, k, supply, error, shift, scale, out, orders, memory,
+    work, vectors, store,
+):  # fmt: skip
+    """Error of a damped step, (I - J / shift)^-1 h sum e_j k_j with J from its start, in units of the tolerance.
+
+    A stiff f counts for what it moves within the step (Hosea and Shampine 1996). Where a jump makes J turn the error
+    round, it counts as it is.
+    """
+    s, n = k.shape
+    d, f, whole, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0
+    renew(rhs, handle, shape, where, t, y, k[0], supply[0], scale, out, memory, work, vectors[s + MOVED], f)
+    memory[FACTORS] += 1.0
+    work[RATIO] = 1.0
+    if factor(shape, work[HEADER:], shift, store) != 0:
+        return NEWTON_FAILED
+    for i in range(n):
+        f[i] = 0.0
+        for j in range(s):
+            f[i] += h * error[j] * k[j, i]
+        d[i] = shift * f[i]
+    solve(shape, store, d)
+    for i in range(n):
+        w = 1.0 / (orders[SIZE] * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        whole += (w * f[i]) * (w * f[i])
+        dot += (w * f[i]) * (w * d[i])
+        smooth += (w * d[i]) * (w * d[i])
+    return sqrt((smooth if dot > 0.0 else whole) / max(n, 1))

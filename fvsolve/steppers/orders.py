@@ -30,6 +30,7 @@ NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved wit
 
 # The header of `work`: whether there is a Jacobian, the step it was made at, whether the last step's stages are known,
 # the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
-# factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the size of a factor.
-HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, STORE = range(8)
-HEADER = 8
+# factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the last step
+# that was damped, the size of a factor.
+HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, DAMPED, STORE = range(9)
+HEADER = 9

@@ -11,7 +11,7 @@ from math import sqrt
 from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
-from fvsolve.steppers.newton import BASE, INCREMENT, RATE, renew
+from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew
 from fvsolve.steppers.orders import (
     CALLS,
     CONTROL,
@@ -97,7 +97,10 @@ def attempt(
     c, beyond = nodes_of(coefficients, s), coefficients[s * s + 3 * s :]  # C, d, g
     gamma, slope, d, f = beyond[s * s + s], vectors[s + SLOPE], vectors[s + INCREMENT], vectors[s + RATE]
     if work[HAS] == 0.0 or work[SEEN] != memory[STEPS]:
-        renew(rhs, handle, shape, where, t, y[now], k, supply, scale, out, memory, work, vectors)
+        renew(
+            rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
+            vectors[s + RATE],
+        )  # fmt: skip
         slope_in_time(rhs, handle, t, h, y[now], k, supply, where, out, memory, work, vectors)
         work[SEEN] = memory[STEPS]
         if orders[WATCH] != 0.0:

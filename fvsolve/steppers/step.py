@@ -42,9 +42,15 @@ def combine(y, h, weights, count, k, out):
         copy(y, out)
 
 
+@njit(forceinline=True)
+def small(scale, y):
+    """What errors of a state are measured against: scale + |y|; a scale below zero is meant whatever y is."""
+    return scale + abs(y) if scale >= 0.0 else -scale
+
+
 @njit
 def error_norm(h, error, k, y, y_new, scale, tolerance):
-    """Root mean square of h sum e_j k_j over tolerance (scale + max(|y|, |y_new|))."""
+    """Root mean square of h sum e_j k_j over tolerance times `small` of the greater of y and y_new."""
     first, last = 0, error.size
     while last > 0 and error[last - 1] == 0.0:
         last -= 1
@@ -55,7 +61,7 @@ def error_norm(h, error, k, y, y_new, scale, tolerance):
         e = 0.0
         for j in range(first, last):
             e += error[j] * k[j, i]
-        w = h * e / (tolerance * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        w = h * e / (tolerance * small(scale[i], max(abs(y[i]), abs(y_new[i]))))
         total += w * w
     return sqrt(total / max(y.size, 1))
 

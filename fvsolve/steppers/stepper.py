@@ -67,15 +67,17 @@ class Stepper:
             from fvsolve.steppers.irk import pairs_of
 
             q, pairs = s - 1, pairs_of(self.method)
-        reals = q - 2 * pairs if q else 1
+        reals = max(q - 2 * pairs, 1)  # stages that are solved in turn want one, whatever the method
         size, self.shape = structure.store_size, structure.shape
         self.work = np.zeros(told.HEADER + structure.nnz + n + 2 * ledgers + q * q)
         self.work[told.STORE] = size
         self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
         self.kept = told.HEADER + structure.nnz
         self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
-        real = arguments(structure.functions()) if reals else no_algebra()[:2]
-        self.algebra = (*real, *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]))
+        self.algebra = (
+            *arguments(structure.functions()),
+            *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]),
+        )
         newton.forget(self.work)
 
     @property

@@ -75,14 +75,15 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     return unit
 
 
-def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0) -> str:
+def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
     """What to say of a given pressure that comes to `pressure` [Pa] absolute, too little for a liquid."""
     below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
     if spelling in UNITS and UNITS[spelling].gauge:
         return f"{show(given)} is {pressure:.4g} Pa absolute, {below}"
-    hint = f"; did you mean {show(f'{number} {spelling}g')}?" if f"{spelling}g" in UNITS else ""
+    gauge = f"{spelling}g" in UNITS and pressure + ambient > vapor_pressure
+    hint = f"; did you mean {show(f'{number} {spelling}g')}?" if gauge else ""
     return f"{show(given)} is absolute, {below}{hint}"
 
 

@@ -2,7 +2,7 @@
 
 p V = m R T, V = V0 - y / rho with y [kg] the fluid that came in; the flow of air is isentropic through an orifice each
 way, choked below r = 0.528 (Wylie and Streeter 1993, 7-4). Open (armed), fluid passes; shut, none does, and the place
-is a junction. It opens where the pressure there falls below ambient and shuts once V is V0 again.
+is a junction. It opens where the pressure there falls below ambient and shuts once V is V0 again and fluid still comes.
 """
 
 from math import expm1, log1p, sqrt
@@ -130,7 +130,10 @@ def air_valve_events(y, out, tables, device, g):
     st, floats, at = tables[I_SETTINGS][0], tables[I_FLOATS], device["event"]
     node, place = tables[I_NODES][device["node"]], tables[I_VALVES][device["valve"]]["from_node"]
     fluid = y[node["y"]]
-    left = fluid - LAX * node["density"] * floats[device["data"] + VOLUME]
+    lax = LAX * node["density"] * floats[device["data"] + VOLUME]
+    left = fluid - lax
+    if out[tables[I_LAYOUT][0]["valve"] + device["valve"]] <= 0.0:  # as full as when it shut, but fluid leaves
+        left = min(left, -lax)
     if tables[I_ARMED][at] <= 0.0:
         p = tables[I_NODES][place]["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + place] - st["ambient"]
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]

@@ -11,13 +11,14 @@ from fvsolve.jit import njit
 from fvsolve.kernels.devices.codes import RELIEF_DISC
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
-from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_VALVES, RATE
+from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_NODES, I_VALVES, RATE
 from fvsolve.kernels.restrictions import head_drop
 
 LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6  # numbers: three of the start, then its keys
 AT_REST = 1e-10  # share of its span that does not lift it off a stop: rounding must not
 SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
 EARLY = 1e-6  # share of 1 / w by which it is asked which way it moves
+SLAM = 1e-9  # share of T or 1 / w in which a disc that is about to reach its seat has done so
 
 
 @njit
@@ -51,7 +52,7 @@ def move_disc(y, dydt, out, tables, device):
     drive, held = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
     own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
-    out[RATE] = max(out[RATE], own if held else disc_loop(out, tables, device, own))
+    out[RATE] = max(out[RATE], own if held else disc_loop(y, out, tables, device, own))
     if dydt.size == 0:
         return
     if device["states"] == 1:
@@ -62,12 +63,15 @@ def move_disc(y, dydt, out, tables, device):
 
 
 @njit
-def disc_loop(out, tables, device, own):
-    """Its rate with that of the places at its ends in the loop."""
-    k, speed = device["valve"], own / tables[I_FLOATS][device["data"] + SPAN]
-    rate = own + loop_rate(out, tables, k, tables[I_VALVES][k]["from_node"], speed)
+def disc_loop(y, out, tables, device, own):
+    """Its rate with that of the places at its ends in the loop; where a column sets its flow, d dP / dx = -2 dP / x."""
+    k, speed, nodes = device["valve"], own / tables[I_FLOATS][device["data"] + SPAN], tables[I_NODES]
+    before, behind = tables[I_VALVES][k]["from_node"], tables[I_VALVES][k]["to_node"]
+    rate = own + loop_rate(out, tables, k, before, speed)
     if device["kind"] != RELIEF_DISC:
-        rate += loop_rate(out, tables, k, tables[I_VALVES][k]["to_node"], speed)
+        rate += loop_rate(out, tables, k, behind, speed)
+    if nodes[before]["gates"] >= 0 or (nodes[behind]["gates"] >= 0 and device["kind"] != RELIEF_DISC):
+        rate += 2.0 * speed * abs(head_drop(tables, out, k)[1]) / max(disc_lift(y, tables, device), 1e-300)
     return rate if device["states"] == 1 else sqrt(own * rate)
 
 
@@ -78,14 +82,14 @@ def disc_events(y, out, tables, device, g):
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
     stop, seat = -drive - AT_REST, drive - AT_REST
     if device["states"] == 1:
-        onward = drive - SETTLED, drive + SETTLED
+        onward, speed = (drive - SETTLED, drive + SETTLED), drive
     else:
         speed = y[o + 1] / tables[I_FLOATS][device["data"] + SWING] + EARLY * drive
         onward = speed, speed
     if armed[at] == 0.0:
         stop = max(1.0 - x, -onward[1])
     if armed[at + 2] == 0.0:
-        seat = max(x, onward[0])
+        seat = max(x + SLAM * min(speed, 0.0), onward[0])
     either(tables, g, at, stop)
     either(tables, g, at + 2, seat)
 

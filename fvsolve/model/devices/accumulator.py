@@ -7,6 +7,7 @@ from fvsolve.kernels.devices import accumulator as law
 from fvsolve.kernels.devices.codes import ACCUMULATOR
 from fvsolve.model.devices.device import Device
 
+ROUNDED = 1e-5  # share of the mass that it gave which errors in its neck are measured against, so as to exceed rounding
 NECK = 0.01  # share of its volume that is fluid in the neck of a bladder accumulator
 
 
@@ -17,12 +18,19 @@ class Accumulator(Device, kind="accumulator"):
     vessel = True
     quantities = ("gas_volume", "gas_pressure")
     events = ("is empty", "holds fluid again")
+    remedy = "give it a connection, whose loss brakes what comes and goes"
 
     def place(self, scene, name, node, row) -> None:
         row["y"] = scene.states([f"{name}.mass"], 0.1 * scene.fluid.density * node.volume)
 
     def numbers(self, scene, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
+
+    def settle(self, model, row, y, scale) -> None:
+        floats, at = model.tables[rec.I_FLOATS][row["data"] :], model.tables[rec.I_NODES][row["node"]]["y"]
+        scale[at] = model.scale[at]
+        if floats[law.NECK] > 0.0 and model.tables[rec.I_ARMED][row["event"]] > 0.0:  # its neck feels far less
+            scale[at] = -(1e5 / floats[law.NECK] + ROUNDED * abs(floats[law.EMPTY]))
 
     def begin(self, start, part, row) -> list[str]:
         scene, fluid = start.scene, start.scene.fluid

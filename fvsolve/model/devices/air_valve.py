@@ -20,6 +20,7 @@ class AirValve(Device, kind="air-valve"):
     states = ("air",)
     quantities = ("air_volume", "air_mass", "air_pressure")
     events = ("opens", "shuts")
+    remedy = "give it another volume"
 
     def place(self, scene, name, node, row) -> None:
         row["density"] = scene.law.tank_density
@@ -50,7 +51,10 @@ class AirValve(Device, kind="air-valve"):
         node["stiffness"] = start.case.ambient_pressure / (part.volume * node["density"])
         short = start.case.ambient_pressure - float(place["pressure"])
         name = list(start.case.places)[row["node"]].removesuffix(".inside")
-        return [f"air valve {name}: {short:.4g} Pa below ambient, so it opens"] if short > law.RELUCTANCE else []
+        if short <= law.RELUCTANCE:
+            return []
+        start.scene.warnings.append(f"{name}: the air valve is open at the start, {short:.4g} Pa below ambient")
+        return [f"air valve {name}: {short:.4g} Pa below ambient, so it opens"]
 
     def squares(self, model, part, row, y, out):
         """R T / (2 m) (dm + m / (V rho) dy)^2 : what changes its pressure, in air or in fluid."""

@@ -14,7 +14,7 @@ class Device:
 
     code : of their law in kernels.devices; states : names of what each holds
     quantities : probes, in the order in which `device_value` numbers them
-    events : what it means that each event function falls to zero
+    events : what it means that each event function falls to zero; remedy : what to try where they go to and fro
     """
 
     kinds: ClassVar[dict[str, Device]] = {}
@@ -22,6 +22,7 @@ class Device:
     states: ClassVar[tuple[str, ...]] = ()
     quantities: ClassVar[tuple[str, ...]] = ()
     events: ClassVar[tuple[str, ...]] = ()
+    remedy: ClassVar[str] = "give it a time_constant"
     vessel: ClassVar[bool] = False  # a place whose pressure it computes
 
     def __init_subclass__(cls, kind: str) -> None:
@@ -71,8 +72,8 @@ class Device:
         """Whether its restriction dissipates drop times flow; else that is energy supplied."""
         return True
 
-    def settle(self, armed: np.ndarray, row, y: np.ndarray) -> None:
-        """Put into y what an event of its own, which has just happened, does at once."""
+    def settle(self, model, row, y: np.ndarray, scale: np.ndarray) -> None:
+        """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
         """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.

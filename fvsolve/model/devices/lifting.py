@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.devices import disc as law
 from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope
 from fvsolve.model.devices.device import Device
@@ -14,6 +13,7 @@ from fvsolve.model.devices.regulator import opening_of
 from fvsolve.steady import Edge
 
 LIFTING, OPEN = "lifting", "open"  # in `start.shut`, shut
+SEATED = 1e-12  # lift below its seat of a disc that has slammed, so that rounding does not open it
 SMALL_LIFT = 1e-9  # of a lift, what is rounding
 STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat")
 
@@ -23,6 +23,7 @@ class Lifting(Device, kind=""):
 
     quantities = ("opening",)
     events = STOPS
+    remedy = "give it a greater overpressure"
 
     def numbers(self, scene, name, part) -> list[float]:
         """At the start: lift, where the pressures draw it, what it feels; then its span, and how its disc moves."""
@@ -33,8 +34,11 @@ class Lifting(Device, kind=""):
     def scales(self, scene, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
-    def settle(self, armed, row, y: np.ndarray) -> None:
-        if row["states"] == 2 and (armed[row["event"]] > 0.0 or armed[row["event"] + 2] > 0.0):
+    def settle(self, model, row, y, scale) -> None:
+        stop, seat = (model.tables[rec.I_ARMED][row["event"] + k] > 0.0 for k in (0, 2))
+        if self.states and seat and law.disc_lift(y, model.tables, row) > 0.0:  # it has slammed
+            y[row["y"]] = -model.tables[rec.I_FLOATS][row["data"] + law.LIFT] - SEATED
+        if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 
     def part(self, start, k: int):

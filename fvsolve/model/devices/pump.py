@@ -27,6 +27,7 @@ class Pump(Device, kind="pump"):
     code = PUMP
     quantities = ("head", "speed", "torque", "power")
     events = ("check valve shuts", "check valve opens")
+    remedy = "give it a check-valve with a time_constant behind it, in place of its own"
 
     def states_of(self, scene, name, part) -> tuple[str, ...]:
         return ("speed",) if part.trip is not None or torques_on(scene.case, name) else ()

@@ -1,0 +1,75 @@
+"""Stages of a fully implicit step solved in turn, for rates whose slope differs by orders from stage to stage.
+
+With A = C U, C lower triangular and the diagonal of U one, K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a
+diagonally implicit step, which `newton.damp` solves. On a stiff part it ends after q such sweeps, I - U being
+nilpotent; a soft part gains a factor of 4 or more by each (van der Houwen and de Swart 1997).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.jit import inner
+from fvsolve.steppers.coefficients import nodes_of, row_of
+from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, damp, goal
+from fvsolve.steppers.step import copy
+
+MOST = 40
+
+
+def lower(a: np.ndarray) -> np.ndarray:
+    """C of A = C U (Crout): float64[q, q]; no zero may stand on its diagonal."""
+    rest, c = a.copy(), np.zeros_like(a)
+    for j in range(len(a)):
+        c[j:, j] = rest[j:, j]
+        if rest[j, j] != 0.0:
+            rest -= np.outer(rest[:, j], rest[j]) / rest[j, j]
+    return c
+
+
+@inner
+def sweep(
+    rhs, factor, solve, handle, coefficients, low, shape, t, h, y, y_stage, k, supply, where, out, scale, orders,
+    memory, nnz, room, work, vectors, store,
+):  # fmt: skip
+    """Slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
+
+    low : float64[q q], C flat; room : first of q rows of `vectors` for the slopes of the sweep before.
+    """
+    s, n = k.shape
+    q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
+    enough, floor = goal(orders)
+    for i in range(1, s):
+        if low[(i - 1) * s] == 0.0:
+            return FAILED
+        copy(k[0], k[i])
+    for turn in range(MOST):
+        total = 0.0
+        for i in range(1, s):
+            copy(k[i], vectors[room + i - 1])
+        for i in range(1, s):
+            row, own, first = row_of(coefficients, s, i), h * low[(i - 1) * s], (i - 1) * q
+            for e in range(n):
+                base[e] = y[e] + h * row[0] * k[0, e]
+            for j in range(1, s):
+                c_ij, last = low[first + j - 1], vectors[room + j - 1]
+                lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
+                for e in range(n):
+                    base[e] += lead * k[j, e] + lag * last[e]
+            if turn == 0:
+                for e in range(n):
+                    k[i, e] = (y[e] - base[e]) / own
+            if damp(
+                rhs, factor, solve, handle, shape, t + c[i] * h, own, i, k, y_stage, supply, where, out, scale, orders,
+                memory, nnz, work, vectors, store,
+            ) == FAILED:  # fmt: skip
+                return FAILED
+            last = vectors[room + i - 1]
+            for e in range(n):
+                change = h * (k[i, e] - last[e]) * weights[e]
+                total += change * change
+        if sqrt(total / max(q * n, 1)) <= (enough if turn < MOST - 1 else floor):
+            return CONVERGED
+    return FAILED
