@@ -267,17 +267,17 @@ BAD_FILES = {
     "(4 such faces): cell 0 at (0.5, 0.5) m and cell 1 at (0.5, 0.5) m and cell 2 at": dict(
         points=SQUARE, cells=[TWO[0]] * 3
     ),
-    "boundary: 1 faces have the corner of another cell between their ends: cell 3 at (0.5, 0.5) m": HANGING,
-    "boundary: 1 pairs of faces lie in one place and do not hang together: cell 0 at (0.5, 0.5) m and cell 1": dict(
+    "boundary: at 1 places faces have the corner of another cell between their ends: cell 3 at (0.5, 0.5) m": HANGING,
+    "boundary: at 1 places faces lie in one place and do not hang together: cell 0 at (0.5, 0.5) m and cell 1": dict(
         points=TWICE, cells=[TWO[0], [6, 2, 5, 7]]
     ),
     "cells: they are in 2 pieces that share no face: 2 with cell 1 at (0.5, 0.5) m, 1 with cell 0 at": dict(
         points=[*SQUARE, (5, 0), (6, 0), (6, 1)], cells=[[6, 7, 8], *TWO]
     ),
-    "groups.in: none of its 1 lines is a face of the boundary: the one from (1, 0) m to (1, 1) m lies between": dict(
+    "groups.in: 1 of 1 lines no face of the boundary: the one from (1, 0) m to (1, 1) m lies between": dict(
         **GRID, groups={"in": [1, 4]}
     ),
-    "groups.in: 1 of its 2 lines are no faces of the boundary: the one from (0, 0) m to (1, 1) m is no side": dict(
+    "groups.in: 1 of 2 lines no face of the boundary: the one from (0, 0) m to (1, 1) m is no side": dict(
         **GRID, groups={"in": [[0, 3], [0, 4]]}
     ),
     "one ends in a point that no cell has": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
@@ -310,7 +310,7 @@ def test_a_boundary_that_crosses_itself(tmp_path):
     """A strip of quads that turns round and runs through its own beginning."""
     ring = [(r * math.cos(w), r * math.sin(w)) for w in np.arange(9) * 0.9 for r in (1.0, 2.0)]
     cells = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(8)]
-    with pytest.raises(MeshError, match=r"pairs of faces cross each other: cell \d at .* and cell \d at"):
+    with pytest.raises(MeshError, match=r"places faces cross each other: cell \d at .* and cell \d at"):
         read(write(tmp_path / "ring.msh", ring, cells))
     assert read(write(tmp_path / "ring.msh", ring, cells[:6])).area.sum() == approx(6 * 1.5 * math.sin(0.9))
 
@@ -320,11 +320,11 @@ def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
     cells = [[0, 1, 4, 3], [9, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
     mesh = read(write(tmp_path / "wall.msh", points, cells, {"baffle": [1, 4]}))
     assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
-    with pytest.raises(MeshError, match="1 pairs of faces lie in one place .* a group that names it as a thin wall"):
+    with pytest.raises(MeshError, match="at 1 places faces lie in one place .* a group that names it as a thin wall"):
         read(write(tmp_path / "none.msh", points, cells))
     monkeypatch.setattr(contact, "BLOCK", 1)  # far into a long boundary
     assert read(tmp_path / "wall.msh").inner == 3
-    with pytest.raises(MeshError, match="1 or more pairs of faces lie in one place"):
+    with pytest.raises(MeshError, match="at 1 or more places faces lie in one place"):
         read(tmp_path / "none.msh")
 
 

@@ -110,7 +110,7 @@ def contact_faults(draft: Draft, edges: Edges, named: np.ndarray) -> list[Fault]
                 one=draft.show(cell[i]), other=draft.show(cell[j]), face=draft.face((start[i], stop[i]))
             )
             number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
-            many = f"{number}{'' if whole else ' or more'} {'' if kind == 'middle' else 'pairs of '}faces"
+            many = f"at {number}{'' if whole else ' or more'} places faces"
             faults.append(Fault("boundary", f"{many} {said}"))
     return faults
 
@@ -150,8 +150,7 @@ def grouped(
         spot = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
         missed = keys[spot] != wanted
         if missed.any():
-            many = "none of its" if missed.all() else f"{missed.sum()} of its"
-            text = f"{many} {members.size} lines {'is a face' if missed.all() else 'are no faces'} of the boundary"
+            text = f"{missed.sum()} of {members.size} lines no face of the boundary"
             how = _beside(draft, edges, lines[members][missed][0])
             faults.append(Fault(place, f"{text}: {how}; wanted a curve of the boundary"))
         spot = spot[~missed]
