@@ -1,4 +1,4 @@
-"""Plane meshes: Green's and Euler's theorems, both ways to mesh a rectangle, order that does not matter, bad files."""
+"""Plane meshes: Green's and Euler's theorems, both ways to mesh a rectangle, order that does not matter."""
 
 import dataclasses
 import math
@@ -7,55 +7,13 @@ import meshio
 import numpy as np
 import pytest
 from pytest import approx
-from scipy.spatial import ConvexHull, Delaunay
+from scipy.spatial import ConvexHull
+from truth.meshes import MSH4, SQUARE, TWO, corner_lists, delaunay, sets, shaken, write
 
-from fvsolve.errors import CaseError, MeshError
-from fvsolve.mesh import contact, quality, read, rectangle
+from fvsolve.errors import MeshError
+from fvsolve.mesh import quality, read, rectangle
 
 EPS = np.finfo(float).eps
-SQUARE = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]  # two unit squares side by side
-TWO = [[0, 1, 4, 3], [1, 2, 5, 4]]
-
-
-def write(path, points, cells, groups=None, **options):
-    """A file of cells (lists of three or four points) and named lines, group 0 for lines without a name."""
-    groups = groups or {}
-    points = np.asarray(points, float)
-    points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-    lines = [(np.reshape(ends, (-1, 2)), k + 1 if name else 0) for k, (name, ends) in enumerate(groups.items())]
-    blocks = [("line", ends) for ends, _ in lines]
-    tags = [np.full(len(ends), tag) for ends, tag in lines]
-    for kind, count in (("triangle", 3), ("quad", 4)):
-        chosen = [cell for cell in cells if len(cell) == count]
-        if chosen:
-            blocks.append((kind, np.array(chosen)))
-            tags.append(np.full(len(chosen), 99))
-    names = {name: np.array([k + 1, 1]) for k, name in enumerate(groups) if name}
-    data = {"gmsh:physical": tags, "gmsh:geometrical": tags} if path.suffix == ".msh" else {}
-    if path.suffix == ".msh":
-        options = {"file_format": "gmsh22", "binary": False} | options
-    meshio.Mesh(points, blocks, cell_data=data, field_data=names).write(path, **options)
-    return path
-
-
-def corner_lists(mesh):
-    return [[p for p in cell if p >= 0] for cell in mesh.cells.tolist()]
-
-
-def delaunay(seed=3, count=60):
-    """Random points of the unit square with its corners, and their triangles."""
-    points = np.vstack([[(0, 0), (1, 0), (0, 1), (1, 1)], np.random.default_rng(seed).random((count, 2))])
-    return points, Delaunay(points).simplices
-
-
-def shaken(seed=5):
-    """A 6 x 5 grid whose inner points are moved: quads, none a parallelogram, every third cut into triangles."""
-    mesh = rectangle((3.0, 2.0), (6, 5), origin=(-1.0, 0.5))
-    points = mesh.points.copy()
-    inside = (points > points.min(0) + 1e-9).all(1) & (points < points.max(0) - 1e-9).all(1)
-    points[inside] += np.random.default_rng(seed).uniform(-0.1, 0.1, (inside.sum(), 2))
-    cells = [[c] if k % 3 else [c[:3], [c[0], *c[2:]]] for k, c in enumerate(mesh.cells.tolist())]
-    return points, sum(cells, [])
 
 
 @pytest.fixture
@@ -149,15 +107,6 @@ def test_the_same_rectangle_from_a_file(tmp_path):
             assert np.array_equal(getattr(back, field.name), getattr(made, field.name)), field.name
 
 
-def sets(mesh):
-    """Cells and faces by their places alone."""
-    cells = sorted(zip(*mesh.centre.round(12).T, mesh.area.round(12), strict=True))
-    beyond = np.where(mesh.right >= 0, 0, mesh.right)
-    turn = np.where(mesh.right < 0, 1.0, np.sign(mesh.normal @ (1.0, math.pi)))[:, None]
-    faces = np.column_stack([mesh.middle, mesh.normal * turn, mesh.length, beyond]).round(12)
-    return cells, sorted(map(tuple, faces + 0.0))
-
-
 def test_order_of_points_cells_and_corners_does_not_matter(tmp_path):
     rng = np.random.default_rng(11)
     points, cells = shaken()
@@ -204,139 +153,6 @@ def test_decimals_near_a_line_mean_it():
     assert third.middle[third.patch("a")][:, 0] == approx([0.5, 5 / 6])
 
 
-UNIT = dict(size=(1.0, 1.0), cells=(4, 4))
-BAD_RECTANGLES = {
-    "size: [1, 0]; wanted two positive lengths": dict(size=(1, 0)),
-    "cells: [4, 2.5]; wanted two whole numbers": dict(cells=(4, 2.5)),
-    "origin: [nan, 0]; wanted the two coordinates": dict(origin=(math.nan, 0)),
-    "grading: [0, 1]; wanted two positive ratios": dict(grading=(0, 1)),
-    "grading: [2, 1] with cells [1, 4]; wanted 1 where": dict(cells=(1, 4), grading=(2, 1)),
-    "grading: [1e+40, 1]: the least cells vanish": dict(origin=(1.0, 0.0), grading=(1e40, 1)),
-    "holes[0]: [0, 0, 0, 1]; wanted [x0, y0, x1, y1]": dict(holes=[(0, 0, 0, 1)]),
-    "holes[0]: x1 = 0.3 m is on no grid line; nearest x: 0.25 and 0.5 m": dict(holes=[(0, 0, 0.3, 1)]),
-    "holes[0]: y1 = 2 m is on no grid line; nearest y: 1 m": dict(holes=[(0, 0, 0.5, 2)]),
-    "holes: they leave 2 pieces that share no face": dict(holes=[(0.25, 0, 0.5, 1)]),
-    "holes: they leave no cell": dict(holes=[(0, 0, 1, 1)]),
-    'patches.a: "wets" is no side; did you mean "west"?': dict(patches={"a": "wets"}),
-    "patches.a: 0.2 to 0.5 m does not hold whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
-        patches={"a": ("west", 0.2, 0.5)}
-    ),
-    "patches.a: 0.3 to 0.31 m does not hold whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
-        patches={"a": ("west", 0.3, 0.31)}
-    ),
-    "patches.a: [0.5, 0.25]; wanted from below to": dict(patches={"a": ("west", 0.5, 0.25)}),
-    'patches.b: overlaps "a" on the west side, about 0.625 to 0.875 m': dict(
-        patches={"a": ("west", 0.5, 1.0), "b": "west"}
-    ),
-    "patches.a: 0 to 1 m on the west side runs along a hole; free is 0 to 0.5 m": dict(
-        holes=[(0, 0.5, 0.25, 1)], patches={"a": ("west", 0.0, 1.0)}
-    ),
-    "patches.a: the holes leave nothing of the west side": dict(holes=[(0, 0, 0.5, 1)], patches={"a": "west"}),
-}
-
-
-@pytest.mark.parametrize("message", BAD_RECTANGLES)
-def test_bad_rectangles(message):
-    with pytest.raises(MeshError) as caught:
-        rectangle(**(UNIT | BAD_RECTANGLES[message]))
-    assert message in str(caught.value) and len(caught.value.faults) == 1
-
-
-def test_all_faults_at_once():
-    with pytest.raises(CaseError) as caught:
-        rectangle(**UNIT, patches={"a": "top", "b": ("west", 0.1, 1.0)}, holes=[(0.5, 0, 0.75, 1)])
-    assert [fault.place for fault in caught.value.faults] == ["holes", "patches.a", "patches.b"]
-
-
-GRID = dict(points=SQUARE, cells=TWO)
-HANGING = dict(points=[*SQUARE, (1, 0.5)], cells=[[0, 1, 4, 3], [1, 2, 6], [2, 5, 6], [5, 4, 6]])
-TWICE = [*SQUARE, (1, 0), (1, 1)]  # the line between the squares once more
-BAD_FILES = {
-    "cells: 1 of 2 cells: cell 1 at (1.55, 0.3) m have corners in one place": dict(
-        points=[*SQUARE[:2], (2, 0), (0, 1), (1, 1), (1.6, 0.6)], cells=[TWO[0], [1, 2, 5, 5]]
-    ),
-    "cells: 1 of 2 cells: cell 1 at (1.5, 0.5) m cross themselves": dict(points=SQUARE, cells=[TWO[0], [1, 2, 4, 5]]),
-    "cells: 1 of 2 cells: cell 1 at (1.3, 0.375) m are not convex": dict(
-        points=[*SQUARE[:5], (1.2, 0.5)], cells=[TWO[0], [1, 2, 5, 4]]
-    ),
-    "cells: 1 of 3 cells: cell 0 at (1, 0) m have no area": dict(points=SQUARE, cells=[[0, 1, 2], *TWO]),
-    "cells: they overlap at the face from (1, 1) m to (1, 0) m: cell 0 at (1.16667, 0.5) m and cell 1": dict(
-        points=[*SQUARE, (1.5, 0.5)], cells=[[1, 6, 4], *TWO]
-    ),
-    "both lie on one side of it": dict(points=[*SQUARE[:5], (0.5, 0.5)], cells=[[0, 1, 4, 3], [0, 1, 5]]),
-    "(4 such faces): cell 0 at (0.5, 0.5) m and cell 1 at (0.5, 0.5) m and cell 2 at": dict(
-        points=SQUARE, cells=[TWO[0]] * 3
-    ),
-    "boundary: at 1 places faces have the corner of another cell between their ends: cell 3 at (0.5, 0.5) m": HANGING,
-    "boundary: at 1 places faces lie in one place and do not hang together: cell 0 at (0.5, 0.5) m and cell 1": dict(
-        points=TWICE, cells=[TWO[0], [6, 2, 5, 7]]
-    ),
-    "cells: they are in 2 pieces that share no face: 2 with cell 1 at (0.5, 0.5) m, 1 with cell 0 at": dict(
-        points=[*SQUARE, (5, 0), (6, 0), (6, 1)], cells=[[6, 7, 8], *TWO]
-    ),
-    "groups.in: 1 of 1 lines no face of the boundary: the one from (1, 0) m to (1, 1) m lies between": dict(
-        **GRID, groups={"in": [1, 4]}
-    ),
-    "groups.in: 1 of 2 lines no face of the boundary: the one from (0, 0) m to (1, 1) m is no side": dict(
-        **GRID, groups={"in": [[0, 3], [0, 4]]}
-    ),
-    "one ends in a point that no cell has": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
-    'groups.out: shares 1 faces with "in", the face from (0, 1) m to (0, 0) m': dict(
-        **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
-    ),
-    "points: z runs from 0 to 0.2 m, beyond the middle in cell 1; wanted a mesh in one plane, z = constant": dict(
-        points=[(x, y, 0.2 * (x > 1)) for x, y in SQUARE], cells=TWO
-    ),
-    "z = constant; y is constant: turn the mesh": dict(points=[(x, 0, y) for x, y in SQUARE], cells=TWO),
-    "cells: there are no cells of two dimensions (2 line); wanted triangle and quad": dict(
-        points=SQUARE, cells=[], groups={"in": [[0, 1], [1, 2]]}
-    ),
-    "points: 1 of 6 are nowhere (not a number, or too large), first point 5": dict(
-        points=[*SQUARE[:5], (math.nan, 1)], cells=TWO
-    ),
-}
-
-
-@pytest.mark.parametrize("message", BAD_FILES)
-def test_bad_files(tmp_path, message):
-    path = write(tmp_path / "bad.msh", **BAD_FILES[message])
-    with pytest.raises(MeshError) as caught:
-        read(path)
-    assert message in str(caught.value) and len(caught.value.faults) == 1
-    assert str(caught.value).startswith("bad.msh: 1 fault\n")
-
-
-def test_a_boundary_that_crosses_itself(tmp_path):
-    """A strip of quads that turns round and runs through its own beginning."""
-    ring = [(r * math.cos(w), r * math.sin(w)) for w in np.arange(9) * 0.9 for r in (1.0, 2.0)]
-    cells = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(8)]
-    with pytest.raises(MeshError, match=r"places faces cross each other: cell \d at .* and cell \d at"):
-        read(write(tmp_path / "ring.msh", ring, cells))
-    assert read(write(tmp_path / "ring.msh", ring, cells[:6])).area.sum() == approx(6 * 1.5 * math.sin(0.9))
-
-
-def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
-    points = [*SQUARE, (0, 2), (1, 2), (2, 2), (1, 0)]  # two above two, the lower ones parted
-    cells = [[0, 1, 4, 3], [9, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
-    mesh = read(write(tmp_path / "wall.msh", points, cells, {"baffle": [1, 4]}))
-    assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
-    with pytest.raises(MeshError, match="at 1 places faces lie in one place .* a group that names it as a thin wall"):
-        read(write(tmp_path / "none.msh", points, cells))
-    monkeypatch.setattr(contact, "BLOCK", 1)  # far into a long boundary
-    assert read(tmp_path / "wall.msh").inner == 3
-    with pytest.raises(MeshError, match="at 1 or more places faces lie in one place"):
-        read(tmp_path / "none.msh")
-
-
-def test_faults_of_several_kinds_come_together(tmp_path):
-    points = [*SQUARE, (0, 2), (1, 2)]
-    cells = [[0, 4, 1, 3], [1, 2, 5, 4], [1, 2, 5, 4], [3, 4, 7, 7]]
-    with pytest.raises(MeshError) as caught:
-        read(write(tmp_path / "bad.msh", points, cells))
-    found = [fault.message for fault in caught.value.faults]
-    assert [word in text for word, text in zip(["one place", "cross", "overlap"], found, strict=True)] == [True] * 3
-
-
 def test_notes_tell_what_the_file_leaves_unsaid(tmp_path):
     plain = read(write(tmp_path / "plain.msh", [*SQUARE, (7, 7)], [TWO[0], TWO[1][::-1]]))
     assert plain.notes == (
@@ -372,50 +188,6 @@ def test_the_unit_of_a_file(tmp_path):
         read(bad, unit="mm")
 
 
-MSH4 = """$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-1 7 "in"
-1 8 "out"
-2 1 "water"
-$EndPhysicalNames
-$Entities
-0 2 1 0
-1 0 0 0 0 1 0 1 7 0
-2 2 0 0 2 1 0 1 8 0
-1 0 0 0 2 1 0 1 1 0
-$EndEntities
-$Nodes
-1 6 1 60
-2 1 0 6
-10
-20
-30
-40
-50
-60
-0 0 0
-1 0 0
-2 0 0
-0 1 0
-1 1 0
-2 1 0
-$EndNodes
-$Elements
-3 4 1 4
-1 1 1 1
-1 10 40
-1 2 1 1
-4 30 60
-2 1 3 2
-2 10 20 50 40
-3 20 30 60 50
-$EndElements
-"""
-
-
 def test_formats_say_the_same(tmp_path):
     (tmp_path / "four.msh").write_text(MSH4)  # by Gmsh's manual, with gaps between the numbers of points
     four = read(tmp_path / "four.msh")
@@ -441,47 +213,3 @@ def test_numbered_groups_are_patches_by_number(tmp_path):
     mesh = read(tmp_path / "ref.mesh")
     assert mesh.patches == ("4", "wall") and mesh.middle[mesh.patch("4")].tolist() == [[0.0, 0.5]]
     assert "groups of lines without a name in the file: their patches are 4" in mesh.notes
-
-
-def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
-    def fault(name, **options):
-        with pytest.raises(MeshError) as caught:
-            read(tmp_path / name, **options)
-        return str(caught.value)
-
-    (tmp_path / "pool.msh").write_text(MSH4[: len(MSH4) // 2])
-    assert "pool.msh: 1 fault\n  meshio cannot read it (" in fault("pool.msh")
-    assert 'there is no such file; did you mean "pool.msh"?' in fault("pol.msh")
-    (tmp_path / "pool.dxf").write_text("0\n")
-    assert "wanted a name that ends in " in fault("pool.dxf") and ".msh" in fault("pool.dxf")
-    (tmp_path / "empty.vtk").write_text("")
-    assert "empty.vtk: 1 fault\n  meshio cannot read it (" in fault("empty.vtk")
-    cube = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
-    meshio.Mesh(cube, [("tetra", [[0, 1, 2, 3]]), ("triangle", [[0, 1, 2]])]).write(tmp_path / "solid.vtk")
-    assert "cells: they are of three dimensions (1 tetra, 1 triangle)" in fault("solid.vtk")
-    six = np.array([(0, 0, 0), (2, 0, 0), (0, 2, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
-    meshio.Mesh(six, [("triangle6", [[0, 1, 2, 3, 4, 5]])]).write(tmp_path / "six.vtk")
-    assert "cells: triangle6 cannot be used (1 triangle6)" in fault("six.vtk")
-    assert "Mesh.ElementOrder = 1" in fault("six.vtk")
-    (tmp_path / "saved-all.msh").write_text(
-        MSH4.replace("1 2 5\n", "").replace("1 0 0 0 0 1 0 1 7 0", "1 0 0 0 0 1 0 0 0")
-    )
-    assert "Mesh.SaveAll = 0" in fault("saved-all.msh")
-    assert capsys.readouterr() == ("", "")
-
-
-def test_a_group_without_lines_is_told(tmp_path):
-    (tmp_path / "four.msh").write_text(
-        MSH4.replace('1 7 "in"', '1 7 "in"\n1 9 "rim"').replace("Names\n3\n", "Names\n4\n")
-    )
-    with pytest.raises(MeshError, match="groups.rim: no line in the file is in it; .*Mesh.SaveAll"):
-        read(tmp_path / "four.msh")
-
-
-def test_a_cell_that_names_no_point(tmp_path):
-    (tmp_path / "lost.vtk").write_text(
-        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 double\n0 0 0 1 0 0 0 1 0\n"
-        "CELLS 1 4\n3 0 1 7\nCELL_TYPES 1\n5\n"
-    )
-    with pytest.raises(MeshError, match="cells: number 0 names a point that the file does not hold; it holds 3"):
-        read(tmp_path / "lost.vtk")
