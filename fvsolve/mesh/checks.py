@@ -48,7 +48,7 @@ class Draft:
 
 
 def shape_faults(draft: Draft) -> tuple[list[Fault], np.ndarray, np.ndarray]:
-    """(faults of single cells, bool[n] which cells are bad, bool[n] which sound ones run clockwise)."""
+    """(faults of single cells, bool[n] which cells are bad, bool[n] which turn right, sound ones clockwise)."""
     turn, _, side = corners(draft.points, draft.cells)
     long = side.max(axis=1, keepdims=True)
     left, right = turn > FLAT * long**2, turn < -FLAT * long**2
@@ -69,7 +69,7 @@ def shape_faults(draft: Draft) -> tuple[list[Fault], np.ndarray, np.ndarray]:
         bad[which] = True
         if which.size:
             faults.append(Fault("cells", f"{draft.list(which)} {words}"))
-    return faults, bad, right.any(axis=1) & ~bad
+    return faults, bad, right.any(axis=1)
 
 
 def overlap_faults(draft: Draft, edges: Edges, number: np.ndarray) -> list[Fault]:
@@ -94,8 +94,7 @@ def contact_faults(draft: Draft, edges: Edges, named: np.ndarray) -> list[Fault]
     Two faces in one place are the sides of a thin wall where a group names one of them.
     """
     start, stop, cell = edges.start[edges.outer], edges.stop[edges.outer], edges.cell[edges.outer]
-    found = contacts(draft.points[start], draft.points[stop])
-    found["same"] = found["same"][~named[found["same"]].any(axis=1)]
+    found, whole = contacts(draft.points[start], draft.points[stop], named)
     words = {
         "same": "lie in one place and do not hang together: {one} and {other} at {face}; wanted one set of points "
         "there (Gmsh: Coherence), or a group that names it as a thin wall",
@@ -110,8 +109,9 @@ def contact_faults(draft: Draft, edges: Edges, named: np.ndarray) -> list[Fault]
             said = words[kind].format(
                 one=draft.show(cell[i]), other=draft.show(cell[j]), face=draft.face((start[i], stop[i]))
             )
-            number = f"{len(pairs)} pairs of faces" if kind != "middle" else f"{len(np.unique(pairs[:, 0]))} faces"
-            faults.append(Fault("boundary", f"{number} {said}"))
+            number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
+            many = f"at {number}{'' if whole else ' or more'} places faces"
+            faults.append(Fault("boundary", f"{many} {said}"))
     return faults
 
 
@@ -150,8 +150,7 @@ def grouped(
         spot = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
         missed = keys[spot] != wanted
         if missed.any():
-            many = "none of its" if missed.all() else f"{missed.sum()} of its"
-            text = f"{many} {members.size} lines {'is a face' if missed.all() else 'are no faces'} of the boundary"
+            text = f"{missed.sum()} of {members.size} lines no face of the boundary"
             how = _beside(draft, edges, lines[members][missed][0])
             faults.append(Fault(place, f"{text}: {how}; wanted a curve of the boundary"))
         spot = spot[~missed]

@@ -8,36 +8,45 @@ from scipy.spatial import cKDTree
 from fvsolve.mesh.shapes import cross
 
 NEAR = 1e-6  # of a face's length: how near is a touch
+BLOCK = 1 << 14  # segments looked at before what was found is told
 
 
-def contacts(a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
-    """What pairs of the segments from float64[k, 2] a to b do: int64[m, 2] each.
+def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, np.ndarray], bool]:
+    """(what pairs of the segments from float64[k, 2] a to b do: int64[m, 2] each; whether that is all).
 
-    same : both ends coincide; middle : an end of the second lies within the first; cross : they pass through each other
+    same : both ends coincide, where neither is `thin`; middle : an end of the second lies within the first;
+    cross : they pass through each other
     """
-    i, j = _pairs(a, b)
+    middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
+    tree = cKDTree(middle)
+    for first in range(0, len(a), BLOCK):
+        found = _touching(a, b, *_pairs(tree, middle, length, np.arange(first, min(first + BLOCK, len(a)))))
+        found["same"] = found["same"][~thin[found["same"]].any(axis=1)]
+        if any(map(len, found.values())):
+            break
+    return found, first + BLOCK >= len(a)
+
+
+def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (i, j) of all that could touch, i of the block and longer: their middles are nearer than it is long."""
+    near = tree.query_ball_point(middle[block], (1.0 + NEAR) * length[block], return_sorted=False)
+    i = np.repeat(block, np.fromiter(map(len, near), np.int64, len(near)))
+    j = np.concatenate(near).astype(np.int64)
+    keep = (length[j] < length[i]) | ((length[j] == length[i]) & (i < j))
+    return i[keep], j[keep]
+
+
+def _touching(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> dict[str, np.ndarray]:
     near = NEAR * np.hypot(*(b[i] - a[i]).T)
     same = (_apart(a[i], b[j]) <= near) & (_apart(b[i], a[j]) <= near)
     same |= (_apart(a[i], a[j]) <= near) & (_apart(b[i], b[j]) <= near)
     one, other = _within(a, b, i, a[j]) | _within(a, b, i, b[j]), _within(a, b, j, a[i]) | _within(a, b, j, b[i])
-    middle = np.concatenate([np.stack([i[one], j[one]], 1), np.stack([j[other], i[other]], 1)])
-    through = _astride(a, b, i, j) & _astride(a, b, j, i) & ~one & ~other
+    through = _astride(a, b, i, j) & _astride(a, b, j, i)
     return {
         "same": np.stack([i[same], j[same]], axis=1),
-        "middle": middle,
+        "middle": np.concatenate([np.stack([i[one], j[one]], axis=1), np.stack([j[other], i[other]], axis=1)]),
         "cross": np.stack([i[through], j[through]], axis=1),
     }
-
-
-def _pairs(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (i, j) of all that could touch, the longer one first: their middles are nearer than it is long."""
-    middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
-    near = cKDTree(middle).query_ball_point(middle, (1.0 + NEAR) * length)
-    count = np.fromiter(map(len, near), np.int64, len(near))
-    i = np.repeat(np.arange(len(a)), count)
-    j = np.concatenate(near).astype(np.int64)
-    keep = (length[j] < length[i]) | ((length[j] == length[i]) & (i < j))
-    return i[keep], j[keep]
 
 
 def _apart(p: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from fvsolve.mesh.shapes import assemble
 from fvsolve.units import find
 
 PLANE = 1e-6  # of the extent: how far z may wander
+FAR = 1e100  # beyond it squares of squares overflow
 LARGE, SMALL = 1e4, 1e-3  # extents that speak for another unit [m]
 
 
@@ -69,9 +70,13 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
     """Points that are nowhere, or not in one plane z = constant."""
     used = np.unique(content.cells[content.cells >= 0])
     points = content.points[used]
-    lost = used[~np.isfinite(points).all(axis=1)]
+    lost = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
     if lost.size:
-        return [Fault("points", f"{lost.size} of {used.size} are not finite, first point {lost[0]}")]
+        return [
+            Fault(
+                "points", f"{lost.size} of {used.size} are nowhere (not a number, or too large), first point {lost[0]}"
+            )
+        ]
     extent = np.ptp(points, axis=0)
     near = PLANE * extent.max()
     if extent[2] <= near:

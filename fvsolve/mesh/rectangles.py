@@ -37,6 +37,8 @@ def rectangle(
     if faults:
         raise MeshError(faults, "rectangle")
     lines = [_graded(*one) for one in zip(origin, size, cells, grading, strict=True)]
+    if any(np.diff(one).min() <= 0.0 for one in lines):
+        raise MeshError([Fault("grading", f"{_shown(grading)}: the least cells vanish; wanted less")], "rectangle")
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
@@ -100,8 +102,7 @@ def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray
 def _line(lines: np.ndarray, value: float) -> int | None:
     """The number of the line that a value means, None where none is near."""
     k = int(np.argmin(np.abs(lines - value)))
-    near = min(NEAR * (lines[-1] - lines[0]), 0.01 * np.diff(lines).min())
-    return k if abs(lines[k] - value) <= near else None
+    return k if abs(lines[k] - value) <= NEAR * (lines[-1] - lines[0]) else None
 
 
 def _nearest(lines: np.ndarray, value: float) -> str:

@@ -1,0 +1,215 @@
+"""Plane meshes: Green's and Euler's theorems, both ways to mesh a rectangle, order that does not matter."""
+
+import dataclasses
+import math
+
+import meshio
+import numpy as np
+import pytest
+from pytest import approx
+from scipy.spatial import ConvexHull
+from truth.meshes import MSH4, SQUARE, TWO, corner_lists, delaunay, sets, shaken, write
+
+from fvsolve.errors import MeshError
+from fvsolve.mesh import quality, read, rectangle
+
+EPS = np.finfo(float).eps
+
+
+@pytest.fixture
+def meshes(tmp_path):
+    """name -> (mesh, area of the domain, holes in it)."""
+    triangles, mixed = (
+        read(write(tmp_path / f"{name}.msh", *made)) for name, made in (("t", delaunay()), ("m", shaken()))
+    )
+    return {
+        "rectangle": (rectangle((2.0, 1.0), (7, 4), origin=(1e3, -1e3)), 2.0, 0),
+        "graded": (rectangle((2.0, 1.0), (7, 4), grading=(5.0, 0.3)), 2.0, 0),
+        "corner": (rectangle((2.0, 1.0), (8, 4), holes=[(1.0, 0.5, 2.0, 1.0)]), 1.5, 0),
+        "ring": (rectangle((3.0, 3.0), (6, 6), holes=[(1.0, 1.0, 2.0, 2.0)]), 8.0, 1),
+        "triangles": (triangles, ConvexHull(triangles.points).volume, 0),
+        "mixed": (mixed, 6.0, 0),
+    }
+
+
+KINDS = ["rectangle", "graded", "corner", "ring", "triangles", "mixed"]
+
+
+def around(mesh, of_face):
+    """The sum over the faces of each cell of what flows out of it."""
+    out = np.zeros((len(mesh.cells), *of_face.shape[1:]))
+    np.add.at(out, mesh.left, of_face)
+    np.subtract.at(out, mesh.right[: mesh.inner], of_face[: mesh.inner])
+    return out
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_cells_fill_the_domain_and_close(meshes, kind):
+    mesh, area, holes = meshes[kind]
+    reach = np.abs(mesh.points).max()
+    assert mesh.area.sum() == approx(area, rel=1e-13 * max(reach, 1.0)) and mesh.area.min() > 0
+    assert np.abs(around(mesh, mesh.normal * mesh.length[:, None])).max() < 8 * EPS * reach
+    assert len(mesh.points) - len(mesh.left) + len(mesh.cells) == 1 - holes
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_greens_theorem_gives_areas_and_centroids(meshes, kind):
+    """By faces alone: areas from div (x, 0), first moments from div (x^2/2, 0) and div (0, y^2/2) by Simpson's rule."""
+    mesh, _, _ = meshes[kind]
+    flux = (mesh.middle * (1.0, 0.0) * mesh.normal).sum(1) * mesh.length
+    reach = np.abs(mesh.points).max()
+    assert around(mesh, flux) == approx(mesh.area, abs=16 * EPS * reach**2)
+    origin = mesh.points.mean(0)
+    a, b, m = (p - origin for p in (mesh.points[mesh.ends[:, 0]], mesh.points[mesh.ends[:, 1]], mesh.middle))
+    square = (a**2 + 4 * m**2 + b**2) / 6
+    moment = around(mesh, 0.5 * square * mesh.normal * mesh.length[:, None])
+    assert moment == approx(mesh.area[:, None] * (mesh.centre - origin), abs=16 * EPS * reach**2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_faces_stand_in_order_and_look_from_left_to_right(meshes, kind):
+    mesh, _, _ = meshes[kind]
+    inner = slice(0, mesh.inner)
+    assert (mesh.right[: mesh.inner] > mesh.left[: mesh.inner]).all() and (mesh.right[mesh.inner :] < 0).all()
+    across = mesh.centre[mesh.right[inner]] - mesh.centre[mesh.left[inner]]
+    assert ((across * mesh.normal[inner]).sum(1) > 0).all()
+    assert (((mesh.middle - mesh.centre[mesh.left]) * mesh.normal).sum(1) > 0).all()
+    assert np.hypot(*mesh.normal.T) == approx(1.0, rel=2 * EPS)
+    along = np.diff(mesh.points[mesh.ends], axis=1)[:, 0]
+    assert (mesh.normal[:, 0] * along[:, 1] - mesh.normal[:, 1] * along[:, 0] > 0).all()
+
+
+def test_rectangles_are_exact():
+    mesh = rectangle((1.0, 0.7), (3, 7), grading=(2.0, 1.0), origin=(0.1, 0.2))
+    x, y, index = mesh.grid.x, mesh.grid.y, mesh.grid.index
+    assert (index == np.arange(21).reshape(7, 3)).all()
+    cx, cy = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]))
+    assert (mesh.centre[index] == np.stack([cx, cy], axis=2)).all()
+    assert (mesh.area[index] == np.outer(np.diff(y), np.diff(x))).all()
+    assert set(map(tuple, np.abs(mesh.normal))) == {(1.0, 0.0), (0.0, 1.0)}
+    assert not np.signbit(mesh.normal[mesh.normal == 0]).any()
+
+
+def test_spacings_grow_geometrically():
+    mesh = rectangle((2.0, 1.0), (5, 1), grading=(16.0, 1.0))
+    step = np.diff(mesh.grid.x)
+    assert step[1:] / step[:-1] == approx(2.0) and step.sum() == approx(2.0)
+    assert quality(mesh).ratio == approx(2.0)
+
+
+def test_the_same_rectangle_from_a_file(tmp_path):
+    made = rectangle((2.0, 1.0), (6, 4), grading=(3.0, 1.0), patches={"in": ("west", 0.25, 0.75), "out": "east"})
+    groups = {name: made.ends[made.patch(name)] for name in ("in", "out")}
+    back = read(write(tmp_path / "r.msh", made.points, corner_lists(made), groups))
+    assert back.grid is None and back.patches == made.patches == ("in", "out", "wall")
+    for field in dataclasses.fields(made):
+        if field.name not in ("patches", "grid", "notes"):
+            assert np.array_equal(getattr(back, field.name), getattr(made, field.name)), field.name
+
+
+def test_order_of_points_cells_and_corners_does_not_matter(tmp_path):
+    rng = np.random.default_rng(11)
+    points, cells = shaken()
+    outer = read(write(tmp_path / "a.msh", points, cells))
+    west = outer.ends[outer.middle[:, 0] == points[:, 0].min()]
+    one = read(write(tmp_path / "b.msh", points, cells, {"west": west}))
+    place = rng.permutation(len(points))
+    moved = np.empty_like(points)
+    moved[place] = points
+    turned = [np.roll(place[cells[c]], rng.integers(4))[:: rng.choice([1, -1])] for c in rng.permutation(len(cells))]
+    other = read(write(tmp_path / "c.msh", moved, turned, {"west": place[west][::-1, ::-1]}))
+    assert sets(one) == sets(other) and one.patches == other.patches
+    assert any("ran clockwise: turned" in note for note in other.notes) and len(west) == 5
+
+
+def test_quality_of_known_shapes(tmp_path):
+    points = [(0, 0), (1, 0), (0.5, math.sqrt(0.75)), (2, 0)]
+    found = quality(read(write(tmp_path / "t.msh", points, [[0, 1, 2], [1, 3, 2]])))
+    assert found.angle == approx(math.pi / 6) and found.sharpest == 1 and found.ratio == approx(1.0)
+    assert found.smallest == approx(math.sqrt(3) / 4) and found.largest == approx(math.sqrt(3) / 4)
+    alone = quality(rectangle((2.0, 3.0), (1, 1)))
+    assert (alone.ratio, alone.steepest, alone.largest) == (1.0, -1, 6.0) and alone.angle == approx(math.pi / 2)
+
+
+def test_patches_and_holes_of_a_rectangle():
+    mesh = rectangle(
+        (3.0, 2.0),
+        (6, 4),
+        origin=(1.0, 0.0),
+        holes=[(2.5, 1.0, 4.0, 2.0)],
+        patches={"in": ("west", 0.5, 1.5), "top": "north", "wall": ("south", 1.0, 2.0), "out": "east"},
+    )
+    assert mesh.patches == ("in", "top", "out", "wall") and mesh.grid.index[3, 3] == -1
+    assert mesh.middle[mesh.patch("in")].tolist() == [[1.0, 0.75], [1.0, 1.25]]
+    assert mesh.middle[mesh.patch("top")][:, 0].tolist() == [1.25, 1.75, 2.25]  # what the hole leaves of the side
+    assert mesh.middle[mesh.patch("out")].tolist() == [[4.0, 0.25], [4.0, 0.75]]
+    assert mesh.length[mesh.inner :].sum() == 10.0  # a corner cut out leaves the girth
+    with pytest.raises(ValueError):
+        mesh.patch("outlet")
+
+
+def test_decimals_near_a_line_mean_it():
+    third = rectangle((1.0, 1.0), (3, 1), patches={"a": ("south", 0.333333, 1)})
+    assert third.middle[third.patch("a")][:, 0] == approx([0.5, 5 / 6])
+
+
+def test_notes_tell_what_the_file_leaves_unsaid(tmp_path):
+    plain = read(write(tmp_path / "plain.msh", [*SQUARE, (7, 7)], [TWO[0], TWO[1][::-1]]))
+    assert plain.notes == (
+        "1 of 7 points in the file belong to no cell: left out",
+        "1 of 2 cells: cell 1 at (1.5, 0.5) m ran clockwise: turned",
+        'the file names no group of lines: all 6 faces of the boundary are "wall"',
+    )
+    some = read(write(tmp_path / "some.msh", SQUARE, TWO, {"in": [0, 3], "": [2, 5]}))
+    assert some.patches == ("in", "wall")
+    assert some.notes == ('5 of 6 faces of the boundary are in no group: they are "wall"',)
+    every = {"wall": [[0, 1], [1, 2], [5, 4], [4, 3]], "ends": [[0, 3], [2, 5]]}
+    full = read(write(tmp_path / "full.msh", SQUARE, TWO, every))
+    assert full.notes == () and full.patches == ("ends", "wall")
+    assert full.length[full.patch("wall")].size == 4
+
+
+@pytest.mark.parametrize("factor, note", [(1e4, 'unit = "mm"'), (1e-4, 'unit = "km"'), (1.0, None)])
+def test_a_strange_size_hints_at_another_unit(tmp_path, factor, note):
+    path = write(tmp_path / "far.msh", factor * np.array(SQUARE), TWO)
+    hints = [text for text in read(path).notes if "another unit" in text]
+    assert [note in text for text in hints] == ([True] if note else [])
+    assert not any("another unit" in text for text in read(path, unit="ft").notes)
+
+
+def test_the_unit_of_a_file(tmp_path):
+    path = write(tmp_path / "mm.msh", 1e3 * np.array(SQUARE), TWO)
+    mesh = read(path, unit="mm")
+    assert mesh.points.tolist() == [list(p) for p in SQUARE] and mesh.area.tolist() == [1.0, 1.0]
+    with pytest.raises(MeshError, match='mm.msh: 1 fault\n  unit: "bar" is a pressure; wanted a length'):
+        read(path, unit="bar")
+    bad = write(tmp_path / "bad.msh", 1e3 * np.array(SQUARE), [TWO[0], [1, 2, 4, 5]])
+    with pytest.raises(MeshError, match=r"cell 1 at \(1500, 500\) mm"):
+        read(bad, unit="mm")
+
+
+def test_formats_say_the_same(tmp_path):
+    (tmp_path / "four.msh").write_text(MSH4)  # by Gmsh's manual, with gaps between the numbers of points
+    four = read(tmp_path / "four.msh")
+    groups = {"in": [0, 3], "out": [2, 5]}
+    two = read(write(tmp_path / "two.msh", SQUARE, TWO, groups))
+    binary = read(write(tmp_path / "binary.msh", SQUARE, TWO, groups, binary=True))
+    assert four.patches == two.patches == binary.patches == ("in", "out", "wall")
+    assert four.middle[four.patch("in")].tolist() == [[0.0, 0.5]]
+    assert four.middle[four.patch("out")].tolist() == [[2.0, 0.5]]
+    assert sets(four) == sets(two) == sets(binary)
+    for suffix in ("vtk", "vtu", "mesh", "inp"):
+        other = read(write(tmp_path / f"other.{suffix}", SQUARE, TWO))
+        assert other.patches == ("wall",) and sets(other)[0] == sets(two)[0]
+
+
+def test_numbered_groups_are_patches_by_number(tmp_path):
+    lines = meshio.Mesh(
+        np.array(SQUARE, float),
+        [("line", [[0, 3], [2, 5]]), ("quad", TWO)],
+        cell_data={"medit:ref": [np.array([4, 0]), np.array([1, 1])]},
+    )
+    lines.write(tmp_path / "ref.mesh")
+    mesh = read(tmp_path / "ref.mesh")
+    assert mesh.patches == ("4", "wall") and mesh.middle[mesh.patch("4")].tolist() == [[0.0, 0.5]]
+    assert "groups of lines without a name in the file: their patches are 4" in mesh.notes
