@@ -32,7 +32,7 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
-from fvsolve.kernels.restrictions import conductance, open_scheduled, restriction_slope
+from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 
 
 @njit(forceinline=True)
@@ -146,7 +146,7 @@ def greatest_rate(out, tables):
             continue  # the gate of a vessel, which says itself how quick it is
         if stiff > 0.0:
             g = conductance(tables, out, k)
-            drop = valve["drop"] + (out[layout["pressure"] + i] - out[layout["pressure"] + j])
+            drop = head_drop(tables, out, k)[1]
             slope = restriction_slope(tables, out, k, drop)
             soft = 0.0
             if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:

@@ -134,6 +134,12 @@ def goal(orders):
 
 
 @inner
+def tight(orders):
+    """The same where Newton is damped: as accurate as where the step is given, for f magnifies what is left."""
+    return FIXED / orders[SIZE] if orders[CONTROL] == TOLERANCE else 1.0, goal(orders)[1]
+
+
+@inner
 def find_worst(d, f, weights, memory):
     """Note the component whose rate is no number, else the one that moves most against its tolerance."""
     worst = -1.0
@@ -192,14 +198,11 @@ def damp(
     rhs, factor, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, scale, orders, memory, nnz, work,
     vectors, store,
 ):  # fmt: skip
-    """k[i] = f(t, base + h gamma k[i]) by damped Newton, a Jacobian for every iterate; returns CONVERGED or FAILED.
-
-    To the accuracy of a given step whatever the tolerance: the last iterations are quick.
-    """
+    """k[i] = f(t, base + h gamma k[i]) by damped Newton, a Jacobian for every iterate; returns CONVERGED or FAILED."""
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
-    enough, floor = FIXED / orders[SIZE] if orders[CONTROL] == TOLERANCE else 1.0, goal(orders)[1]
+    enough, floor = tight(orders)
     evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
     for turn in range(MOST_DAMPED):
         for m in range(supply.shape[1]):

@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve.jit import inner
 from fvsolve.steppers.coefficients import nodes_of, row_of
-from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, damp, goal
+from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, damp, tight
 from fvsolve.steppers.step import copy
 
 MOST = 40
@@ -40,7 +40,8 @@ def sweep(
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
-    enough, floor = goal(orders)
+    enough, floor = tight(orders)
+    before = 0.0
     for i in range(1, s):
         if low[(i - 1) * s] == 0.0:
             return FAILED
@@ -70,6 +71,8 @@ def sweep(
             for e in range(n):
                 change = h * (k[i, e] - last[e]) * weights[e]
                 total += change * change
-        if sqrt(total / max(q * n, 1)) <= (enough if turn < MOST - 1 else floor):
+        size = sqrt(total / max(q * n, 1))
+        if size <= enough or size <= floor and (turn >= q and size >= 0.5 * before or turn == MOST - 1):
             return CONVERGED
+        before = size
     return FAILED

@@ -1,0 +1,91 @@
+"""Implicit steps where a drop dies: as many as asked for, on the parabola of Torricelli, and at rest after it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit
+from truth.scenes import chamber, lake, scene, tank, valve
+
+import fvsolve
+from fvsolve.steppers import integrate
+
+FULL = ["radau-iia-5", "radau-iia-9", "radau-iia-3", "lobatto-iiic-4"]
+DAMPING = ["implicit-euler", "alexander-3", "tr-bdf2", "esdirk-4", *FULL]  # L-stable: at rest they rest
+
+
+def dead_end(**numerics) -> dict:
+    """A lake fills a chamber within a fifth of a millisecond."""
+    nodes = {"lake": lake(50.0), "pot": chamber(0.01, 2e5)}
+    return scene(nodes, {"tap": valve("lake", "pot", 1e-3)}, 1.0, numerics, ["pot.pressure"], 0.05)
+
+
+def two_tanks(**numerics) -> dict:
+    """They level out after 15 s."""
+    nodes = {"a": tank(1.0, 2.0), "b": tank(0.5, 1.0)}
+    links = {"pipe": valve("a", "b", 0.01)}
+    return scene(nodes, links, 200.0, numerics, ["a.level"], 1.0, exact={"name": "levelling"})
+
+
+@pytest.mark.parametrize("name", DAMPING)
+@pytest.mark.parametrize("build, step", [(dead_end, 0.01), (two_tanks, 10.0)])
+def test_a_given_step_is_taken_whole_and_ends_in_rest(name, build, step):
+    result = fvsolve.run(build(method=name, step=step))
+    assert result.ok, result.reason
+    assert result.summary["steps"] == round(result.t[-1] / step) and result.summary["newton_failures"] == 0
+    probe = str(result.probes[0])
+    assert result[probe][-1] == pytest.approx(101325.0 + 9806.65 * 50.0 if build is dead_end else 5.0 / 3.0, rel=1e-6)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-13
+
+
+@pytest.mark.parametrize("name", ["trapezoid", "implicit-midpoint", "gauss-4"])
+def test_what_is_not_l_stable_swings_but_takes_the_steps_it_is_given(name):
+    result = fvsolve.run(dead_end(method=name, step=0.01))
+    assert result.ok, result.reason
+    assert result.summary["steps"] == 100
+
+
+@pytest.mark.parametrize("name", ["tr-bdf2", "esdirk-4", "radau-iia-5", "radau-iia-9"])
+def test_error_control_follows_the_parabola_in_few_steps(name):
+    result = fvsolve.run(two_tanks(method=name, rtol=1e-6))
+    assert result.ok, result.reason
+    slope = 0.01 * np.sqrt(2.0 * 9.80665) * (1.0 + 1.0 / 0.5)
+    drop = np.maximum(1.0 - 0.5 * slope * result.t, 0.0) ** 2
+    assert result["a.level"] == pytest.approx(5.0 / 3.0 + drop / 3.0, abs=2e-5)
+    assert result.summary["steps"] < 100
+
+
+@njit
+def chained(t, y):
+    """Six drops in a row that die at one time, each of a root that is straight within 1e-8."""
+    rates = np.zeros(y.size)
+    for i in range(y.size):
+        drop = (y[i - 1] if i > 0 else 1.0) - y[i]
+        q = 1e3 * drop / np.sqrt(abs(drop) + 1e-8)
+        rates[i] += q
+        if i > 0:
+            rates[i - 1] -= q
+    return rates
+
+
+@pytest.mark.parametrize("name", ["implicit-euler", "esdirk-4", "radau-iia-5"])
+def test_many_drops_may_die_at_once(name):
+    counts: dict = {}
+    start = np.array([0.3, 0.9, 0.1, 0.5, 0.0, 0.7])
+    found = integrate(chained, start, [0.0, 1.0], name, step=0.1, counts=counts)[-1]
+    assert counts["steps"] == 10 and counts["newton_failures"] == 0
+    assert found == pytest.approx(np.ones(6), abs=1e-6)
+
+
+@njit
+def rooted(t, y):
+    return -50.0 * np.sign(y) * np.sqrt(np.abs(y))
+
+
+@pytest.mark.parametrize("name, own, known", [("implicit-euler", 5.0, 0.0), ("trapezoid", 2.5, 2.5)])
+def test_a_long_step_over_a_bare_root_ends_where_its_quadratic_says(name, own, known):
+    """y+ + own sign(y+) sqrt|y+| = 1 - known, h = 0.1: with z = sqrt|y+| a quadratic."""
+    right = 1.0 - known
+    z = (np.sqrt(own**2 + 4.0 * abs(right)) - own) / 2.0
+    found = integrate(rooted, [1.0], [0.0, 0.1], name, step=0.1)[-1, 0]
+    assert found == pytest.approx(np.sign(right) * z**2, abs=1e-9)
