@@ -165,11 +165,11 @@ BAD = {
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
     "missing type": (
         swap('type = "junction"\n', ""),
-        "line 15: nodes.gate: type is missing; wanted one of accumulator, air-valve, chamber, ",
+        "line 15: nodes.gate: type is missing; wanted one of accumulator, ",
     ),
     "a link among nodes": (
         swap('"junction"', '"pipe"'),
-        'nodes.gate.type: no type "pipe"; types are accumulator, air-valve, chamber, frame,',
+        'nodes.gate.type: no type "pipe"; types are accumulator, ',
     ),
     "a link among nodes, where": (swap('"junction"', '"pipe"'), "it belongs under [links]"),
     "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: no type 3"),
