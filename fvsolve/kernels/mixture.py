@@ -33,8 +33,11 @@ else:
 
 
 def part(function):
-    """`njit` for what the functions of `density.py` alone call: no door to Python."""
-    return njit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """`njit` for what the functions of `density.py` alone call: no door to Python.
+
+    Inlining is told, since numba takes it over from whichever caller compiles first, and `outside` forbids it.
+    """
+    return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 @part

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import basin_fields
 
@@ -125,8 +124,6 @@ class Model:
     @cached_property
     def structure(self):
         """Pattern of the Jacobian and the linear algebra that fits it, or that `numerics.linear_algebra` names."""
-        if len(self.tables[rec.I_BASINS]):
-            raise FvsolveError("basins are stepped by explicit methods and cannot be linearised yet")
         from fvsolve.model.sparsity import sparsity
         from fvsolve.steppers.structure import Structure
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
+from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.steady import union
 
@@ -22,6 +23,8 @@ Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depe
 
 def sparsity(model) -> csc_array:
     """bool[n + nodes, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
+    if len(model.tables[rec.I_BASINS]):
+        raise FvsolveError("basins are stepped by explicit methods and cannot be linearised yet")
     n, nodes = model.y_size, len(model.node_names)
     pairs = [(np.arange(n), np.arange(n)), *Couplings(model).pairs()]
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
