@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fvsolve.errors import CaseError
+from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.run import model_of
 
 
@@ -110,3 +110,10 @@ def _once(model, y, run) -> Outcome:
 
 
 Told = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
+
+
+def without_basins(case, study: str) -> None:
+    """Raises FvsolveError where a case has basins, whose cells a study does not refine or replace yet."""
+    names = [name for name, node in case.nodes.items() if node.kind == "basin"]
+    if names:
+        raise FvsolveError(f"{study} does not know basins yet; the case has {listing(names)}")

@@ -19,7 +19,7 @@ from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, 
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
-from fvsolve.studies.outcome import Told, prepared, refusal
+from fvsolve.studies.outcome import Told, prepared, refusal, without_basins
 from fvsolve.studies.points import Points
 
 WRONG = 1.0  # an error as great as all that the component does
@@ -116,6 +116,7 @@ class _Study:
         from fvsolve.case import load
 
         self.case: Case = load(case, set)
+        without_basins(self.case, "chart")
         self.points, self.progress = Points(folder), progress
         self.default, self.compiling = default_curve(self.case), 0.0
         self.coarse: Coarse | None = None  # with pipes

@@ -19,7 +19,7 @@ from fvsolve.kernels.schedules import schedule_value
 from fvsolve.model.checks import velocities
 from fvsolve.studies.accuracy.rungs import Misfit, restated, structures
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
-from fvsolve.studies.outcome import Outcome, outcome
+from fvsolve.studies.outcome import Outcome, outcome, without_basins
 
 TARGET = 1e-2
 BEST_OF, BRIEF = 3, 0.3  # timings of a rung; [s] that the first may take for there to be others
@@ -140,6 +140,7 @@ def ladder(
     from fvsolve.case import load
 
     case, told = load(case, dict(set or {})), progress or (lambda *_: None)
+    without_basins(case, "chart --models")
     asked = [(rung, law) for rung in structures(case) for law in laws(case)]
     runs, dear = [], {}  # dear: law -> the rung with cells that was given up under it
     for at, (rung, law) in enumerate(asked):

@@ -9,7 +9,7 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan
-from fvsolve.studies.outcome import Told
+from fvsolve.studies.outcome import Told, without_basins
 from fvsolve.studies.points import Points
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
@@ -94,6 +94,7 @@ def order(
         )
     given = {"numerics.scheme": scheme, "numerics.method": method}
     case = load(case, {**(set or {}), **{name: value for name, value in given.items() if value is not None}})
+    without_basins(case, "order")
     made = affordable(case, refine, key, levels, cells, against, points)
     if initial is None and source is None and exact is None:
         from fvsolve.studies.accuracy.judge import Judge

@@ -14,7 +14,7 @@ from fvsolve.studies.failure.converged import Converged, converged
 from fvsolve.studies.failure.eigen_limit import LINEAR_TWIN, greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.outcome import Told
+from fvsolve.studies.outcome import Told, without_basins
 from fvsolve.studies.points import Points
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
@@ -81,6 +81,7 @@ def failures(
     tolerance : mean error over the range of a probe. Raises FvsolveError for names and numbers that are none, and
     where the reference is no better than the tolerance asks.
     """
+    without_basins(case, "map")
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
