@@ -216,3 +216,20 @@ def test_what_basins_do_not_go_with_yet_is_said():
     for study in (order, chart, ladder, energy, lambda case: failures(fvsolve.load(case))):
         with pytest.raises(FvsolveError, match="basins"):
             study(case)
+
+
+def test_a_run_interrupted_and_resumed_is_the_unbroken_one_frames_too(tmp_path):
+    case = alone(basin((40.0, 20.0), (160, 80), 0.2, dam={"x": 20.0, "level": 0.1}), 60.0)
+    case["output"] |= {"fields": 12, "every": 1.0}
+    times = []
+
+    def interrupt(t, seconds, steps):
+        times.append(t)
+        if t > 5.0:
+            raise KeyboardInterrupt
+
+    assert not fvsolve.run(case, out=tmp_path / "run", progress=interrupt).ok and 5.0 < times[-1] < 60.0
+    assert fvsolve.run(case, out=tmp_path / "run", resume=True).ok
+    assert fvsolve.run(case, out=tmp_path / "whole").ok
+    for name in ("history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"):
+        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
