@@ -6,7 +6,9 @@ fvsolve's step follows its shortest cell, so it is met twice: at the same step, 
 
 import tomllib
 import warnings
+from contextlib import chdir
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import process_time
 
 import numpy as np
@@ -25,7 +27,7 @@ SETTINGS = [("upwind", "euler"), ("muscl", "ssp-rk2"), ("upwind5", "rk4")]
 
 def rthym(dt):
     """CPU time [s], greatest drift of a head [m], steps."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), TemporaryDirectory() as folder, chdir(folder):  # where it leaves temp.inp and more
         warnings.simplefilter("ignore")
         solver = rthym_moc.load_inp(str(NET), stub_length_ft=4720 * dt)
     best = np.inf
