@@ -184,6 +184,7 @@ def test_what_the_network_gives_a_basin_gets():
 
 
 FAULTS = {
+    "cut": ({"patches": {"east": {"side": "east", "span": [0.3, 1.4]}}}, "cuts cells of 0.5 m; .* 0.5 m to 1.5 m"),
     "span": ({"patches": {"east": {"side": "east", "span": [1.0, 9.0]}}}, "no stretch of the east side"),
     "side": ({"patches": {"east": {"side": "wst"}}}, r'patches.east.side: no side named "wst"; did you mean "west"'),
     "shared": ({"patches": {"east": {"side": "east"}, "b": {"side": "east", "span": [0.0, 1.0]}}}, "has cells of east"),

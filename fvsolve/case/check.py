@@ -13,7 +13,6 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import (
     KINDS,
     Accumulator,
-    Basin,
     Chamber,
     Cylinder,
     EndStop,
@@ -55,11 +54,11 @@ def network(table: dict[str, Any]) -> Found:
             yield (group,), "is empty; wanted two places and a link between them at least"
     touched = {place for places in ends.values() for place in places}
     for name, node in nodes.items():
-        if _own_places(name, node) is None and name not in touched:
+        if own_places(name, node) is None and name not in touched:
             yield ("nodes", name), "no link touches it"
     if not complete:
         return  # what hangs together is not known
-    islands = _islands({name: own for name, node in nodes.items() if (own := _own_places(name, node))} | ends)
+    islands = _islands({name: own for name, node in nodes.items() if (own := own_places(name, node))} | ends)
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
         yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
@@ -138,34 +137,6 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
 
 
-def basins(nodes: dict[str, Any], numerics: Numerics, fluid: Any) -> Found:
-    """Faults of patches beside their basin or over one another, of dams, and of what basins do not go with yet."""
-    found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
-    method = METHODS.get(numerics.method or "")
-    if found and (numerics.method == AUTO or (method is not None and not method.explicit)):
-        yield ("numerics", "method"), f"{show(numerics.method)} is implicit; basins are stepped by explicit methods"
-    if found and fluid is not None and fluid.law != "linear":
-        yield (
-            ("fluid", "law"),
-            f'{show(fluid.law)} does not go with basins, whose water has one density; wanted "linear"',
-        )
-    for name, basin in found.items():
-        taken: dict[int, str] = {}
-        for patch, one in basin.patches.items():
-            along = basin.size[1] if one.side in ("west", "east") else basin.size[0]
-            key = ("nodes", name, "patches", patch)
-            if one.span is not None and not one.span[0] < one.span[1] <= along * (1.0 + 1e-9):
-                what = f"{one.span[0]:g} m to {one.span[1]:g} m is no stretch of the {one.side} side"
-                yield (*key, "span"), f"{what}, 0 m to {along:g} m"
-                continue
-            other = next((taken[cell] for cell in basin.span_of(patch).tolist() if cell in taken), None)
-            if other is not None:
-                yield key, f"has cells of {other}; patches share none"
-            taken |= dict.fromkeys(basin.span_of(patch).tolist(), patch)
-        if basin.dam is not None and basin.dam.x >= basin.size[0]:
-            yield ("nodes", name, "dam", "x"), f"{basin.dam.x:g} m lies beyond the basin, 0 m to {basin.size[0]:g} m"
-
-
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
     """Faults of claims at a time outside the run."""
     for text, claim in expect.items():
@@ -188,7 +159,7 @@ def _owned(name: str, link: Any) -> dict[str, str]:
     return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
 
 
-def _own_places(name: str, node: Any) -> list[str] | None:
+def own_places(name: str, node: Any) -> list[str] | None:
     """Places in a node's stead, as others name them; None where it is a place itself."""
     kind = _kind("nodes", node)
     own = kind.own_places(_dict(node)) if kind else None
@@ -199,7 +170,7 @@ def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | Non
     """Every place -> its domain, None where its type is at fault."""
     found: dict[str, str | None] = {}
     for name, node in nodes.items():
-        kind, own = _kind("nodes", node), _own_places(name, node)
+        kind, own = _kind("nodes", node), own_places(name, node)
         found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
     return found | {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
 

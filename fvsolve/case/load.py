@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import check, text
+from fvsolve.case import basins, check, text
 from fvsolve.case.case import Case, default_cells
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
@@ -92,10 +92,8 @@ class _Reader:
         kinds = {group: self.kinds(group) for group in parts}
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
-        for name, kind in [*kinds["nodes"].items()]:
-            given = self.raw.table["nodes"].get(name)
-            own = kind.own_places(given) if kind and isinstance(given, dict) else None
-            kinds["nodes"] |= {f"{name}.{one}": Chamber for one in own or ()}
+        for name in [*kinds["nodes"]]:
+            kinds["nodes"] |= dict.fromkeys(check.own_places(name, self.raw.table["nodes"].get(name)) or (), Chamber)
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.raw.table))
@@ -106,7 +104,7 @@ class _Reader:
             has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
-            self.add(check.basins(parts["nodes"], numerics, properties))
+            self.add(basins.misfits(parts["nodes"], numerics, properties))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
         links = self.cells(parts["links"], properties, numerics)

@@ -24,12 +24,11 @@ def behind_dam(basin) -> np.ndarray:
     return np.maximum(level - bed, 0.0) - np.maximum(basin.level - bed, 0.0)
 
 
-def basin_fields(model, row, y: np.ndarray) -> dict[str, np.ndarray]:
+def basin_fields(model, basin, row, y: np.ndarray) -> dict[str, np.ndarray]:
     """Depth, surface, velocities and bed of a basin's cells, SI."""
     n = int(row["nx"] * row["ny"])
     o, at, plane = int(row["y"]), int(row["plan"]), model.tables[rec.I_PLANE]
     depth = np.maximum(plane[at : at + n] + y[o : o + n], 0.0)
-    basin = list(basins_of(model.case).values())[list(model.tables[rec.I_BASINS]["y"]).index(row["y"])]
     bed = basin.bed_at(np.arange(n)) + (basin.elevation or 0.0)
     wet = np.maximum(depth, shallow.THIN)
     share = 2.0 * depth / (depth * depth + wet * wet)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import basin_fields
+from fvsolve.model.basins import basin_fields, basins_of
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
@@ -74,7 +74,7 @@ class Model:
     @property
     def basin_names(self) -> list[str]:
         """Basins, as their table has them."""
-        return [name for name, node in self.case.nodes.items() if node.kind == "basin"]
+        return list(basins_of(self.case))
 
     @property
     def y_size(self) -> int:
@@ -248,8 +248,8 @@ class Model:
             }  # fmt: skip
         nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
-        for name, row in zip(self.basin_names, self.tables[rec.I_BASINS], strict=True):
-            found[name] = basin_fields(self, row, y)
+        for (name, basin), row in zip(basins_of(self.case).items(), self.tables[rec.I_BASINS], strict=True):
+            found[name] = basin_fields(self, basin, row, y)
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])

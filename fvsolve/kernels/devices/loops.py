@@ -39,14 +39,13 @@ def text(kind: int) -> str:
     homes = [call.split(": ") for call in law.values() if call]
     lines = dict.fromkeys(f"from {HOME}.{module} import {call.split('(')[0]}" for module, call in homes)
     head, *functions = TEMPLATE.read_text(encoding="utf-8").replace("KIND = -1", f"KIND = {kind}").split("\n\n\n")
-    return "\n\n\n".join(
-        ["\n".join(dict.fromkeys(lines)) + "\n" + head, *filter(None, (filled(f, law) for f in functions))]
-    )
+    own = [said for function in functions if (said := filled(function, law))]
+    return "\n\n\n".join(["\n".join([*lines, head]), *own])
 
 
 def filled(function: str, law: dict[str, str]) -> str:
     """A function of the template with its call in place, "" where this kind has none and needs none."""
-    before, mark, after = function.partition("...  # each: ")
+    before, _, after = function.partition("...  # each: ")
     asked, end, rest = after.partition("\n")
     *into, job = asked.split(" = ")
     if law[job]:
