@@ -62,7 +62,7 @@ def dam(x, t, high, low):
 
 @pytest.mark.parametrize("low", [0.4, 0.0], ids=["wet", "dry"])
 def test_a_dam_breaks_as_in_the_exact_solution(low):
-    """L1 of the depth falls at the order of fronts, two thirds or more, and mass stays."""
+    """L1 of the depth falls at first order, all that a front allows, and mass stays."""
     errors = []
     for nx in (100, 200, 400):
         h, _ = depths(alone(basin((20.0, 1.0), (nx, 3), 1.0, dam={"x": 10.0, "level": low}), 1.2))
@@ -70,7 +70,7 @@ def test_a_dam_breaks_as_in_the_exact_solution(low):
         errors.append(np.abs(h[1] - dam(x, 1.2, 1.0, low)).mean() * 20.0)
         assert h.min() >= 0.0 and np.array_equal(h[0], h[2])
         assert h.mean() == approx(0.5 * (1.0 + low), rel=1e-13)
-    assert errors[-1] < 0.02 and errors[0] / errors[2] > 4.0 ** (2.0 / 3.0)
+    assert errors[-1] < 0.02 and errors[0] / errors[2] > 4.0**0.95
 
 
 def test_a_lake_at_rest_does_not_move_by_one_bit_on_a_bank_and_behind_a_shut_valve():
@@ -83,20 +83,23 @@ def test_a_lake_at_rest_does_not_move_by_one_bit_on_a_bank_and_behind_a_shut_val
 
 @pytest.mark.parametrize("mode", [1, 2])
 def test_small_waves_slosh_at_the_periods_of_long_waves(mode):
-    """Standing wave a cos(k x) of a closed box: period 2 L / (n sqrt(g h)); a hundredth of a millimetre high."""
-    size, nx = 10.0, 80
-    pool = basin((size, 2.0), (nx, 4), 1.0)
-    model = fvsolve.build(fvsolve.load(alone(pool, 10.0)))
-    x = (np.arange(nx) + 0.5) * size / nx
-    state = fvsolve.initial_state(model)
-    shape = 1e-5 * np.cos(mode * math.pi * x / size)
-    state.y[: 4 * nx] = np.tile(shape, 4)
-    period = 2.0 * size / (mode * math.sqrt(GRAVITY))
-    found = fvsolve.advance(model, state, 2.0 * period).y[:nx]
-    turned = np.dot(found, shape) / np.dot(shape, shape)
-    assert turned == approx(1.0, abs=0.01)
-    quarter = fvsolve.advance(model, state, 1.25 * period).y[:nx]
-    assert abs(np.dot(quarter, shape)) < 0.02 * np.dot(shape, shape)
+    """Standing wave a cos(k x) of a closed box, period 2 L / (n sqrt(g h)), a hundredth of a millimetre high.
+
+    What is left after two periods falls short at third order, what is there after a quarter more at second.
+    """
+    size, lost, late = 10.0, [], []
+    for nx in (40 * mode, 80 * mode):
+        model = fvsolve.build(fvsolve.load(alone(basin((size, 2.0), (nx, 2), 1.0), 10.0)))
+        x = (np.arange(nx) + 0.5) * size / nx
+        state = fvsolve.initial_state(model)
+        shape = 1e-5 * np.cos(mode * math.pi * x / size)
+        state.y[: 2 * nx] = np.tile(shape, 2)
+        period = 2.0 * size / (mode * math.sqrt(GRAVITY))
+        after = [fvsolve.advance(model, state, n * period).y[:nx] @ shape / (shape @ shape) for n in (2.0, 1.25)]
+        lost.append(abs(after[0] - 1.0))
+        late.append(abs(after[1]))
+    assert lost[1] < 3e-4 and lost[0] / lost[1] > 2.0**2.8
+    assert late[1] < 2e-3 and late[0] / late[1] > 2.0**1.8
 
 
 def test_a_mirrored_and_a_turned_basin_have_the_same_bits():
@@ -127,12 +130,13 @@ def test_a_deep_and_quiet_basin_drains_as_its_tank_and_as_torricelli():
     case["numerics"] |= PLANE
     found = fvsolve.run(case)
     twin = fvsolve.run(drained("pool", {"pool": tank(40.0, 2.0)}, 200.0))
-    assert found.ok and found["tap.flow"] == approx(twin["tap.flow"], rel=2e-3, abs=2e-4)
+    assert found.ok and found["tap.flow"] == approx(twin["tap.flow"], abs=5e-5)  # of 0.075: waves of its start
     assert abs(found.ledger["mass"]["relative"]) < 1e-13
     level = (
         math.sqrt(2.0) - 0.012 * math.sqrt(2 * GRAVITY) / 80.0 * 190.0
     ) ** 2  # the ramp counts for half of its 20 s
-    assert found["tap.flow"][-1] == approx(0.012 * math.sqrt(2 * GRAVITY * level), rel=3e-3)
+    assert twin["tap.flow"][-1] == approx(0.012 * math.sqrt(2 * GRAVITY * level), rel=1e-9)
+    assert found["tap.flow"][-1] == approx(twin["tap.flow"][-1], rel=5e-4)
 
 
 def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero():
