@@ -1,53 +1,118 @@
-"""What must hold of basins and between them and the rest of a case. Knows their sides; knows no network."""
+"""Meshes of basins, and what must hold between these, their patches and the rest of a case. Knows no network."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from fvsolve.case.sections import Numerics
+from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
+from fvsolve.parts.basin import Place
+from fvsolve.parts.series import find_file
+from fvsolve.parts.value import Misfit, Setting
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
 
+if TYPE_CHECKING:
+    from fvsolve.mesh import Mesh
+
 Found = Iterator[tuple[tuple, str]]
 
-WHOLE = 1e-6  # of a cell, by which the end of a stretch may lie beside an edge
+
+def mesh_of(basin: Basin, setting: Setting) -> Mesh:
+    """The mesh of a basin; Misfit with all that is wrong with it."""
+    from fvsolve.mesh import read, rectangle
+
+    try:
+        if basin.mesh is None:
+            sides = {name: (one.side, *one.span) if one.span else one.side for name, one in basin.patches.items()}
+            grading = basin.grading or (1.0, 1.0)
+            return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
+        path = find_file(basin.mesh.file, setting)
+        return read(path, basin.mesh.unit)
+    except MeshError as error:
+        below = ("mesh",) if basin.mesh else ()
+        raise Misfit([((*below, *keys(fault.place)), fault.message) for fault in error.faults]) from None
+    except ValueError as error:
+        raise Misfit([(("mesh", "file"), str(error))]) from None
 
 
-def misfits(nodes: dict[str, Any], numerics: Numerics, fluid: Any) -> Found:
-    """Faults of patches and dams, and of what basins do not go with yet."""
+def keys(place: str) -> tuple:
+    """What a fault's place says, as keys: "patches.east", "holes[0]"."""
+    found = [int(one) if one.isdigit() else one for one in re.split(r"[.\[\]]", place) if one]
+    return tuple(found) if found and found[0] in Basin.keys() else ()
+
+
+def patch_names(mesh: Mesh) -> tuple[str, ...]:
+    """Patches that a file may name; the last one is all that has no name."""
+    return mesh.patches[:-1]
+
+
+def behind(mesh: Mesh, patch: str) -> np.ndarray:
+    """Numbers of the cells behind a patch : int64[count]."""
+    return np.unique(mesh.left[mesh.patch(patch)])
+
+
+def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
+    """Height of the bed above the elevation at centres : float64[n] [m]."""
+    x, y = np.ascontiguousarray(mesh.centre.T)
+    return np.zeros(x.size) if basin.bed is None else basin.bed.at(x, y)
+
+
+def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
+    """Patches as places, at the mean height of the bed behind them."""
+    found, bed = {}, bed_of(basin, mesh)
+    for patch in patch_names(mesh) if basin.physics != "transport" else ():
+        cells = behind(mesh, patch)
+        height = float(np.average(bed[cells], weights=mesh.area[cells]))
+        depth = None
+        if basin.level is not None:
+            depth = float(np.average(np.maximum(basin.level - bed[cells], 0.0), weights=mesh.area[cells]))
+        stated = basin.elevation is not None or basin.bed is not None
+        found[f"{name}.{patch}"] = Place.model_construct(
+            elevation=(basin.elevation or 0.0) + height if stated else None, position=None, basin=name, patch=patch,
+            depth=depth, pressure=basin.pressure,
+        )  # fmt: skip
+    return found
+
+
+def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any) -> Found:
+    """Faults of patches, and of what basins do not go with."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     method = METHODS.get(numerics.method or "")
     if found and (numerics.method == AUTO or (method is not None and not method.explicit)):
         yield ("numerics", "method"), f"{show(numerics.method)} is implicit; basins are stepped by explicit methods"
-    if found and fluid is not None and fluid.law != "linear":
-        what = f"{show(fluid.law)} does not go with basins, whose water has one density"
-        yield ("fluid", "law"), f'{what}; wanted "linear"'
+    joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
-        yield from _patches(name, basin)
-        if basin.dam is not None and basin.dam.x >= basin.size[0]:
-            yield ("nodes", name, "dam", "x"), f"{basin.dam.x:g} m lies beyond the basin, 0 m to {basin.size[0]:g} m"
-
-
-def _patches(name: str, basin: Basin) -> Found:
-    """Faults of stretches that leave their side or cut a cell, and of cells that two patches share."""
-    taken: dict[int, str] = {}
-    for patch, one in basin.patches.items():
-        axis = 1 if one.side in ("west", "east") else 0
-        along, cell, key = basin.size[axis], basin.size[axis] / basin.cells[axis], ("nodes", name, "patches", patch)
-        low, high = one.span or (0.0, along)
-        said = f"{low:g} m to {high:g} m"
-        if not low < high <= along * (1.0 + 1e-9):
-            yield (*key, "span"), f"{said} is no stretch of the {one.side} side, 0 m to {along:g} m"
+        key = ("nodes", name)
+        if fluid is not None and fluid.law != "linear" and basin.physics == "free-surface":
+            what = f"{show(fluid.law)} does not go with a free surface, whose water has one density"
+            yield ("fluid", "law"), f'{what}; wanted "linear"'
+        if name not in meshes:
             continue
-        first, last = round(low / cell), max(round(high / cell), round(low / cell) + 1)
-        if max(abs(low / cell - first), abs(high / cell - last)) > WHOLE:
-            near = f"{first * cell:.6g} m to {last * cell:.6g} m"
-            yield (*key, "span"), f"{said} cuts cells of {cell:.6g} m; wanted whole ones, for example {near}"
-            continue
-        cells = basin.span_of(patch).tolist()
-        other = next((taken[cell] for cell in cells if cell in taken), None)
-        if other is not None:
-            yield key, f"has cells of {other}; patches share none"
-        taken |= dict.fromkeys(cells, patch)
+        known = patch_names(meshes[name])
+        for patch, one in basin.patches.items():
+            if patch not in known:
+                yield (*key, "patches", patch), f"the mesh has no such patch; patches are {listing(known) or 'none'}"
+            elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:
+                what = "boundary" if one.boundary else "impedance"
+                yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
+            if one.impedance is not None and basin.physics != "liquid":
+                yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
+        x, y = np.ascontiguousarray(meshes[name].centre.T)
+        shapes = {("bed",): basin.bed}
+        if basin.start is not None:
+            shapes |= {("start", what): getattr(basin.start, what) for what in ("level", "pressure", "u", "v")}
+            other = {"free-surface": "pressure", "liquid": "level", "transport": "u"}[basin.physics]
+            if getattr(basin.start, other) is not None:
+                yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
+        for below, shape in shapes.items():
+            try:
+                if shape is not None:
+                    shape.at(x, y)
+            except ValueError as error:
+                yield (*key, *below), str(error)

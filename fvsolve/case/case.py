@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import text
+from fvsolve.case import basins, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactSpec, FluidSpec, Numerics, Output
@@ -47,6 +47,7 @@ class Case:
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
     folder: Path | None = field(repr=False)
+    meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
 
     @property
     def files(self) -> list[Path]:
@@ -71,7 +72,10 @@ class Case:
         """Places of the fluid: hydraulic nodes, then the chambers that cylinders own, as they are at the start."""
         found = {}
         for name, node in self.nodes.items():
-            found |= node.inner(name)[0] if node.domain == "hydraulic" else {}
+            if name in self.meshes:
+                found |= basins.places(name, node, self.meshes[name])
+            elif node.domain == "hydraulic":
+                found |= node.inner(name)[0]
         for name, link in self.links.items():
             found |= link.inner(name)[0]
             if "A" in link.owns:

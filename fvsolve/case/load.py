@@ -87,16 +87,18 @@ class _Reader:
         fluid, properties = self.fluid()
         self.setting.signals = self.group("signals")
         parts = {group: self.parts(group) for group in ("nodes", "links")}
+        meshes = self.meshes(parts["nodes"])
         self.unused_signals()
         numerics = self.table("numerics", Numerics)
         kinds = {group: self.kinds(group) for group in parts}
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name in [*kinds["nodes"]]:
-            kinds["nodes"] |= dict.fromkeys(check.own_places(name, self.raw.table["nodes"].get(name)) or (), Chamber)
+            own = [f"{name}.{patch}" for patch in basins.patch_names(meshes[name])] if name in meshes else ()
+            kinds["nodes"] |= dict.fromkeys(own, Chamber)
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
-        self.add(check.network(self.raw.table))
+        self.add(check.network(self.with_patches(meshes)))
         self.add(
             check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
         )
@@ -104,7 +106,7 @@ class _Reader:
             has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
-            self.add(basins.misfits(parts["nodes"], numerics, properties))
+            self.add(basins.misfits(parts["nodes"], parts["links"], meshes, numerics, properties))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
         links = self.cells(parts["links"], properties, numerics)
@@ -127,6 +129,7 @@ class _Reader:
             copies=dict(self.setting.files),
             raw=self.raw.table,
             folder=self.raw.folder,
+            meshes=meshes,
             **top,
         )
         return made if named is None else self.exact(made)
@@ -233,7 +236,8 @@ class _Reader:
         return found
 
     def parts(self, group: str) -> dict[str, Any]:
-        if group not in self.raw.table:
+        basin = any(isinstance(one, dict) and one.get("type") == "basin" for one in self.group("nodes").values())
+        if group not in self.raw.table and not (group == "links" and basin):
             self.fault((), f"[{group}] is missing: {GROUPS[group]}")
         made = {}
         for name, part in self.group(group).items():
@@ -251,6 +255,26 @@ class _Reader:
             except ValueError as error:
                 self.misfit((group, name), error)
         return made
+
+    def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:
+        """Meshes of basins by name; without one it is not known what may be joined, and reading ends."""
+        made = {}
+        for name, node in nodes.items():
+            try:
+                if isinstance(node, Basin):
+                    made[name] = basins.mesh_of(node, self.setting)
+            except Misfit as error:
+                self.misfit(("nodes", name), error)
+        if len(made) < sum(isinstance(node, Basin) for node in nodes.values()):
+            self.stop()
+        return made
+
+    def with_patches(self, meshes: dict[str, Any]) -> dict[str, Any]:
+        """The table as the file has it, basins with all the patches of their meshes."""
+        nodes = self.raw.table.get("nodes")
+        own = {name: {**nodes[name], "patches": dict.fromkeys(basins.patch_names(mesh), {})}
+               for name, mesh in meshes.items()}  # fmt: skip
+        return {**self.raw.table, "nodes": {**nodes, **own}} if meshes else self.raw.table
 
     def kind(self, group: str, name: str, part: dict[str, Any]) -> Any:
         known = KINDS[group]

@@ -307,25 +307,43 @@ PROBE = np.dtype(
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 
+SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, ACOUSTIC_FACES, LIQUID_GRID, LIQUID_FACES = 0, 1, 2, 3, 4, 5
+CARRIED_GRID, CARRIED_FACES = 6, 7  # kinds of basins: physics, law of the liquid, grid or loop over faces
+
 BASIN = np.dtype(
     [
+        ("kind", "i8"),
+        ("scheme", "i8"),
+        ("limiter", "i8"),
+        ("n", "i8"),  # cells
         ("nx", "i8"),
         ("ny", "i8"),
-        ("dx", "f8"),
-        ("dy", "f8"),
-        ("y", "i8"),  # first state: depths, then flows along x and y
-        ("plan", "i8"),  # offset in `plane` of what is fixed, rows of cells
+        ("faces", "i8"),  # of a mesh, the last ones the boundary's
+        ("outer", "i8"),  # how many of them these are
+        ("y", "i8"),  # first state: of one quantity after the other, a row of cells
+        ("spacing", "i8"),  # offsets in `plane`: 1 / widths of columns, then of rows [1/m]
+        ("plan", "i8"),  # what is fixed, rows of cells
+        ("area", "i8"),  # of cells [m2]
+        ("reflect", "i8"),  # what comes back of waves, a value for each face of the boundary
+        ("outer_given", "i8"),  # how many values these are: 0 for walls everywhere
+        ("mesh", "i8"),  # numbers of a mesh, in `plane` and
+        ("links", "i8"),  # in `integers`
         ("work", "i8"),
-        ("limiter", "i8"),
+        ("thickness", "f8"),  # [m]
+        ("speed", "f8"),  # of waves in a liquid [m/s]
+        ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
+        ("roughness", "f8"),  # Manning's n, or a factor
     ],
     align=True,
 )
+NO_DRAG, MANNING, DARCY = 0, 1, 2
 PATCHES = np.dtype(
     [
         ("basin", "i8"),
         ("node", "i8"),
         ("first", "i8"),  # of its cells in `integers`
         ("count", "i8"),
+        ("area", "f8"),  # of these [m2]
     ],
     align=True,
 )

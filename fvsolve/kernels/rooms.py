@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from fvsolve.kernels.devices.loops import loops_of
+from fvsolve.kernels.records import ACOUSTIC_FACES, ACOUSTIC_GRID, SHALLOW_FACES, SHALLOW_GRID
 
 HOME = "fvsolve.kernels"
 
@@ -64,10 +65,16 @@ ROOMS = {
         before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
-    "basins": Room(before="plane.basin: patch_pressures", after="plane.basin: basin_rates"),
+    "patches": Room(before="plane.patches: patch_pressures", after="plane.patches: patch_flows"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
+BASINS = {  # kind of basin
+    SHALLOW_GRID: Room(after="plane.rooms: shallow_grids"),
+    SHALLOW_FACES: Room(after="plane.rooms: shallow_meshes"),
+    ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
+    ACOUSTIC_FACES: Room(after="plane.rooms: acoustic_meshes"),
+}
 ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 
 
@@ -75,7 +82,7 @@ ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 class Scene:
     """What decides which functions a scene is made of.
 
-    law : of the fluid; cavities : whether it knows them; kinds : codes of the devices that there are
+    law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are
     """
 
     law: str
@@ -86,7 +93,7 @@ class Scene:
     bodies: bool = False
     memory: bool = False
     kinds: tuple[int, ...] = ()
-    basins: bool = False
+    basins: tuple[int, ...] = ()
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -102,8 +109,10 @@ class Scene:
         for kind in self.kinds:
             loops = loops_of(kind)
             yield Room(**{job: f"{loops.__name__}: {job}" for job in vars(Room()) if hasattr(loops, job)})
+        for kind in self.basins:
+            yield BASINS[kind]
         if self.basins:
-            yield ROOMS["basins"]
+            yield ROOMS["patches"]
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
         yield ALWAYS

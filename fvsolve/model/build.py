@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError, Fault
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import basins_of, behind_dam, lower_basins
+from fvsolve.model.basins import at_start, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.density import add_law, cavity_pressure
@@ -49,6 +49,8 @@ class Scene:
         self.law = Hydraulics(case)
         self.schedules = Schedules()
         self.floats: list[float] = []
+        self.pieces_of_plane: list[np.ndarray] = []
+        self.plane_size = 0
         cylinders = [name for name, link in case.links.items() if link.kind == "cylinder"]
         self.moving_names = {f"{name}.{place}" for name in cylinders for place in "AB"}
         self.node_index = {name: i for i, name in enumerate(case.places)}
@@ -71,6 +73,12 @@ class Scene:
         self.scale += [scale] * len(names)
         self.size += len(names)
         return self.size - len(names)
+
+    def to_plane(self, values: np.ndarray) -> int:
+        """Offset of new values in `plane`."""
+        self.pieces_of_plane.append(np.ravel(values))
+        self.plane_size += values.size
+        return self.plane_size - values.size
 
     @property
     def device_names(self) -> list[str]:
@@ -148,7 +156,7 @@ class Scene:
         row["y"] = self.states([f"{name}.mass"], 0.1 * rho * row["area"])
 
     def node_patch(self, name, node, row) -> None:
-        row["kind"], row["level"] = rec.PATCH, node.level
+        row["kind"] = rec.PATCH
 
     def node_chamber(self, name, node, row) -> None:
         row["kind"], row["volume"] = rec.CHAMBER, node.volume
@@ -330,7 +338,8 @@ class Scene:
             self.device_table, self.basin_table, self.patch_table,
             np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
             np.zeros(max(4 * most + 64, system, 2 * len(self.body_table))), marks,
-            np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at), self.plane,
+            np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at),
+            np.concatenate([np.zeros(0), *self.pieces_of_plane]),
             pieces, envelope, extremes,
         )  # fmt: skip
 
@@ -339,13 +348,6 @@ class Scene:
         for row in self.column_table:
             k = stiff[row["from_node"]] + stiff[row["to_node"]]
             yield math.sqrt(k * row["area"] / row["length"])
-
-    def start_state(self) -> np.ndarray:
-        """No deviation from the profile, but in basins with a dam."""
-        found = np.zeros(self.size)
-        for row, basin in zip(self.basin_table, basins_of(self.case).values(), strict=True):
-            found[row["y"] : row["y"] + row["nx"] * row["ny"]] = behind_dam(basin)
-        return found
 
     def model(self) -> Model:
         case = self.case
@@ -356,7 +358,8 @@ class Scene:
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
             self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
-            self.steady, self.profiles, self.devices, self.start_state(), self.events,
+            self.steady, self.profiles, self.devices, at_start(self.basins, self.size), self.events,
+            self.basins,
         )  # fmt: skip
 
 

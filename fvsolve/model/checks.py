@@ -125,6 +125,6 @@ def velocities(model) -> np.ndarray:
 def quick_parts(model) -> str:
     """What may have a rate of its own beside the pipes: what stores, rigid columns, bodies."""
     stores = [name for name, row in zip(model.node_names, model.tables[rec.I_NODES], strict=True)
-              if row["kind"] not in (rec.FIXED, rec.JUNCTION)]  # fmt: skip
-    found = [*stores, *model.column_names, *model.body_names]
+              if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
+    found = [*(basin.name for basin in model.basins), *stores, *model.column_names, *model.body_names]
     return found[0] if len(found) == 1 else f"one of {listing(found)}"

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import basin_fields, basins_of
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
+    from fvsolve.model.basins import Basin
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,7 @@ class Model:
     devices: list[tuple]  # (name, part, what it is lowered by), as their table has them
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
-
-    @property
-    def basin_names(self) -> list[str]:
-        """Basins, as their table has them."""
-        return list(basins_of(self.case))
+    basins: list[Basin]  # as their table has them
 
     @property
     def y_size(self) -> int:
@@ -106,7 +102,8 @@ class Model:
         kinds = tuple(int(kind) for kind in np.unique(self.tables[rec.I_DEVICES]["kind"]))
         law, many = self.case.fluid.law, [len(table) > 0 for table in self.tables]
         there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
-        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, many[rec.I_BASINS])
+        basins = tuple(int(kind) for kind in np.unique(self.tables[rec.I_BASINS]["kind"]))
+        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins)
         return functions(scene)
 
     @property
@@ -248,8 +245,8 @@ class Model:
             }  # fmt: skip
         nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
-        for (name, basin), row in zip(basins_of(self.case).items(), self.tables[rec.I_BASINS], strict=True):
-            found[name] = basin_fields(self, basin, row, y)
+        for basin in self.basins:
+            found[basin.name] = basin.fields(basin.of(y))
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
@@ -275,11 +272,11 @@ class Model:
             if row["y"] >= 0:
                 initial += float(row["mass"])
                 change += float(y[row["y"]])
-        for row in self.tables[rec.I_BASINS]:
-            n, cell = int(row["nx"] * row["ny"]), fluid.density * float(row["dx"] * row["dy"])
-            own, at = slice(row["y"], row["y"] + n), int(row["plan"])
-            initial += cell * float(np.sum(self.tables[rec.I_PLANE][at : at + n] + self.start[own]))
-            change += cell * float(np.sum(y[own] - self.start[own]))
+        for basin in self.basins:
+            rest, per = basin.mass()
+            own, start = basin.of(y)[0], basin.of(self.start)[0]
+            initial += rest + float(np.sum(per * start))
+            change += float(np.sum(per * (own - start)))
         for row in self.tables[rec.I_PISTONS]:  # what moving chambers hold is their excess and what was swept
             places = self.tables[rec.I_BODIES][[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)

@@ -85,7 +85,11 @@ class Start:
 
     def given_pressure(self, row, node) -> float:
         """Pressure [Pa] of a reservoir or tank at the start."""
-        if row["kind"] in (rec.TANK, rec.PATCH):
+        if row["kind"] == rec.PATCH and node.pressure is not None:
+            return node.pressure
+        if row["kind"] == rec.PATCH:
+            return self.case.ambient_pressure + self.weight * node.depth
+        if row["kind"] == rec.TANK:
             return self.case.ambient_pressure + self.weight * node.level
         return schedule_value(self.scene.tables, int(row["schedule"]), self.t)
 

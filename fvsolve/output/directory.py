@@ -36,7 +36,7 @@ class RunDirectory:
         if self.restart is None:
             _refuse(self.folder, force, resume)
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
-        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basin_names) > 0
+        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
 
     @property

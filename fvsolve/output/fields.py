@@ -28,7 +28,7 @@ class FieldSeries:
         self.folder = folder
         self.frames = 0
         self.points, self.lines = geometry(model) if model.pipes else (np.zeros((0, 3)), np.zeros((0, 2), dtype=int))
-        self.basins = {name: quads(model.case.nodes[name]) for name in model.basin_names}
+        self.basins = {basin.name: shape(basin) for basin in model.basins}
         self.pipes = [pipe.name for pipe in model.pipes]
         cells = [pipe.cells for pipe in model.pipes]
         self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
@@ -59,8 +59,8 @@ class FieldSeries:
         name = f"fields/{self.frames:06d}.vtu"
         for part, (basin, (points, cells)) in enumerate(self.basins.items(), 1):
             file = f"fields/{basin}-{self.frames:06d}.vtu"
-            found = {key: [value] for key, value in frame[basin].items()}
-            meshio.Mesh(points, [("quad", cells)], cell_data=found).write(self.folder / file)
+            found = {key: parted(value, cells) for key, value in frame[basin].items()}
+            meshio.Mesh(points, cells, cell_data=found).write(self.folder / file)
             self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
         if not self.pipes:
             self.frames += 1
@@ -99,15 +99,23 @@ def geometry(model) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(points), np.concatenate(lines)
 
 
-def quads(basin) -> tuple[np.ndarray, np.ndarray]:
-    """Corners float64[n, 3] [m] of a basin's cells, on their bed, and their numbers int[cells, 4], anticlockwise."""
-    (nx, ny), (wide, deep) = basin.cells, basin.size
-    x, y = np.meshgrid(np.linspace(0.0, wide, nx + 1), np.linspace(0.0, deep, ny + 1))
-    bed = (basin.elevation or 0.0) + basin.bed_slope[0] * x + basin.bed_slope[1] * y
-    origin = basin.position or (0.0, 0.0)
-    corner = (np.arange(ny)[:, None] * (nx + 1) + np.arange(nx)).ravel()
-    points = np.column_stack([origin[0] + x.ravel(), origin[1] + y.ravel(), bed.ravel()])
-    return points, np.column_stack([corner, corner + 1, corner + nx + 2, corner + nx + 1])
+def shape(basin) -> tuple[np.ndarray, list]:
+    """Corners float64[p, 3] [m] of a basin's cells, on their bed, and blocks of cells of a kind, in their order."""
+    mesh, part = basin.mesh, basin.part
+    x, y = np.ascontiguousarray(mesh.points.T)
+    bed = (part.elevation or 0.0) + (0.0 if part.bed is None else part.bed.at(x, y))
+    origin = part.position or (0.0, 0.0)
+    points = np.column_stack([origin[0] + x, origin[1] + y, np.broadcast_to(bed, x.shape)])
+    three = mesh.cells[:, 3] < 0
+    ends = np.flatnonzero(np.diff(three)) + 1
+    blocks = np.split(np.arange(len(three)), ends)
+    named = {True: ("triangle", 3), False: ("quad", 4)}
+    return points, [(named[three[b[0]]][0], mesh.cells[b, : named[three[b[0]]][1]]) for b in blocks]
+
+
+def parted(values: np.ndarray, blocks: list) -> list[np.ndarray]:
+    """Values of cells, block by block."""
+    return np.split(values, np.cumsum([len(cells) for _, cells in blocks])[:-1])
 
 
 def read_series(path: Path) -> list[tuple[float, Path]]:

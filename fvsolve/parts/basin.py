@@ -1,43 +1,50 @@
-"""A basin with a free surface in the plane. Knows its sides, its bed and who may join where; computes nothing."""
+"""A basin: fields in the plane. Knows its outline, its physics and who may join where; computes nothing."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
+from fvsolve.errors import listing
+from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
-from fvsolve.parts.table import Table, misfits
-from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Value, nonnegative, positive
+from fvsolve.parts.table import Table, at_most_one, misfits
+from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
 from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
+PHYSICS = ("free-surface", "liquid", "transport")
+OF_ONE = {  # keys that mean something to some physics alone
+    "level": ("free-surface",), "bed": ("free-surface",), "manning": ("free-surface",), "factor": ("free-surface",),
+    "pressure": ("liquid",), "wave_speed": ("liquid",), "velocity": ("transport",),
+    "thickness": ("liquid", "transport"),
+}  # fmt: skip
+NEEDS = {"free-surface": ("level",), "liquid": ("pressure", "thickness"), "transport": ("velocity",)}
+OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
 
 
 class Patch(Table):
-    """A stretch of a side that links may join as `BASIN.PATCH`."""
+    """A stretch of the outline: a place `BASIN.PATCH` that links may join, or a boundary that is no wall."""
 
-    side: Annotated[str, Choice("side", SIDES, "of the basin")]
+    side: Annotated[str | None, Choice("side", SIDES, "of a rectangle")] = None
     span: Annotated[
         tuple[float, float] | None,
         Rows("length", nonnegative, length=2, about="along the side, all of it if left out [m]"),
     ] = None
+    boundary: Annotated[str | None, Choice("boundary", ("wall", "open"), "a wall if left out")] = None
+    impedance: Annotated[
+        float | None, Quantity("number", nonnegative, "of the boundary to waves, pressure over velocity [Pa s/m]")
+    ] = None
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"),)
 
 
-class Dam(Table):
-    """A wall across the basin that is gone at the start."""
+class Inside(Value):
+    """A table of its own."""
 
-    x: Annotated[float, Quantity("length", positive, "where it stood [m]")]
-    level: Annotated[float, Quantity("level", nonnegative, "of the water beyond it, above the elevation [m]")]
+    def __init__(self, model: type[Table], about: str) -> None:
+        self.model, self.about = model, about
 
-
-class Broken(Value):
-    """The table of a dam."""
-
-    about = "a dam that is gone at the start: { x, level beyond it }"
-
-    def read(self, given: Any, setting: Setting) -> Dam:
-        return given if isinstance(given, Dam) else Dam.model_validate(given, context=setting)
+    def read(self, given: Any, setting: Setting) -> Table:
+        return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
 
 
 class Patches(Value):
@@ -75,67 +82,99 @@ class Cells(Value):
         return tuple(given)
 
 
+class Holes(Value):
+    """Rectangles that are cut out."""
+
+    about = "cut out of the rectangle, each [x0, y0, x1, y1] [m]"
+
+    def read(self, given: Any, setting: Setting) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(given, (list, tuple)) or (given and not isinstance(given[0], (list, tuple))):
+            raise ValueError(f"{show(given)} is no list of holes; wanted [[x0, y0, x1, y1], ...]")
+        return tuple(Rows("length", length=4).read(one, setting) for one in given)
+
+
+class MeshFile(Table):
+    """A mesh of triangles and quadrilaterals; groups of lines are patches."""
+
+    file: Annotated[str, Text("that meshio reads, relative to the case")]
+    unit: Annotated[str, Text("of its coordinates")] = "m"
+
+
+class Start(Table):
+    """What a basin starts from where that is not rest."""
+
+    level: Annotated[Formula | None, Shaped("length", "of the free surface above the elevation [m]")] = None
+    pressure: Annotated[Formula | None, Shaped("number", "of a liquid above that at rest [Pa]")] = None
+    u: Annotated[Formula, Shaped("number", "velocity along x [m/s]")] = even(0.0)
+    v: Annotated[Formula, Shaped("number", "velocity along y [m/s]")] = even(0.0)
+
+
 class Place(Node):
-    """A patch as a place: pressure of the water over its bed, flow into the cells behind it."""
+    """A patch as a place: pressure in the cells behind it, flow into them."""
 
     fixes_pressure: ClassVar[bool] = True
     kind: ClassVar[str] = "patch"
 
     basin: str
     patch: str
-    level: float
+    depth: float | None = None  # of water at rest, mean over the cells behind [m]
+    pressure: float | None = None  # of a liquid at rest [Pa]
 
 
 class Basin(Node, kind="basin"):
-    """Water over a bed between walls, h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed).
+    """Fields in the plane between walls, joined to the network by patches.
 
-    Places: its patches (pressure over the bed there, flow). Stored energy: rho times the integral of g h^2 / 2 + g h
-    bed + q^2 / (2 h) over the area [J].
+    free-surface: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction.
+    liquid: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0.
+    transport: (d phi)_t + div(d w phi) = div(d D grad phi), velocity w given.
     """
 
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
 
-    size: Annotated[tuple[float, float], Rows("length", positive, length=2, about="along x and y [m]")]
-    cells: Annotated[Any, Cells()]
-    level: Annotated[float, Quantity("level", nonnegative, "of the water at the start, above the elevation [m]")]
-    bed_slope: Annotated[
-        tuple[float, float],
-        Rows("number", length=2, about="rise of the bed along x and y, from 0 in the south-west [-]"),
-    ] = (0.0, 0.0)
-    dam: Annotated[Dam | None, Broken()] = None
+    physics: Annotated[str, Choice("physics", PHYSICS)] = "free-surface"
+    size: Annotated[tuple[float, float] | None, Rows("length", positive, length=2, about="along x and y [m]")] = None
+    cells: Annotated[Any, Cells()] = None
+    grading: Annotated[
+        tuple[float, float] | None,
+        Rows("number", positive, length=2, about="last over first spacing, along x and y, 1 if left out [-]"),
+    ] = None
+    holes: Annotated[Any, Holes()] = None
+    mesh: Annotated[MeshFile | None, Inside(MeshFile, "a mesh in place of a rectangle: { file, unit }")] = None
     patches: Annotated[Any, Patches()] = {}
+    start: Annotated[Start | None, Inside(Start, "where the start is not rest: { level | pressure, u, v }")] = None
+
+    level: Annotated[float | None, Quantity("level", anything, "of the water at rest, above the elevation [m]")] = None
+    bed: Annotated[Formula | None, Shaped("length", "height above the elevation, 0 if left out [m]")] = None
+    manning: Annotated[float | None, Quantity("number", nonnegative, "Manning's n [s/m^(1/3)]")] = None
+    factor: Annotated[float | None, Quantity("number", nonnegative, "friction factor after Darcy [-]")] = None
+
+    pressure: Annotated[float | None, Quantity("pressure", positive, "at rest")] = None
+    thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]")] = None
+    wave_speed: Annotated[float | None, Quantity("velocity", positive, "the fluid's own if left out [m/s]")] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        physics = given.get("physics", "free-surface")
+        faults = at_most_one(given, ("manning", "factor"))
+        if physics in PHYSICS:
+            for key, goes in OF_ONE.items():
+                if key in given and physics not in goes:
+                    faults.append(((key,), f"means nothing to physics {show(physics)}; it goes with {listing(goes)}"))
+            faults += [((), f"{key} is missing") for key in NEEDS[physics] if key not in given]
+        if "mesh" in given:
+            faults += [((key,), "goes with rectangles; the basin has a mesh") for key in OUTLINE if key in given]
+        else:
+            faults += [((), f"{key} is missing") for key in OUTLINE[:2] if key not in given]
+        for name, one in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
+            side = isinstance(one, dict) and "side" in one
+            if side and "mesh" in given:
+                faults.append((("patches", name), "has its faces from the mesh; leave side and span out"))
+            elif isinstance(one, dict) and not side and "mesh" not in given:
+                faults.append((("patches", name), "side is missing"))
+        return faults
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
         patches = given.get("patches")
         return tuple(patches) if isinstance(patches, dict) else ()
-
-    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        return {
-            f"{name}.{patch}": Place.model_construct(
-                elevation=(self.elevation or 0.0) + bed if self.elevation is not None or bed else None, position=None,
-                basin=name, patch=patch, level=self.level - bed,
-            )
-            for patch, bed in ((patch, float(self.bed_at(self.span_of(patch)).mean())) for patch in self.patches)
-        }, {}  # fmt: skip
-
-    def centres(self) -> tuple[np.ndarray, np.ndarray]:
-        """x and y of all cells, row by row [m]."""
-        (nx, ny), (wide, deep) = self.cells, self.size
-        x, y = np.meshgrid((np.arange(nx) + 0.5) * wide / nx, (np.arange(ny) + 0.5) * deep / ny)
-        return x.ravel(), y.ravel()
-
-    def bed_at(self, cells: np.ndarray) -> np.ndarray:
-        """Height of the bed of cells above the elevation [m]."""
-        x, y = self.centres()
-        return (self.bed_slope[0] * x + self.bed_slope[1] * y)[cells]
-
-    def span_of(self, patch: str) -> np.ndarray:
-        """Numbers of the cells behind a patch."""
-        (nx, ny), one = self.cells, self.patches[patch]
-        along, count = (self.size[1], ny) if one.side in ("west", "east") else (self.size[0], nx)
-        low, high = one.span or (0.0, along)
-        at = np.arange(round(low / along * count), max(round(high / along * count), round(low / along * count) + 1))
-        at = at[(at >= 0) & (at < count)]
-        return {"west": at * nx, "east": at * nx + nx - 1, "south": at, "north": (ny - 1) * nx + at}[one.side]

@@ -1,0 +1,73 @@
+"""A free surface over a bed: the lake at rest about which its states deviate. Knows no network."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.case.basins import bed_of
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.plane import shallow
+from fvsolve.model.basins.basin import Basin
+
+SCALE = 0.1  # [m] of depth
+
+
+class FreeSurface(Basin, physics="free-surface"):
+    """Shallow water, states depth [m] and flows per width [m2/s]."""
+
+    quantities = ("depth", "flow_x", "flow_y")
+    units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
+
+    def __init__(self, case, name: str) -> None:
+        super().__init__(case, name)
+        self.bed = bed_of(self.part, self.mesh)
+        self.depth = np.maximum(self.part.level - self.bed, 0.0)
+
+    def scales(self) -> list[float]:
+        flow = SCALE * np.sqrt(self.case.gravity * SCALE)
+        return [SCALE, flow, flow]
+
+    def lower(self, scene, row) -> None:
+        plan = np.zeros((shallow.PLANS, self.n))
+        plan[shallow.DEPTH], plan[shallow.SURFACE] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
+        part = self.part
+        if part.manning is not None or part.factor is not None:
+            row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
+            row["roughness"] = part.factor if part.manning is None else part.manning
+        if self.is_grid:
+            self.lower_grid(scene, row, plan)
+        else:
+            self.lower_faces(scene, row, plan)
+        row["plan"] = scene.to_plane(plan)
+
+    def lower_grid(self, scene, row, plan: np.ndarray) -> None:
+        grid = self.mesh.grid
+        row["kind"] = rec.SHALLOW_GRID
+        work, still = np.zeros(shallow.work_size(grid.nx, grid.ny)), np.zeros((3, self.n))
+        shallow.grid_rates(
+            self.case.gravity, row["limiter"] if row["scheme"] != rec.UPWIND else shallow.NO_SLOPE, grid.nx, grid.ny,
+            1.0 / np.diff(grid.x)[0], 1.0 / np.diff(grid.y)[0], plan, *np.zeros((3, self.n)), work, *still,
+        )  # fmt: skip
+        plan[2:] = still
+        row["work"] = scene.to_plane(work)
+
+    def start(self) -> np.ndarray:
+        found, given = np.zeros((3, self.n)), self.part.start
+        depth = self.depth
+        if given is not None and given.level is not None:
+            depth = np.maximum(self.formula(given.level) - self.bed, 0.0)
+            found[0] = depth - self.depth
+        if given is not None:
+            found[1], found[2] = depth * self.formula(given.u), depth * self.formula(given.v)
+        return found
+
+    def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
+        depth = np.maximum(self.depth + y[0], 0.0)
+        bed, wet = self.bed + (self.part.elevation or 0.0), np.maximum(depth, shallow.THIN)
+        share = 2.0 * depth / (depth * depth + wet * wet)
+        velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
+        return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
+
+    def mass(self) -> tuple[float, np.ndarray]:
+        per = self.case.properties.density * self.mesh.area
+        return float(np.sum(per * self.depth)), per
