@@ -6,7 +6,7 @@ flux; the system is linear, so that one direction after the other has the full o
 read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
 """
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.ends import entering_cells, leaving_cells
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
 from fvsolve.kernels.reconstruction import value_muscl, value_weno5
@@ -67,7 +67,7 @@ def image(j, n):
     return j % (2 * n) >= n
 
 
-@njit
+@inner
 def mirror(n, forward, backward):
     """Fill three values beyond either end of [3 : n + 3] of two waves: each becomes the other."""
     for k in range(BEYOND):
@@ -123,14 +123,14 @@ def close_row(scheme, limiter, small, reflect, n, entering, leaving, first, step
             entering[at], leaving[at] = near_in[BEYOND - 1 - k], near_out[BEYOND - 1 - k]
 
 
-@njit
+@inner
 def send_back(reflect, leaving, entering):
     """What enters at a side's faces is what leaves there, times `reflect`."""
     for i in range(entering.size):
         entering[i] = reflect[i] * leaving[i]
 
 
-@njit
+@inner
 def put_waves(half, r, m, forward, backward):
     """Both waves of a row of cells; half : c / 2."""
     for i in range(r.size):
@@ -138,7 +138,7 @@ def put_waves(half, r, m, forward, backward):
         forward[i], backward[i] = a + b, a - b
 
 
-@njit
+@inner
 def settle_row(c, k, forward, backward, rate_r, rate_m, rate_t):
     """Rates of a row of cells from faces i and i + 1."""
     f, b = forward[1:], backward[1:]
@@ -148,7 +148,7 @@ def settle_row(c, k, forward, backward, rate_r, rate_m, rate_t):
         rate_t[i] = 0.0
 
 
-@njit
+@inner
 def settle_column(c, k, f0, b0, f1, b1, rate_r, rate_m):
     """The same, added, of a row of cells between two rows of faces."""
     ck = c * k

@@ -9,7 +9,7 @@ of sound); the velocity along the face comes from the side that the flow comes f
 
 from math import sqrt
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
 from fvsolve.kernels.plane.liquid import (
     BEYOND,
@@ -43,7 +43,7 @@ def log_sum(y):
     return 8.0 * t * (1.0 + z * (1.0 / 3.0 + z * p))
 
 
-@njit
+@inner
 def put_primitives(c0, rho, kx, ky, r, mx, my, w, u, v, top):
     """w = 2 (c0 - c) and both velocities of a row [m/s]; top[i] the greatest (|u| + c) kx + (|v| + c) ky so far."""
     per, twice = 1.0 / rho, 2.0 * c0
@@ -94,7 +94,7 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
             f[i] = c[i] + s if on else d[i] - s
 
 
-@njit
+@inner
 def fluxes(c0, rho, forward, backward, along):
     """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them."""
     bulk, per = rho * c0 * c0, 0.5 / c0
@@ -105,7 +105,7 @@ def fluxes(c0, rho, forward, backward, along):
         along[i] = mass * along[i]
 
 
-@njit
+@inner
 def settle_row(k, mass, push, along, rate_r, rate_m, rate_t):
     """Rates of a row of cells from faces i and i + 1."""
     m, p, t = mass[1:], push[1:], along[1:]
@@ -115,7 +115,7 @@ def settle_row(k, mass, push, along, rate_r, rate_m, rate_t):
         rate_t[i] = k[i] * (along[i] - t[i])
 
 
-@njit
+@inner
 def settle_column(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
     """The same, added, of a row of cells between two rows of faces."""
     for i in range(rate_r.size):
