@@ -326,11 +326,14 @@ BASIN = np.dtype(
         ("area", "i8"),  # of cells [m2]
         ("reflect", "i8"),  # what comes back of waves, a value for each face of the boundary
         ("outer_given", "i8"),  # how many values these are: 0 for walls everywhere
+        ("open", "i8"),  # node of the first patch that is no wall, to whom what passes is booked; -1 for none
         ("mesh", "i8"),  # numbers of a mesh, in `plane` and
         ("links", "i8"),  # in `integers`
         ("work", "i8"),
         ("thickness", "f8"),  # [m]
-        ("speed", "f8"),  # of waves in a liquid [m/s]
+        ("speed", "f8"),  # of waves in a liquid at rest [m/s]
+        ("density", "f8"),  # of a liquid at rest [kg/m3]
+        ("small", "f8"),  # what is too small to mean anything, squared
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
         ("roughness", "f8"),  # Manning's n, or a factor
     ],

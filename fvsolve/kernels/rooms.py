@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from fvsolve.kernels.devices.loops import loops_of
-from fvsolve.kernels.records import ACOUSTIC_FACES, ACOUSTIC_GRID, SHALLOW_FACES, SHALLOW_GRID
+from fvsolve.kernels.records import ACOUSTIC_FACES, ACOUSTIC_GRID, LIQUID_GRID, SHALLOW_FACES, SHALLOW_GRID
 
 HOME = "fvsolve.kernels"
 
@@ -74,6 +74,7 @@ BASINS = {  # kind of basin
     SHALLOW_FACES: Room(after="plane.rooms: shallow_meshes"),
     ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
     ACOUSTIC_FACES: Room(after="plane.rooms: acoustic_meshes"),
+    LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
 }
 ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 

@@ -100,7 +100,10 @@ class Basin:
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = scene.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         given = self.reflects()
-        row["reflect"], row["outer_given"] = scene.to_plane(given), given.size
+        row["reflect"], row["outer_given"], row["open"] = scene.to_plane(given), given.size, -1
+        if given.size:
+            known = (name for name, patch in self.part.patches.items() if self.reflection(patch) != 1.0)
+            row["open"] = scene.node_index[f"{self.name}.{next(known)}"]
         self.lower(scene, row)
         first, *others = ([f"{self.name}.{what}[{i}]" for i in range(self.n)] for what in self.quantities)
         scales = self.scales()
