@@ -65,6 +65,7 @@ ROOMS = {
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
     "basins": Room(before="plane.basin: patch_pressures", after="plane.basin: basin_rates"),
+    "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
@@ -87,6 +88,7 @@ class Scene:
     memory: bool = False
     kinds: tuple[int, ...] = ()
     basins: bool = False
+    scalars: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -102,10 +104,12 @@ class Scene:
         for kind in self.kinds:
             loops = loops_of(kind)
             yield Room(**{job: f"{loops.__name__}: {job}" for job in vars(Room()) if hasattr(loops, job)})
-        if self.basins:
-            yield ROOMS["basins"]
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
+        if self.scalars:  # carried by the flow that rates of waves now have; basins take what comes to patches
+            yield ROOMS["scalars"]
+        if self.basins:
+            yield ROOMS["basins"]
         yield ALWAYS
 
     def functions(self, *jobs: str) -> list:
