@@ -14,9 +14,11 @@ from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
 
-HOLDERS = {"cylinder": "its chambers carry", "rigid-column": "it has no cells that carry"}
-HOLDERS |= dict.fromkeys(("accumulator", "air-valve", "basin"), "its contents carry")
-REMEDIES = {"rigid-column": "; wanted a pipe"}
+HOLDERS = {
+    "cylinder": "its chambers carry no scalars yet",
+    "rigid-column": "it has no cells to carry scalars; use a pipe",
+}
+HOLDERS |= dict.fromkeys(("accumulator", "air-valve", "basin"), "its contents carry no scalars yet")
 TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure", "depth", "bed",
          "surface"}  # fmt: skip
 TAKEN |= {name for kinds in KINDS.values() for kind in kinds.values() for name in kind.quantities}
@@ -39,8 +41,7 @@ def misfits(
                     yield (group, name, "scalars", scalar), said
             if scalars and part.kind in HOLDERS:
                 article = "an" if part.kind[0] in "aeiou" else "a"
-                said = f"is {article} {part.kind}; {HOLDERS[part.kind]} no scalars yet{REMEDIES.get(part.kind, '')}"
-                yield (group, name), said
+                yield (group, name), f"is {article} {part.kind}; {HOLDERS[part.kind]}"
     if not scalars:
         return
     if fluid is not None and fluid.law != "linear":
