@@ -105,7 +105,7 @@ PIPE = np.dtype(
             "i8",
         ),  # offsets in `profile`: mass per length at faces, momentum flux there, mass at centres
         ("flux", "i8"),
-        ("center", "i8"),
+        ("center", "i8"),  # the last with scalars under the linear law too
         ("from_base", "f8"),  # laws log and table: flow into the node that the profile computes to
         ("to_base", "f8"),
         ("from_mass", "f8"),  # and the mass per length at the end that it computes to [kg/m]
@@ -282,6 +282,11 @@ LAYOUT = np.dtype(
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
         ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
         ("drive", "i8"),  # relative speeds of pumps now, one a valve
+        ("gain", "i8"),  # amounts of each scalar that enter by nodes, then what decays, behind `supply` in the ledger
+        ("value", "i8"),  # of each scalar at all nodes
+        ("edge", "i8"),  # values that the water of pipes has at both ends
+        ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
+        ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
         ("size", "i8"),
     ],
     align=True,
@@ -301,11 +306,13 @@ PROBE = np.dtype(
         ("offset", "f8"),
         ("head", "i8"),  # laws log and table: 1 a head, 2 a velocity
         ("mass", "f8"),  # laws log and table: mass per length of the profile there [kg/m]
+        ("scalar", "i8"),
     ],
     align=True,
 )
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
+NODE_SCALAR, PIPE_SCALAR = 13, 14
 
 SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, ACOUSTIC_FACES, LIQUID_GRID, LIQUID_FACES = 0, 1, 2, 3, 4, 5
 CARRIED_GRID, CARRIED_FACES = 6, 7  # kinds of basins: physics, law of the liquid, grid or loop over faces
@@ -351,6 +358,20 @@ PATCHES = np.dtype(
     align=True,
 )
 
+SCALAR = np.dtype(
+    [
+        ("y", "i8"),  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes that store
+        ("places", "i8"),  # offset in `integers`, one a node: where its amount is in y, or the schedule of its value
+        ("diffusivity", "f8"),
+        ("decay", "f8"),  # [1/s]
+        ("ambient", "f8"),  # what it decays to
+        ("initial", "f8"),  # what flows in where nothing else is said
+        ("least", "f8"),  # bounds of all values that there can be
+        ("greatest", "f8"),
+    ],
+    align=True,
+)
+
 RECORDS = {
     "settings": SETTINGS,
     "layout": LAYOUT,
@@ -368,6 +389,7 @@ RECORDS = {
     "devices": DEVICE,
     "basins": BASIN,
     "patches": PATCHES,
+    "scalars": SCALAR,
 }
 ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare", "plane")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
@@ -389,6 +411,7 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_DEVICES,
     I_BASINS,
     I_PATCHES,
+    I_SCALARS,
     I_INTEGERS,
     I_FLOATS,
     I_PROFILE,

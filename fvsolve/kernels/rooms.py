@@ -66,6 +66,7 @@ ROOMS = {
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
     "patches": Room(before="plane.patches: patch_pressures", after="plane.patches: patch_flows"),
+    "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
@@ -95,6 +96,7 @@ class Scene:
     memory: bool = False
     kinds: tuple[int, ...] = ()
     basins: tuple[int, ...] = ()
+    scalars: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -110,12 +112,14 @@ class Scene:
         for kind in self.kinds:
             loops = loops_of(kind)
             yield Room(**{job: f"{loops.__name__}: {job}" for job in vars(Room()) if hasattr(loops, job)})
+        if self.memory:
+            yield ROOMS["memory" if linear else "memory, barotropic"]
         for kind in self.basins:
             yield BASINS[kind]
         if self.basins:
             yield ROOMS["patches"]
-        if self.memory:
-            yield ROOMS["memory" if linear else "memory, barotropic"]
+        if self.scalars:  # carried by the flow that rates of waves now have
+            yield ROOMS["scalars"]
         yield ALWAYS
 
     def functions(self, *jobs: str) -> list:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.scalars import node_values, pipe_values
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
@@ -103,7 +104,8 @@ class Model:
         law, many = self.case.fluid.law, [len(table) > 0 for table in self.tables]
         there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
         basins = tuple(int(kind) for kind in np.unique(self.tables[rec.I_BASINS]["kind"]))
-        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins)
+        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins,
+                      many[rec.I_SCALARS])  # fmt: skip
         return functions(scene)
 
     @property
@@ -241,7 +243,7 @@ class Model:
             found[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / swollen,
                 "flow": flow, "least_pressure": np.minimum(low, pressure),
-                "greatest_pressure": np.maximum(high, pressure),
+                "greatest_pressure": np.maximum(high, pressure), **pipe_values(self, k, y),
             }  # fmt: skip
         nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
@@ -252,8 +254,8 @@ class Model:
             pressure = float(nodes[i]["pressure"] + out[at + i])
             found["nodes"][name] = {
                 "pressure": pressure,
-                "head": float(self.head(pressure, self.elevation[name])),
-            }
+                "head": float(self.head(pressure, self.elevation[name])), **node_values(self, i, out),
+            }  # fmt: skip
         return found
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:

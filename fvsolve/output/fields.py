@@ -30,6 +30,7 @@ class FieldSeries:
         self.points, self.lines = geometry(model) if model.pipes else (np.zeros((0, 3)), np.zeros((0, 2), dtype=int))
         self.basins = {basin.name: shape(basin) for basin in model.basins}
         self.pipes = [pipe.name for pipe in model.pipes]
+        self.quantities = (*QUANTITIES, *model.case.scalars)
         cells = [pipe.cells for pipe in model.pipes]
         self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
 
@@ -65,7 +66,7 @@ class FieldSeries:
         if not self.pipes:
             self.frames += 1
             return
-        data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in QUANTITIES}
+        data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.quantities}
         data["pipe"] = [self.pipe]
         meshio.Mesh(self.points, [("line", self.lines)], cell_data=data).write(self.folder / name)
         self._list(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')

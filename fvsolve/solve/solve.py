@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
+from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.summary import (
     Event,
@@ -298,9 +299,11 @@ class Run:
         model, loop = self.model, self.loop
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
-        ledger = mass_ledger(model, loop.now, loop.stepper.ledger[: len(model.node_names)])
+        ledger = loop.stepper.ledger[: loop.stepper.ledger.size // 2]
+        ledgers = {"mass": mass_ledger(model, loop.now, ledger[: len(model.node_names)])}
+        ledgers |= scalar_ledgers(model, loop.now, ledger)
         summary = Summary(
-            reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
+            reason, reason == "finished", loop.t, find_marks(model), ledgers, find_extremes(model),
             find_envelope(model), loop.stepper.counts(), self.methods(), model.cells, self.seconds, self.setup,
             [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model),
         )  # fmt: skip
