@@ -12,6 +12,7 @@ from fvsolve.case.sections import Numerics
 from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
+from fvsolve.parts.formula import Formula
 from fvsolve.parts.series import find_file
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.steppers.methods import AUTO, METHODS
@@ -66,7 +67,7 @@ def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     """Patches as places, at the mean height of the bed behind them."""
     found, bed = {}, bed_of(basin, mesh)
-    for patch in patch_names(mesh) if basin.physics != "transport" else ():
+    for patch in patch_names(mesh):
         cells = behind(mesh, patch)
         height = float(np.average(bed[cells], weights=mesh.area[cells]))
         depth = None
@@ -100,6 +101,8 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; patches are {listing(known) or 'none'}"
+            elif f"{name}.{patch}" in joined and basin.physics == "transport":
+                yield (*key, "patches", patch), "a link joins here, but what flows is given by velocity"
             elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:
                 what = "boundary" if one.boundary else "impedance"
                 yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
@@ -112,6 +115,10 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics
             other = {"free-surface": "pressure", "liquid": "level", "transport": "u"}[basin.physics]
             if getattr(basin.start, other) is not None:
                 yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
+        shapes |= {("scalars", scalar): shape for scalar, shape in basin.scalars.items()}
+        if basin.velocity is not None:
+            given = basin.velocity.given.items()
+            shapes |= {("velocity", what): shape for what, shape in given if isinstance(shape, Formula)}
         for below, shape in shapes.items():
             try:
                 if shape is not None:

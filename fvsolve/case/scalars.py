@@ -8,7 +8,7 @@ from typing import Any
 
 from fvsolve.case.sections import Numerics
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import KINDS, Chamber, Inflow, Pipe, Reservoir, Tank
+from fvsolve.parts import KINDS, Basin, Chamber, Inflow, Pipe, Reservoir, Tank
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
 
@@ -18,7 +18,7 @@ HOLDERS = {
     "cylinder": "its chambers carry no scalars yet",
     "rigid-column": "it has no cells to carry scalars; use a pipe",
 }
-HOLDERS |= dict.fromkeys(("accumulator", "air-valve", "basin"), "its contents carry no scalars yet")
+HOLDERS |= dict.fromkeys(("accumulator", "air-valve"), "its contents carry no scalars yet")
 TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure", "depth", "bed",
          "surface"}  # fmt: skip
 TAKEN |= {name for kinds in KINDS.values() for kind in kinds.values() for name in kind.quantities}
@@ -39,6 +39,15 @@ def misfits(
             for scalar, value in getattr(part, "scalars", {}).items():
                 if (said := _wrong(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), said
+            if scalars and getattr(part, "physics", "") == "liquid":
+                yield (group, name), "is a basin of liquid, whose waves carry no scalars; wanted a free surface"
+            for patch, one in getattr(part, "patches", {}).items():
+                for scalar in one.scalars:
+                    place = (group, name, "patches", patch, "scalars", scalar)
+                    if scalar not in scalars:
+                        yield place, _unknown(scalar, scalars)
+                    elif part.physics != "transport":
+                        yield place, "comes with what links bring; it goes with a given velocity alone"
             if scalars and part.kind in HOLDERS:
                 article = "an" if part.kind[0] in "aeiou" else "a"
                 yield (group, name), f"is {article} {part.kind}; {HOLDERS[part.kind]}"
@@ -57,10 +66,16 @@ def misfits(
 def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:
     """What is wrong with the value of a scalar that a part states."""
     if scalar not in scalars:
-        near = did_you_mean(scalar, scalars) or (f"; scalars are {listing(scalars)}" if scalars else "")
-        return f"no scalar named {show(scalar)}{near}" + ("" if scalars else f"; declare it as [scalars.{scalar}]")
+        return _unknown(scalar, scalars)
+    if isinstance(part, Basin):
+        return None
     if isinstance(part, (Tank, Chamber)) and not value.constant:
         return "is what it holds at the start; wanted a number, no schedule"
     if not isinstance(part, (Pipe, Tank, Chamber, Reservoir, Inflow)):
         return f"a {part.kind} has none of its own; wanted an inflow, a reservoir, a tank, a chamber or a pipe"
     return None
+
+
+def _unknown(scalar: str, scalars: dict[str, Any]) -> str:
+    near = did_you_mean(scalar, scalars) or (f"; scalars are {listing(scalars)}" if scalars else "")
+    return f"no scalar named {show(scalar)}{near}" + ("" if scalars else f"; declare it as [scalars.{scalar}]")

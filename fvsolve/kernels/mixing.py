@@ -220,8 +220,6 @@ def exchange(t, y, dydt, out, tables, q):
         kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
         if kind == FIXED:
             out[gain + i] = -out[brought + i]
-        elif kind == PATCH:
-            out[gain + i] = 0.0
         elif kind == JUNCTION and supply > 0.0:
             out[gain + i] = supply * given_value(t, tables, q, i)
         else:

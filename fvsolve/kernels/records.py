@@ -341,6 +341,12 @@ BASIN = np.dtype(
         ("speed", "f8"),  # of waves in a liquid at rest [m/s]
         ("density", "f8"),  # of a liquid at rest [kg/m3]
         ("small", "f8"),  # what is too small to mean anything, squared
+        ("carried", "i8"),  # first state of scalars, depth times value, one after the other; -1 for none
+        ("flows", "i8"),  # flows through faces: of columns, then of rows, or of a mesh; -1 where nobody asks
+        ("outside", "i8"),  # of each scalar, values beyond the boundary
+        ("toil", "i8"),  # what scalars are carried in
+        ("fastest", "f8"),  # rate of a given velocity [1/s]
+        ("period", "f8"),  # of its turning back [s]; 0 for none
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
         ("roughness", "f8"),  # Manning's n, or a factor
     ],
@@ -354,6 +360,9 @@ PATCHES = np.dtype(
         ("first", "i8"),  # of its cells in `integers`
         ("count", "i8"),
         ("area", "f8"),  # of these [m2]
+        ("ring", "i8"),  # of its faces' numbers in `integers`, as the boundary has them
+        ("faces", "i8"),  # how many these are
+        ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
     ],
     align=True,
 )

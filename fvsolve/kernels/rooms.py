@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from fvsolve.kernels.devices.loops import loops_of
-from fvsolve.kernels.records import ACOUSTIC_FACES, ACOUSTIC_GRID, LIQUID_GRID, SHALLOW_FACES, SHALLOW_GRID
+from fvsolve.kernels.records import (
+    ACOUSTIC_FACES,
+    ACOUSTIC_GRID,
+    CARRIED_GRID,
+    LIQUID_GRID,
+    SHALLOW_FACES,
+    SHALLOW_GRID,
+)
 
 HOME = "fvsolve.kernels"
 
@@ -66,9 +73,14 @@ ROOMS = {
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
     "patches": Room(before="plane.patches: patch_pressures", after="plane.patches: patch_flows"),
+    "values": Room(after="plane.carried: patch_values"),
     "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
+}  # fmt: skip
+GRIDS = (SHALLOW_GRID, CARRIED_GRID)
+CARRIED = {  # scalars in basins, on grids and on other meshes
+    True: Room(after="plane.carried: carried_rates"), False: Room(after="plane.carried_faces: carried_rates"),
 }  # fmt: skip
 BASINS = {  # kind of basin
     SHALLOW_GRID: Room(after="plane.rooms: shallow_grids"),
@@ -115,11 +127,13 @@ class Scene:
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
         for kind in self.basins:
-            yield BASINS[kind]
+            yield BASINS.get(kind, Room())
         if self.basins:
             yield ROOMS["patches"]
         if self.scalars:  # carried by the flow that rates of waves now have
+            yield ROOMS["values"] if self.basins else Room()
             yield ROOMS["scalars"]
+            yield from (CARRIED[grid] for grid in (True, False) if any((kind in GRIDS) == grid for kind in self.basins))
         yield ALWAYS
 
     def functions(self, *jobs: str) -> list:

@@ -44,7 +44,7 @@ class BarotropicStart(Start):
 
     def given_pressure(self, row, node) -> float:
         if row["kind"] == rec.PATCH:
-            return node.pressure
+            return self.case.ambient_pressure if node.pressure is None else node.pressure
         if row["kind"] == rec.TANK:
             return head_pressure(self.st, self.floats, float(node.level))
         value = schedule_value(self.scene.tables, int(row["schedule"]), self.t)

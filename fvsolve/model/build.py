@@ -42,6 +42,9 @@ def build(case) -> Model:
     return scene.model()
 
 
+LINE = 8  # floats of a cache line
+
+
 class Scene:
     """The tables of one model while they are filled."""
 
@@ -76,10 +79,18 @@ class Scene:
         return self.size - len(names)
 
     def to_plane(self, values: np.ndarray) -> int:
-        """Offset of new values in `plane`."""
-        self.pieces_of_plane.append(np.ravel(values))
-        self.plane_size += values.size
-        return self.plane_size - values.size
+        """Offset of new values in `plane`, where a cache line begins."""
+        self.pieces_of_plane.append(np.append(np.ravel(values), np.zeros(-values.size % LINE)))
+        self.plane_size += self.pieces_of_plane[-1].size
+        return self.plane_size - self.pieces_of_plane[-1].size
+
+    def plane(self) -> np.ndarray:
+        """All values of the plane, from a cache line on."""
+        room = np.zeros(self.plane_size + LINE)
+        first = -(room.ctypes.data // 8) % LINE
+        made = room[first : first + self.plane_size]
+        np.concatenate([np.zeros(0), *self.pieces_of_plane], out=made)
+        return made
 
     @property
     def device_names(self) -> list[str]:
@@ -347,7 +358,7 @@ class Scene:
             np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
             np.zeros(max((5 if many else 4) * most + 64, system, 2 * len(self.body_table), 4 * carried)), marks,
             np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at),
-            np.concatenate([np.zeros(0), *self.pieces_of_plane]),
+            self.plane(),
             pieces, envelope, extremes,
         )  # fmt: skip
 

@@ -248,7 +248,7 @@ class Model:
         nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
         for basin in self.basins:
-            found[basin.name] = basin.fields(basin.of(y))
+            found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
@@ -276,9 +276,9 @@ class Model:
                 change += float(y[row["y"]])
         for basin in self.basins:
             rest, per = basin.mass()
-            own, start = basin.of(y)[0], basin.of(self.start)[0]
-            initial += rest + float(np.sum(per * start))
-            change += float(np.sum(per * (own - start)))
+            for own, start in zip(basin.of(y)[:1], basin.of(self.start)[:1], strict=True):
+                initial += rest + float(np.sum(per * start))
+                change += float(np.sum(per * (own - start)))
         for row in self.tables[rec.I_PISTONS]:  # what moving chambers hold is their excess and what was swept
             places = self.tables[rec.I_BODIES][[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)

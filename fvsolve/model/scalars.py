@@ -43,9 +43,13 @@ def bounds(case, name: str) -> tuple[float, float]:
     """Least and greatest value of a scalar that there can be, as nothing but what is stated is mixed."""
     scalar = case.scalars[name]
     said = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
-    for part in [*case.places.values(), *case.links.values()]:
+    patches = [patch for basin in case.meshes for patch in case.nodes[basin].patches.values()]
+    for part in [*case.places.values(), *case.links.values(), *patches]:
         given = getattr(part, "scalars", {}).get(name)
         said += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
+    for basin, mesh in case.meshes.items():
+        if name in case.nodes[basin].scalars:
+            said += case.nodes[basin].scalars[name].at(*np.ascontiguousarray(mesh.centre.T)).tolist()
     return min(said), max(said)
 
 
@@ -110,6 +114,8 @@ def amount(model, row, y: np.ndarray) -> float:
     for pipe in pipes:
         at = int(row["y"] + pipe["cell"])
         total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
+    q = int(np.flatnonzero(model.tables[rec.I_SCALARS]["places"] == row["places"])[0])
+    total += sum(float(np.sum(basin.held() * basin.amounts(y)[q])) for basin in model.basins)
     places = model.tables[rec.I_INTEGERS][row["places"] : row["places"] + len(nodes)]
     return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.errors import listing
 from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
+from fvsolve.parts.scalar import Carried
+from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.table import Table, at_most_one, misfits
 from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
 from fvsolve.units import show
@@ -34,6 +37,7 @@ class Patch(Table):
     impedance: Annotated[
         float | None, Quantity("number", nonnegative, "of the boundary to waves, pressure over velocity [Pa s/m]")
     ] = None
+    scalars: Annotated[dict[str, Any], Carried("of scalars that the given velocity brings in")] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"),)
 
 
@@ -109,6 +113,51 @@ class Start(Table):
     v: Annotated[Formula, Shaped("number", "velocity along y [m/s]")] = even(0.0)
 
 
+@dataclass(frozen=True)
+class Velocity:
+    """A given velocity: `way` "u, v" | "stream" | "expression" | "file", what it takes, and when it turns back [s].
+
+    given : {"u": Formula, "v": Formula} | {"stream": Formula} | {"expression": name, its parameters} | {"file": path}
+    """
+
+    way: str
+    given: dict[str, Any]
+    period: float | None
+    said: dict[str, Any]
+
+    def table(self) -> dict[str, Any]:
+        """What the file would say."""
+        return self.said
+
+
+class Flowing(Value):
+    """A velocity: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
+
+    about = "{ u, v } or { stream }, formulas of x and y in SI, { expression, its parameters } or { file }; and period"
+
+    def read(self, given: Any, setting: Setting) -> Velocity:
+        if isinstance(given, Velocity):
+            return given
+        ways = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
+        if not ways or (len(ways) > 1 and ways != ["u", "v"]):
+            raise ValueError(f"{show(given)}; wanted {self.about}")
+        found = {key: value for key, value in given.items() if key != "period"}
+        period, said = None, dict(given)
+        if "period" in given:
+            period = said["period"] = Quantity("time", positive).read(given["period"], setting)
+        way = "u, v" if ways[0] in "uv" else ways[0]
+        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(found))
+        faults = [((key,), f"unknown key; wanted {listing([*known, 'period'])}") for key in found if key not in known]
+        if faults:
+            raise Misfit(faults)
+        if way in ("u, v", "stream"):
+            found = {key: Shaped("number").read(found.get(key, 0.0), setting) for key in known}
+        elif way == "file":
+            path = find_file(str(found["file"]), setting)
+            found, said["file"] = {"file": path}, copy_name(path, setting)
+        return Velocity(way, found, period, said)
+
+
 class Place(Node):
     """A patch as a place: pressure in the cells behind it, flow into them."""
 
@@ -152,6 +201,9 @@ class Basin(Node, kind="basin"):
     pressure: Annotated[float | None, Quantity("pressure", positive, "at rest")] = None
     thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]")] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "the fluid's own if left out [m/s]")] = None
+
+    velocity: Annotated[Any, Flowing()] = None
+    scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:

@@ -71,3 +71,9 @@ class FreeSurface(Basin, physics="free-surface"):
     def mass(self) -> tuple[float, np.ndarray]:
         per = self.case.properties.density * self.mesh.area
         return float(np.sum(per * self.depth)), per
+
+    def depth_of(self, y: np.ndarray) -> np.ndarray:
+        return np.maximum(self.depth + y[0], 0.0)
+
+    def held(self) -> np.ndarray:
+        return self.case.properties.density * self.mesh.area

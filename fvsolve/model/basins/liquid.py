@@ -76,3 +76,6 @@ class Liquid(Basin, physics="liquid"):
         if self.linear:
             density *= 1.0 + (self.part.pressure - fluid.pressure) / (self.density * self.speed**2)
         return float(np.sum(per)) * density, per
+
+    def held(self) -> np.ndarray:
+        return np.zeros(self.n)
