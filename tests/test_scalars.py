@@ -307,7 +307,6 @@ FAULTS = [
     (("scalars", "dye", "decay"), -1.0, "out of range"),
     (("scalars", "dye", "diffusivity"), "3 m", "a diffusivity"),
     (("fluid", "law"), "log", '"log" carries no scalars yet'),
-    (("numerics", "method"), "radau-iia-5", "explicit"),
     (("output", "probes"), ["lake.dye", "a.dye@0.5", "a.dye"], 'say where, for example "a.dye@0.5"'),
     (("output", "probes"), ["v.dye"], "v is a valve"),
 ]
