@@ -110,7 +110,7 @@ class _Reader:
             self.add(basins.misfits(parts["nodes"], parts["links"], meshes, numerics, properties))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
-        self.add(scalars.misfits(carried, *parts.values(), numerics, properties))
+        self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         named = self.table("exact", ExactSpec) if "exact" in self.raw.table else None
         self.stop()

@@ -6,10 +6,8 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from fvsolve.case.sections import Numerics
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Basin, Chamber, Inflow, Pipe, Reservoir, Tank
-from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
@@ -25,9 +23,7 @@ TAKEN |= {name for kinds in KINDS.values() for kind in kinds.values() for name i
 TAKEN |= set(Pipe.along)
 
 
-def misfits(
-    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], numerics: Numerics | None, fluid: Any
-) -> Found:
+def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
     """Faults of names, of values that parts cannot have, and of what scalars do not go with yet."""
     for name in scalars:
         if not re.fullmatch(r"[\w-]+", name):
@@ -55,12 +51,6 @@ def misfits(
         return
     if fluid is not None and fluid.law != "linear":
         yield ("fluid", "law"), f'{show(fluid.law)} carries no scalars yet; wanted "linear"'
-    method = METHODS.get(numerics.method or "") if numerics is not None else None
-    if numerics is not None and (numerics.method == AUTO or (method is not None and not method.explicit)):
-        yield (
-            ("numerics", "method"),
-            f"{show(numerics.method)} is implicit; scalars are stepped by explicit ones, such as dormand-prince",
-        )
 
 
 def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:

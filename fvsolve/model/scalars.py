@@ -90,6 +90,14 @@ def start_amounts(scene, found: np.ndarray) -> None:
                 found[place] = value * node["mass"]
 
 
+def amounts(model) -> np.ndarray:
+    """Places of all amounts in the state."""
+    count = model.cells + int(np.isin(model.tables[rec.I_NODES]["kind"], STORES).sum())
+    return np.concatenate(
+        [np.zeros(0, dtype=int), *(row["y"] + np.arange(count) for row in model.tables[rec.I_SCALARS])]
+    )
+
+
 def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
     """Values of all scalars in the cells of pipe k."""
     pipe, found = model.tables[rec.I_PIPES][k], {}
