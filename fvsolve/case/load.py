@@ -18,6 +18,7 @@ from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, 
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe
+from fvsolve.parts.basin import Place
 from fvsolve.parts.pipe import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -91,11 +92,13 @@ class _Reader:
         self.unused_signals()
         numerics = self.table("numerics", Numerics)
         kinds = {group: self.kinds(group) for group in parts}
+        has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name in [*kinds["nodes"]]:
-            own = [f"{name}.{patch}" for patch in basins.patch_names(meshes[name])] if name in meshes else ()
-            kinds["nodes"] |= dict.fromkeys(own, Chamber)
+            if name in meshes:
+                kinds["nodes"][name] = basins.Pool(parts["nodes"][name].fields(), meshes[name])
+                kinds["nodes"] |= {f"{name}.{patch}": Place for patch in basins.patch_names(meshes[name])}
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.with_patches(meshes)))
@@ -103,7 +106,6 @@ class _Reader:
             check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
         )
         if numerics is not None:
-            has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
             self.add(basins.misfits(parts["nodes"], parts["links"], meshes, numerics, properties))

@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Link, Node
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.case.basins import Pool
 
 _PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*))?")
 
@@ -19,7 +23,8 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 
 @dataclass(frozen=True)
 class Probe:
-    """What is recorded: text of the case, part and quantity, and along a pipe the fraction from `from`."""
+    """What is recorded: text of the case, part and quantity; along a pipe the fraction from `from`, in a basin the
+    point [m]."""
 
     text: str
     part: str  # "nodes" | "links"
@@ -27,16 +32,17 @@ class Probe:
     quantity: str
     fraction: float | None
     dimension: str
+    point: tuple[float, float] | None = None
 
 
-Kinds = Mapping[str, Mapping[str, type[Node] | type[Link] | None]]
+Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | None"]]
 
 
 def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """The probe a text names; None where its part is at fault itself.
 
-    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown). Raises
-    ValueError.
+    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown), of a basin what of
+    it can be read. Raises ValueError.
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
@@ -53,8 +59,9 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     found, problems = [], []
     for part in parts:
         try:
-            fraction, dimension = _quantity(kinds[part][name], name, quantity, place)
-            found.append(Probe(given.strip(), part, name, quantity, fraction, dimension))
+            found.append(
+                Probe(given.strip(), part, name, quantity, *_quantity(kinds[part][name], name, quantity, place))
+            )
         except ValueError as error:
             problems.append(str(error))
     if not found:
@@ -77,13 +84,16 @@ def default_probes(kinds: Kinds) -> list[Probe]:
     return found
 
 
-def _quantity(kind: type[Node] | type[Link], name: str, quantity: str, place: str | None) -> tuple[float | None, str]:
-    along = getattr(kind, "along", {})
-    known = {**along, **kind.quantities}
+def _quantity(kind: type[Node] | type[Link] | Pool, name: str, quantity: str, place: str | None) -> tuple:
+    """(fraction, dimension) or, of a basin, (None, dimension, point)."""
+    along, fields = getattr(kind, "along", {}), getattr(kind, "fields", {})
+    known = {**along, **kind.quantities, **fields}
     article = "an" if kind.kind[0] in "aeiou" else "a"
     if quantity not in known:
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
         raise ValueError(f"{name} is {article} {kind.kind}, without {show(quantity)}; {has}")
+    if quantity in fields:
+        return None, known[quantity], kind.point(f"{name}.{quantity}", place)
     if place is None:
         if quantity not in kind.quantities:
             raise ValueError(f'{name} is a {kind.kind}: say where, for example "{name}.{quantity}@0.5"')

@@ -20,6 +20,12 @@ OF_ONE = {  # keys that mean something to some physics alone
 }  # fmt: skip
 NEEDS = {"free-surface": ("level",), "liquid": ("pressure", "thickness"), "transport": ("velocity",)}
 OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
+MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}
+FIELDS = {  # what can be read at a point: name -> dimension
+    "free-surface": {"depth": "level", "surface": "level", "bed": "level", **MOVES},
+    "liquid": {"pressure": "pressure", **MOVES},
+    "transport": {},
+}
 
 
 class Patch(Table):
@@ -114,6 +120,7 @@ class Place(Node):
 
     fixes_pressure: ClassVar[bool] = True
     kind: ClassVar[str] = "patch"
+    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "flow": "flow"}  # into the basin
 
     basin: str
     patch: str
@@ -152,6 +159,10 @@ class Basin(Node, kind="basin"):
     pressure: Annotated[float | None, Quantity("pressure", positive, "at rest")] = None
     thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]")] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "the fluid's own if left out [m/s]")] = None
+
+    def fields(self) -> dict[str, str]:
+        """What can be read at a point of it: name -> dimension."""
+        return FIELDS[self.physics]
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:

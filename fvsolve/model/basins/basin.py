@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from fvsolve.case.basins import behind
 from fvsolve.kernels import records as rec
+from fvsolve.mesh.points import Points
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
 FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
+MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
 SIDES = ("west", "east", "south", "north")  # in the order of a grid's boundary faces
 
 
@@ -49,11 +52,20 @@ class Basin:
         """What cells hold at deviations float64[quantities, n], SI."""
         raise NotImplementedError
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        """Fill what a probe of a field is, beside the cells that it reads; scalar fields are its physics' own."""
+        row["kind"], row["scale"] = MOVES[field], 1.0
+
     def mass(self) -> tuple[float, np.ndarray]:
         """Mass of the start's profile [kg], and mass per deviation of the first quantity : float64[n]."""
         raise NotImplementedError
 
     # ----------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def points(self) -> Points:
+        """Finds points of its mesh, and the cells that are read there."""
+        return Points(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
         """A formula at centres : float64[n]."""

@@ -49,6 +49,11 @@ class Liquid(Basin, physics="liquid"):
         velocity = np.column_stack([y[1], y[2], np.zeros(self.n)]) / self.density
         return {"pressure": self.part.pressure + self.speed**2 * y[0], "velocity": velocity}
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field != "pressure":
+            return super().lower_probe(row, field, cells, weights)
+        row["kind"], row["scale"], row["offset"] = rec.CELL_STATE, self.speed**2, self.part.pressure
+
     def mass(self) -> tuple[float, np.ndarray]:
         per = self.part.thickness * self.mesh.area
         strain = (self.part.pressure - self.case.properties.pressure) / (self.density * self.speed**2)
