@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.sections import Numerics
+from fvsolve.case.sections import Numerics, Output
 from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
@@ -86,6 +86,27 @@ def keys(place: str) -> tuple:
     """What a fault's place says, as keys: "patches.east", "holes[0]"."""
     found = [int(one) if one.isdigit() else one for one in re.split(r"[.\[\]]", place) if one]
     return tuple(found) if found and found[0] in Basin.keys() else ()
+
+
+def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
+    """Faults of lines across basins; `nodes` are kinds, or what of a basin can be read."""
+    for name, line in output.lines.items():
+        pool, key = nodes.get(line.basin), ("output", "lines", name)
+        if not re.fullmatch(r"[\w-]+", name):
+            yield key, f"{show(name)} is no name; a name has letters, digits, _ and -"
+        if not isinstance(pool, Pool):
+            pools = [one for one, kind in nodes.items() if isinstance(kind, Pool)]
+            yield (*key, "basin"), f"no basin named {show(line.basin)}; basins are {listing(pools) or 'none'}"
+            continue
+        for end, point in (("from", line.from_), ("to", line.to)):
+            try:
+                pool.inside(*point)
+            except ValueError as error:
+                yield (*key, end), str(error)
+        if line.from_ == line.to:
+            yield (*key, "to"), "is where the line starts; wanted another point"
+    if output.lines and output.fields == 0:
+        yield ("output", "lines"), "are written at every frame, and fields is 0; wanted fields = 1 or more"
 
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:

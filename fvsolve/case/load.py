@@ -337,6 +337,7 @@ class _Reader:
         else:
             named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(output.probes)]
             probes = list({probe.text: probe for probe in named if probe is not None}.values())
+        self.add(basins.line_faults(output, kinds["nodes"]))
         changes: dict[str, Any] = {"probes": probes}
         if output.every is None and numerics is not None:
             changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 from fvsolve.errors import listing
 from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
-from fvsolve.parts.table import Table, at_most_one, misfits
-from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
+from fvsolve.parts.table import Named, Table, at_most_one
+from fvsolve.parts.value import Choice, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
 from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
@@ -51,27 +51,6 @@ class Inside(Value):
 
     def read(self, given: Any, setting: Setting) -> Table:
         return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
-
-
-class Patches(Value):
-    """Patches by name."""
-
-    about = "patches by name: { outlet = { side, span } }"
-
-    def read(self, given: Any, setting: Setting) -> dict[str, Patch]:
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table of patches; wanted {{ NAME = {{ side, span }} }}")
-        found, faults = {}, []
-        for name, one in given.items():
-            try:
-                found[name] = one if isinstance(one, Patch) else Patch.model_validate(one, context=setting)
-            except Misfit as error:
-                faults += [((name, *below), message) for below, message in error.faults]
-            except ValueError as error:
-                faults += [((name, *below), message) for below, message in misfits(error, Patch.keys())]
-        if faults:
-            raise Misfit(faults)
-        return found
 
 
 class Cells(Value):
@@ -148,7 +127,7 @@ class Basin(Node, kind="basin"):
     ] = None
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[MeshFile | None, Inside(MeshFile, "a mesh in place of a rectangle: { file, unit }")] = None
-    patches: Annotated[Any, Patches()] = {}
+    patches: Annotated[Any, Named(Patch, "patches by name: { outlet = { side, span } }")] = {}
     start: Annotated[Start | None, Inside(Start, "where the start is not rest: { level | pressure, u, v }")] = None
 
     level: Annotated[float | None, Quantity("level", anything, "of the water at rest, above the elevation [m]")] = None
