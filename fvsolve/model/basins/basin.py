@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fvsolve.case.basins import behind
 from fvsolve.kernels import records as rec
-from fvsolve.mesh.points import Points
+
+if TYPE_CHECKING:
+    from fvsolve.mesh.points import Points
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
 FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
@@ -65,6 +67,8 @@ class Basin:
     @cached_property
     def points(self) -> Points:
         """Finds points of its mesh, and the cells that are read there."""
+        from fvsolve.mesh.points import Points
+
         return Points(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
