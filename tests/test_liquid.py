@@ -126,7 +126,7 @@ def test_on_graded_cells_every_scheme_is_second_order(scheme):
 
 def wave(box: Box, at: float, way: float) -> np.ndarray:
     """A pulse at x = `at` that runs east (way 1) or west (-1)."""
-    return box.averages(lambda x, y: (np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None]))
+    return box.averages(lambda x, y: np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None])
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -192,12 +192,15 @@ def test_no_mode_grows_whatever_the_sides_send_back(scheme):
     worst = 0
     for nx, ny in itertools.product((1, 2, 5, 6, 8) if scheme == "upwind" else (5, 6, 8), repeat=2):
         box = Box(nx, ny, scheme, (nx, ny))
-        for sides in (WALLS, shares(box), -np.ones(2*(nx+ny)), np.zeros(2*(nx+ny))):
+        for sides in (WALLS, shares(box), -np.ones(2 * (nx + ny)), np.zeros(2 * (nx + ny))):
             box = replace(box, reflect=sides)
             unit = np.eye(3 * nx * ny) * np.repeat([1.0, C, C], nx * ny)
-            matrix = np.array([(box.rates(row.reshape(3, ny, nx))[0]).ravel() for row in unit]) / np.repeat([1.0, C, C], nx * ny)
+            matrix = np.array([(box.rates(row.reshape(3, ny, nx))[0]).ravel() for row in unit]) / np.repeat(
+                [1.0, C, C], nx * ny
+            )
             worst = max(worst, np.linalg.eigvals(matrix).real.max() / C)
-            if worst>1e-9: print(nx,ny,sides,worst)
+            if worst > 1e-9:
+                print(nx, ny, sides, worst)
     print("GROW", scheme, worst)
 
 
@@ -210,7 +213,7 @@ def test_noise_between_any_sides_dies_away(scheme, log):
         box = replace(box, reflect=shares(box))
         start = noise(box, 0.02)
         energy = [((C * s[0]) ** 2 + s[1] ** 2 + s[2] ** 2).sum() for s in (start, box.run(start, 50.0))]
-        worst = max(worst, energy[1]/energy[0])
+        worst = max(worst, energy[1] / energy[0])
     print("NOISE", scheme, log, worst)
 
 
@@ -219,7 +222,9 @@ def test_a_round_pulse_stays_round(scheme):
     """Against Hankel's integral; the errors along axes and along diagonals part at the order of the scheme."""
 
     def height(r, t):
-        return quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[0]
+        return quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[
+            0
+        ]
 
     radii, end = np.linspace(0.0, 9.0, 400), 0.3
     shape = {t: CubicSpline(radii, height(radii, t)) for t in (0.0, end)}
@@ -238,7 +243,7 @@ def test_a_round_pulse_stays_round(scheme):
         axis, diagonal = (angle < 10) | (angle > 80), abs(angle - 45) < 10
         parts.append(abs(miss[axis].mean() - miss[diagonal].mean()))
         errors.append(miss.mean())
-    print("ROUND", scheme, parts, errors, np.log2(parts[0]/parts[1]), np.log2(errors[0]/errors[1]))
+    print("ROUND", scheme, parts, errors, np.log2(parts[0] / parts[1]), np.log2(errors[0] / errors[1]))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.sections import Numerics
+from fvsolve.case.sections import Numerics, Output
 from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
@@ -20,8 +23,46 @@ from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
+    from fvsolve.mesh.points import Points
 
 Found = Iterator[tuple[tuple, str]]
+
+
+@dataclass(frozen=True)
+class Pool:
+    """A basin as probes see it: its fields, name -> dimension, and its mesh."""
+
+    fields: dict[str, str]
+    mesh: Mesh
+    kind: ClassVar[str] = "basin"
+    quantities: ClassVar[dict[str, str]] = {}
+
+    def point(self, what: str, place: str | None) -> tuple[float, float]:
+        """The point inside that a text such as "3.5,1.2" means [m]; ValueError where it means none."""
+        middle = ",".join(f"{value:.4g}" for value in self.mesh.centre[len(self.mesh.centre) // 2])
+        if place is None:
+            raise ValueError(f'a basin is read at points: say where, for example "{what}@{middle}"')
+        try:
+            x, y = (float(one) for one in place.split(","))
+        except ValueError:
+            raise ValueError(f'"@{place}" is no point x,y [m]; wanted for example "@{middle}"') from None
+        return self.inside(x, y)
+
+    def inside(self, x: float, y: float) -> tuple[float, float]:
+        """The same point; ValueError where it lies outside or in a hole."""
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise ValueError(f"{x:g}, {y:g} is no point")
+        if self.points.cell(x, y) < 0:
+            near = ",".join(f"{value:.6g}" for value in self.points.nearest(x, y))
+            raise ValueError(f"{x:g},{y:g} m lies outside the mesh or in a hole; the nearest point inside is {near}")
+        return x, y
+
+    @cached_property
+    def points(self) -> Points:
+        """Finds points of the mesh."""
+        from fvsolve.mesh.points import Points
+
+        return Points(self.mesh)
 
 
 def mesh_of(basin: Basin, setting: Setting) -> Mesh:
@@ -46,6 +87,27 @@ def keys(place: str) -> tuple:
     """What a fault's place says, as keys: "patches.east", "holes[0]"."""
     found = [int(one) if one.isdigit() else one for one in re.split(r"[.\[\]]", place) if one]
     return tuple(found) if found and found[0] in Basin.keys() else ()
+
+
+def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
+    """Faults of lines across basins; `nodes` are kinds, or what of a basin can be read."""
+    for name, line in output.lines.items():
+        pool, key = nodes.get(line.basin), ("output", "lines", name)
+        if not re.fullmatch(r"[\w-]+", name):
+            yield key, f"{show(name)} is no name; a name has letters, digits, _ and -"
+        if not isinstance(pool, Pool):
+            pools = [one for one, kind in nodes.items() if isinstance(kind, Pool)]
+            yield (*key, "basin"), f"no basin named {show(line.basin)}; basins are {listing(pools) or 'none'}"
+            continue
+        for end, point in (("from", line.from_), ("to", line.to)):
+            try:
+                pool.inside(*point)
+            except ValueError as error:
+                yield (*key, end), str(error)
+        if line.from_ == line.to:
+            yield (*key, "to"), "is where the line starts; wanted another point"
+    if output.lines and output.fields == 0:
+        yield ("output", "lines"), "are written at every frame, and fields is 0; wanted fields = 1 or more"
 
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:

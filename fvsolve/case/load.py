@@ -18,6 +18,7 @@ from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, 
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
+from fvsolve.parts.basin import Place
 from fvsolve.parts.pipe import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -92,11 +93,15 @@ class _Reader:
         self.unused_signals()
         numerics = self.table("numerics", Numerics)
         kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
+        has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name in [*kinds["nodes"]]:
-            own = [f"{name}.{patch}" for patch in basins.patch_names(meshes[name])] if name in meshes else ()
-            kinds["nodes"] |= dict.fromkeys(own, Chamber)
+            if name in meshes:
+                pool = parts["nodes"][name]
+                own = {} if pool.physics == "liquid" else dict.fromkeys(carried, "number")
+                kinds["nodes"][name] = basins.Pool(pool.fields() | own, meshes[name])
+                kinds["nodes"] |= {f"{name}.{patch}": Place for patch in basins.patch_names(meshes[name])}
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.with_patches(meshes)))
@@ -104,7 +109,6 @@ class _Reader:
             check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
         )
         if numerics is not None:
-            has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
             self.add(basins.misfits(parts["nodes"], parts["links"], meshes, numerics, properties))
@@ -349,6 +353,7 @@ class _Reader:
         else:
             named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(output.probes)]
             probes = list({probe.text: probe for probe in named if probe is not None}.values())
+        self.add(basins.line_faults(output, kinds["nodes"]))
         changes: dict[str, Any] = {"probes": probes}
         if output.every is None and numerics is not None:
             changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS

@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Link, Node, Scalar
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.case.basins import Pool
 
 _PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*))?")
 
@@ -20,7 +23,8 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 
 @dataclass(frozen=True)
 class Probe:
-    """What is recorded: text of the case, part and quantity, and along a pipe the fraction from `from`."""
+    """What is recorded: text of the case, part and quantity; along a pipe the fraction from `from`, in a basin the
+    point [m]."""
 
     text: str
     part: str  # "nodes" | "links"
@@ -28,17 +32,18 @@ class Probe:
     quantity: str
     fraction: float | None
     dimension: str
+    point: tuple[float, float] | None = None
     unit: str = ""  # of a scalar, a label
 
 
-Kinds = Mapping[str, Mapping[str, type[Node] | type[Link] | Scalar | None]]
+Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | Scalar | None"]]
 
 
 def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """The probe a text names; None where its part is at fault itself.
 
-    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown), and the "scalars".
-    Raises ValueError.
+    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown), of a basin what of
+    it can be read, and the "scalars". Raises ValueError.
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
@@ -85,16 +90,20 @@ def _carried(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[st
 
 def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:
     kind, scalar = kinds[part][name], kinds["scalars"].get(quantity)
+    unit = scalar.unit if scalar is not None else ""
+    if quantity in (fields := getattr(kind, "fields", {})):  # of a basin
+        point = kind.point(f"{name}.{quantity}", place)
+        return Probe(text, part, name, quantity, None, fields[quantity], point, unit)
     along = getattr(kind, "along", {}) | _carried(kind, kinds, "along")
     quantities = kind.quantities | _carried(kind, kinds, "quantities")
     fraction, dimension = _quantity(kind, along, quantities, name, quantity, place)
-    return Probe(text, part, name, quantity, fraction, dimension, scalar.unit if scalar is not None else "")
+    return Probe(text, part, name, quantity, fraction, dimension, unit=unit)
 
 
 def _quantity(
     kind: Any, along: dict[str, str], own: dict[str, str], name: str, quantity: str, place: str | None
 ) -> tuple[float | None, str]:
-    known = {**along, **own}
+    known = {**along, **own, **getattr(kind, "fields", {})}
     article = "an" if kind.kind[0] in "aeiou" else "a"
     if quantity not in known:
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"

@@ -297,9 +297,9 @@ OUT_HEAD = 4
 PROBE = np.dtype(
     [
         ("kind", "i8"),
-        ("index", "i8"),  # of the node, pipe, valve, column, body, push or piston
-        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside
-        ("cell", "i8"),  # first of the cells that are read
+        ("index", "i8"),  # of the node, pipe, valve, column, body, push, piston or basin
+        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside; CELL_STATE: which of a basin's quantities
+        ("cell", "i8"),  # first of the cells that are read; of a basin, offset of their numbers in `integers`
         ("count", "i8"),  # how many
         ("weights", "i8"),  # offset of their weights in `floats`
         ("scale", "f8"),
@@ -313,6 +313,7 @@ PROBE = np.dtype(
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 NODE_SCALAR, PIPE_SCALAR = 13, 14
+CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
 
 SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, ACOUSTIC_FACES, LIQUID_GRID, LIQUID_FACES = 0, 1, 2, 3, 4, 5
 CARRIED_GRID, CARRIED_FACES = 6, 7  # kinds of basins: physics, law of the liquid, grid or loop over faces

@@ -72,8 +72,11 @@ ROOMS = {
         before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
-    "patches": Room(before="plane.patches: patch_pressures", after="plane.patches: patch_flows"),
-    "values": Room(after="plane.carried: patch_values"),
+    "patches": Room(
+        before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
+        observe="plane.observe: observe_basins",
+    ),
+    "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
     "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),

@@ -18,7 +18,12 @@ def lower_probes(scene) -> np.ndarray:
     table = np.zeros(len(scene.case.probes), rec.PROBE)
     for row, probe in zip(table, scene.case.probes, strict=True):
         name = inside(scene, probe)
-        if probe.quantity in scene.case.scalars:
+        if probe.point is not None:
+            lower_point(scene, row, probe)
+        elif probe.part == "nodes" and probe.quantity == "flow":
+            row["index"], row["kind"] = scene.node_index[probe.name], rec.PATCH_FLOW
+            row["scale"] = 1.0 / scene.fluid.density
+        elif probe.quantity in scene.case.scalars:
             scalar_probe(scene, row, probe, name)
         elif name in scene.device_names and probe.quantity in scene.device_of(name).quantities:
             row["index"], row["kind"] = scene.device_names.index(name), rec.DEVICE_VALUE
@@ -65,6 +70,21 @@ def inside(scene, probe) -> str:
     return name if probe.part == "nodes" and name in scene.node_index else probe.name
 
 
+def lower_point(scene, row, probe) -> None:
+    """The cells of a basin that a probe reads, and their weights."""
+    k = list(scene.case.meshes).index(probe.name)
+    basin = scene.basins[k]
+    cells, weights = basin.points.reading(*probe.point)
+    row["index"], row["count"], row["cell"] = k, cells.size, len(scene.integers)
+    row["weights"] = len(scene.floats)
+    scene.integers += cells.tolist()
+    scene.floats += weights.tolist()
+    if probe.quantity in scene.case.scalars:
+        row["kind"], row["scalar"] = rec.CELL_SCALAR, list(scene.case.scalars).index(probe.quantity)
+    else:
+        basin.lower_probe(row, probe.quantity, cells, weights)
+
+
 def place(scene, row, fraction: float, degree: int | None = None) -> None:
     """Where along its pipe a probe reads: an end, or cells by a polynomial, of the scheme's degree if left out."""
     if fraction in (0.0, 1.0):
@@ -89,6 +109,8 @@ def reading_weights(x: float, degree: int) -> np.ndarray:
 def probe_offsets(scene, start) -> None:
     """Scale and offset of every probe, once the profile is known."""
     for row, probe in zip(scene.probe_table, scene.case.probes, strict=True):
+        if row["kind"] >= rec.CELL_STATE:  # their profile is known to basins
+            continue
         if scene.case.fluid.law == "linear":
             linear_offsets(scene, start, row, probe)
         else:

@@ -10,7 +10,7 @@ from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import Table, at_most_one, misfits
+from fvsolve.parts.table import Named, Table, at_most_one
 from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
 from fvsolve.units import show
 
@@ -23,6 +23,12 @@ OF_ONE = {  # keys that mean something to some physics alone
 }  # fmt: skip
 NEEDS = {"free-surface": ("level",), "liquid": ("pressure", "thickness"), "transport": ("velocity",)}
 OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
+MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}
+FIELDS = {  # what can be read at a point: name -> dimension
+    "free-surface": {"depth": "level", "surface": "level", "bed": "level", **MOVES},
+    "liquid": {"pressure": "pressure", **MOVES},
+    "transport": {},
+}
 
 
 class Patch(Table):
@@ -49,27 +55,6 @@ class Inside(Value):
 
     def read(self, given: Any, setting: Setting) -> Table:
         return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
-
-
-class Patches(Value):
-    """Patches by name."""
-
-    about = "patches by name: { outlet = { side, span } }"
-
-    def read(self, given: Any, setting: Setting) -> dict[str, Patch]:
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table of patches; wanted {{ NAME = {{ side, span }} }}")
-        found, faults = {}, []
-        for name, one in given.items():
-            try:
-                found[name] = one if isinstance(one, Patch) else Patch.model_validate(one, context=setting)
-            except Misfit as error:
-                faults += [((name, *below), message) for below, message in error.faults]
-            except ValueError as error:
-                faults += [((name, *below), message) for below, message in misfits(error, Patch.keys())]
-        if faults:
-            raise Misfit(faults)
-        return found
 
 
 class Cells(Value):
@@ -163,6 +148,7 @@ class Place(Node):
 
     fixes_pressure: ClassVar[bool] = True
     kind: ClassVar[str] = "patch"
+    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "flow": "flow"}  # into the basin
 
     basin: str
     patch: str
@@ -190,7 +176,7 @@ class Basin(Node, kind="basin"):
     ] = None
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[MeshFile | None, Inside(MeshFile, "a mesh in place of a rectangle: { file, unit }")] = None
-    patches: Annotated[Any, Patches()] = {}
+    patches: Annotated[Any, Named(Patch, "patches by name: { outlet = { side, span } }")] = {}
     start: Annotated[Start | None, Inside(Start, "where the start is not rest: { level | pressure, u, v }")] = None
 
     level: Annotated[float | None, Quantity("level", anything, "of the water at rest, above the elevation [m]")] = None
@@ -204,6 +190,10 @@ class Basin(Node, kind="basin"):
 
     velocity: Annotated[Any, Flowing()] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
+
+    def fields(self) -> dict[str, str]:
+        """What can be read at a point of it: name -> dimension."""
+        return FIELDS[self.physics]
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:

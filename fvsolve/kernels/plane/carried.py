@@ -11,12 +11,15 @@ from fvsolve.kernels.plane.advection import INFINITE, THIN, grid_advection, grid
 from fvsolve.kernels.plane.diffusion import grid_diffusion, scalar_sources
 from fvsolve.kernels.records import (
     CARRIED_GRID,
+    CELL_SCALAR,
     I_BASINS,
+    I_FLOATS,
     I_INTEGERS,
     I_LAYOUT,
     I_NODES,
     I_PATCHES,
     I_PLANE,
+    I_PROBES,
     I_SCALARS,
     I_SETTINGS,
     RATE,
@@ -55,6 +58,19 @@ def patch_values(t, y, dydt, out, handle):
                 i = tables[I_INTEGERS][patch["first"] + m]
                 total += tables[I_PLANE][basin["area"] + i] * cell_value(tables, basin, q, y, i)
             out[value + q * nodes + patch["node"]] = total / patch["area"]
+
+
+@njit
+def observe_values(t, y, out, handle, values):
+    """values[k] of every probe of a scalar at a point of a basin."""
+    tables = open_tables(handle)
+    for k in range(tables[I_PROBES].size):
+        probe = tables[I_PROBES][k]
+        if probe["kind"] == CELL_SCALAR:
+            values[k] = 0.0
+            for m in range(probe["count"]):
+                i, weight = tables[I_INTEGERS][probe["cell"] + m], tables[I_FLOATS][probe["weights"] + m]
+                values[k] += weight * cell_value(tables, tables[I_BASINS][probe["index"]], probe["scalar"], y, i)
 
 
 @njit

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -11,8 +12,12 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
 
+if TYPE_CHECKING:
+    from fvsolve.mesh.points import Points
+
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
 FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
+MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
 SIDES = ("west", "east", "south", "north")  # in the order of a grid's boundary faces
 
 
@@ -52,11 +57,22 @@ class Basin:
         """What cells hold at deviations float64[quantities, n], SI."""
         raise NotImplementedError
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        """Fill what a probe of a field is, beside the cells that it reads; scalar fields are its physics' own."""
+        row["kind"], row["scale"] = MOVES[field], 1.0
+
     def mass(self) -> tuple[float, np.ndarray]:
         """Mass of the start's profile [kg], and mass per deviation of the first quantity : float64[n]."""
         raise NotImplementedError
 
     # ----------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def points(self) -> Points:
+        """Finds points of its mesh, and the cells that are read there."""
+        from fvsolve.mesh.points import Points
+
+        return Points(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
         """A formula at centres : float64[n]."""

@@ -68,6 +68,13 @@ class FreeSurface(Basin, physics="free-surface"):
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field not in ("depth", "surface", "bed"):
+            return super().lower_probe(row, field, cells, weights)
+        row["kind"], row["scale"] = rec.CELL_DEPTH, float(field != "bed")
+        if field != "depth":
+            row["offset"] = weights @ self.bed[cells] + (self.part.elevation or 0.0)
+
     def mass(self) -> tuple[float, np.ndarray]:
         per = self.case.properties.density * self.mesh.area
         return float(np.sum(per * self.depth)), per

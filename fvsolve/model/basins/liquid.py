@@ -70,6 +70,11 @@ class Liquid(Basin, physics="liquid"):
         velocity = np.column_stack([y[1] / density, y[2] / density, np.zeros(self.n)])
         return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field != "pressure":
+            return super().lower_probe(row, field, cells, weights)
+        row["kind"], row["scale"], row["offset"] = rec.CELL_STATE, self.speed**2, self.part.pressure
+
     def mass(self) -> tuple[float, np.ndarray]:
         per, fluid = self.part.thickness * self.mesh.area, self.case.properties
         density = self.density

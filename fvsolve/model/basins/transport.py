@@ -55,6 +55,9 @@ class Transport(Basin, physics="transport"):
     def start(self) -> np.ndarray:
         return np.zeros((0, self.n))
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        raise NotImplementedError(field)  # there are scalars alone
+
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         return {}
 
