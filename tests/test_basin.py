@@ -13,7 +13,6 @@ import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.models import ladder
-from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.failure.failure_map import failures
 
@@ -225,7 +224,7 @@ def test_what_basins_do_not_go_with_yet_is_said():
     model = fvsolve.build(fvsolve.load(case))
     with pytest.raises(FvsolveError, match="explicit methods"):
         _ = model.structure
-    for study in (order, chart, ladder, energy, lambda case: failures(fvsolve.load(case))):
+    for study in (chart, ladder, energy, lambda case: failures(fvsolve.load(case))):
         with pytest.raises(FvsolveError, match="basins"):
             study(case)
 
