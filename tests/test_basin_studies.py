@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import pipe, reservoir, scene
+from test_sparsity import stray
+from truth.scenes import AMBIENT, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.model.basins import FreeSurface
+from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.plane import lowered
@@ -99,3 +101,58 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
     with pytest.raises(FvsolveError, match="the mesh of pool is a file, which nothing refines"):
         plan(case, "both")
+
+
+# Jacobians and implicit steps ---------------------------------------------------------------------------------------
+
+
+def fed(scheme: str, end: float = 1.0, **numerics) -> dict:
+    """A sloshing basin between a pipe and a valve that opens, and a drier one behind an orifice."""
+    west = pool((6, 4), SLOSH, elevation=0.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}})
+    east = pool((4, 3), size=(4.0, 3.0), depth=0.5, elevation=0.0, patches={"gate": {"side": "west"}}, bed="0.2*x")
+    links = {
+        "main": pipe("lake", "end", 50.0, 0.3, 1000.0, 6, friction={"model": "steady", "factor": 0.02}),
+        "tap": valve("end", "west.in", 0.02, ramp(0.0, 0.2, 0.0, 1.0)),
+        "hole": valve("west.gate", "east.gate", 0.05),
+    }
+    nodes = {"west": west, "east": east, "end": {"type": "junction", "elevation": 0.0}}
+    nodes["lake"] = reservoir(AMBIENT + 2e4, elevation=0.0)
+    return scene(nodes, links, end, PLANE | {"scheme": scheme} | numerics, ["hole.flow"], end / 10)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
+    model, rng = built(fed(scheme)), np.random.default_rng(1)
+    for t in (0.0, 0.1, 0.9):
+        y = model.start + model.scale * rng.normal(scale=0.2, size=model.y_size)
+        assert stray(model, t, y) < 1e-9
+    entries = sparsity(model).nnz
+    assert entries < 0.35 * model.y_size**2  # a pattern that has everything would show nothing
+
+
+def test_a_cell_feels_its_row_and_column_and_no_corner():
+    """Upwind: five cells of three quantities in the middle of a grid; muscl nine."""
+    for scheme, cells in (("upwind", 5), ("muscl", 9)):
+        model = built(alone(pool((7, 7)), 1.0, scheme=scheme))
+        per_row = np.diff(sparsity(model).tocsr().indptr)
+        assert per_row[24] == 3 * cells
+
+
+@pytest.mark.parametrize("method", ["radau-iia-5", "esdirk-4", "rodas-5p"])
+def test_implicit_steps_come_to_where_explicit_ones_do(method):
+    runs = {}
+    for name, rtol in ((method, 1e-6), ("dormand-prince", 1e-8)):
+        case = fed("muscl", method=name, rtol=rtol, limiter="van-leer")
+        del case["numerics"]["courant"]
+        model = built(case)
+        runs[name] = fvsolve.advance(model, fvsolve.initial_state(model), 1.0).y / model.scale
+    assert np.abs(runs[method] - runs["dormand-prince"]).max() < 2e-3
+    assert fvsolve.run(case).ledger["mass"]["relative"] < 1e-13
+
+
+def test_implicit_steps_may_cross_many_cells():
+    """A deep pool that a shut valve joins: ten times the step that explicit ones can take, and mass stays."""
+    case = alone(pool((16, 8), SLOSH), 4.0, method="radau-iia-5", courant=10.0)
+    run = fvsolve.run(case)
+    assert run.ok and abs(run.ledger["mass"]["relative"]) < 1e-13
+    assert run.summary["steps"] < 100

@@ -14,7 +14,6 @@ from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
 from fvsolve.parts.series import find_file
 from fvsolve.parts.value import Misfit, Setting
-from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -83,9 +82,6 @@ def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
 def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any) -> Found:
     """Faults of patches, and of what basins do not go with."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
-    method = METHODS.get(numerics.method or "")
-    if found and (numerics.method == AUTO or (method is not None and not method.explicit)):
-        yield ("numerics", "method"), f"{show(numerics.method)} is implicit; basins are stepped by explicit methods"
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.kernels import records as rec
 from fvsolve.model.basins.basin import FIFTH
 from fvsolve.model.schemes import ORDER
 from fvsolve.parts import Basin, Pipe
@@ -97,8 +96,7 @@ def greatest_rate(case, found: Mapping[str, tuple[int, ...]]) -> float:
     if basins(case):
         own = {key: numbers for key, numbers in counts(case).items() if key.startswith("nodes.")}
         finer = max((max(found[key]) / max(numbers) for key, numbers in own.items()), default=1.0)
-        model = prepared(case)
-        rates.append(finer * float(model.evaluate(case.numerics.start, model.start)[1][rec.RATE]))
+        rates.append(finer * prepared(case).wave_rate)
     return max(rates)
 
 
