@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from pytest import approx
 from test_sparsity import stray
-from truth.scenes import AMBIENT, RHO, pipe, ramp, reservoir, scene, valve
+from truth.scenes import AMBIENT, GRAVITY, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError
@@ -16,6 +18,8 @@ from fvsolve.studies.accuracy.cells import counts, keys, scaled
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.plane import lowered
 from fvsolve.studies.accuracy.refine import plan, resolutions
+from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.stability.stability import stability
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  # of 10 m by 5 m
@@ -156,3 +160,35 @@ def test_implicit_steps_may_cross_many_cells():
     run = fvsolve.run(case)
     assert run.ok and abs(run.ledger["mass"]["relative"]) < 1e-13
     assert run.summary["steps"] < 100
+
+
+# limits of steps -------------------------------------------------------------------------------------------------
+
+
+def test_a_slosh_blows_up_at_the_predicted_step():
+    """16 by 4 cells at rest: prediction and real runs agree to bisection; about a moving slosh to half a per cent."""
+    still = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
+    assert still.difference == approx(0.0, abs=3e-4)
+    assert still.rate * still.predicted > 2.0  # two half cells: nothing fails at Courant 1
+    moving = stability(alone(pool((16, 4), SLOSH), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
+    assert moving.difference == approx(0.0, abs=1e-2) and any("moves" in note for note in moving.notes)
+
+
+def test_a_limited_basin_is_measured_with_upwind_beside_it():
+    row = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["muscl"], ["ssp-rk2"]).rows[0]
+    assert row.measured == approx(row.frozen["upwind"], rel=0.01)
+    assert any("basins know its weights only as upwind" in note for note in row.notes)
+
+
+def test_a_linearised_basin_sloshes_at_its_natural_frequencies():
+    """Poles about rest: the slowest oscillates as the longest of long waves, sqrt(g h) k, to second order."""
+    depth, size = 1.0, 10.0
+    case = alone(pool((24, 2), size=(size, 1.0), depth=depth), 1.0, scheme="upwind")
+    found = linearise(case)
+    values = np.linalg.eigvals(found.a)
+    slowest = values.imag[values.imag > 1e-6].min()
+    assert slowest == approx(math.sqrt(GRAVITY * depth) * math.pi / size, rel=5e-3)
+    assert found.state_units[0] == "m" and found.state_units[-1] == "m2/s"
+    assert values.real.max() < 1e-9 * abs(values).max()
+    with pytest.raises(FvsolveError, match="--scheme upwind"):
+        linearise(case, scheme="fromm")

@@ -9,12 +9,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from fvsolve.model.basins import units
+
 NEAR = 1e-9  # of its length: how near an edge of coarser cells must be to one of finer ones to be the same
 DEGREE = 5  # of the spline through contents, where it is not
-UNITS = {  # of what states are, by physics and quantity; what is carried has the unit of nobody
-    ("free-surface", "depth"): "m", ("free-surface", "flow_x"): "m2/s", ("free-surface", "flow_y"): "m2/s",
-    ("liquid", "density"): "kg/m3", ("liquid", "flow_x"): "kg/(m2 s)", ("liquid", "flow_y"): "kg/(m2 s)",
-}  # fmt: skip
 
 
 def variable_of(basin, quantity: str) -> str:
@@ -28,7 +26,7 @@ def unit_of(case, variable: str) -> str | None:
     node = case.nodes.get(name)
     if not quantity or node is None or node.kind != "basin":
         return None
-    return UNITS.get((node.physics, quantity), "-")
+    return units.unit_of(node.physics, quantity)
 
 
 def end_errors(model, y: np.ndarray, truth: Mapping, norms: Callable) -> dict[str, dict[str, float]]:
