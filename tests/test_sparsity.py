@@ -12,7 +12,6 @@ from truth.random_networks import random_network
 from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
-from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
 from fvsolve.kernels import records as rec
 from fvsolve.model.scalars import ledger_rows
@@ -45,12 +44,15 @@ def random_state(model, rng) -> np.ndarray:
 
 def stray(model, t: float, y: np.ndarray) -> float:
     """Greatest change of a rate by a state that its pattern has not, over the greatest by one that it has."""
-    pattern, base = sparsity(model).toarray(), rates(model, t, y)
+    states = np.arange(model.y_size)
+    if states.size > 2000:  # of a basin a sample
+        states = np.random.default_rng(states.size).choice(states, 100, replace=False)
+    pattern, base = sparsity(model)[:, states].toarray(), rates(model, t, y)
     change = np.empty(pattern.shape)
-    for j in range(model.y_size):
+    for k, j in enumerate(states):
         moved = y.copy()
         moved[j] += 1e-2 * model.scale[j]
-        change[:, j] = np.abs(rates(model, t, moved) - base)
+        change[:, k] = np.abs(rates(model, t, moved) - base)
     known = np.max(change * pattern, axis=1)
     rounding = 1e-10 * np.max(known)  # for rates that nothing moves
     return float(np.max(np.max(change * ~pattern, axis=1) / np.maximum(known, rounding)))
@@ -67,10 +69,6 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
 @pytest.mark.parametrize("path", CASES, ids=lambda p: p.stem)
 def test_shipped_cases_keep_to_their_pattern(path):
     model, rng = fvsolve.build(fvsolve.load(path)), np.random.default_rng(0)
-    if model.basin_names:
-        with pytest.raises(FvsolveError, match="cannot be linearised yet"):
-            sparsity(model)
-        return
     for t in (0.0, 0.5 * model.case.numerics.end):
         assert stray(model, t, random_state(model, rng)) < 1e-7
 

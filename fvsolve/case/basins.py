@@ -143,12 +143,16 @@ def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     return found
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any) -> Found:
+def misfits(
+    nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any, scalars: dict
+) -> Found:
     """Faults of patches, and of what basins do not go with."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     method = METHODS.get(numerics.method or "")
-    if found and (numerics.method == AUTO or (method is not None and not method.explicit)):
-        yield ("numerics", "method"), f"{show(numerics.method)} is implicit; basins are stepped by explicit methods"
+    implicit = numerics.method == AUTO or (method is not None and not method.explicit)
+    if scalars and implicit and any(basin.physics == "free-surface" for basin in found.values()):
+        what = f"{show(numerics.method)} is implicit; scalars in a free surface are stepped by explicit methods"
+        yield ("numerics", "method"), f"{what}, such as ssp-rk2"
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)

@@ -66,7 +66,7 @@ def draw(folder: Path, found) -> list[Path]:
         name = "order.png" if len(found) == 1 else f"order-{one.scheme}-{one.method}.png"
         sizes = [row.level.size for row in one.rows]
         curves = {
-            f"{variable} [{unit(variable)}]": {
+            f"{variable} [{unit(variable, one)}]": {
                 norm: ([row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows], fits[norm])
                 for norm in NORMS
             }
@@ -84,11 +84,13 @@ def title(one) -> str:
     return f"{scheme}{one.method}, {one.plan.words}"
 
 
-def unit(variable: str) -> str:
-    """SI unit of a variable."""
+def unit(variable: str, one) -> str:
+    """SI unit of a variable of a study."""
     from fvsolve.parts import KINDS
     from fvsolve.units import DIMENSIONS
 
+    if variable in one.units:
+        return one.units[variable]
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
     kinds = [kind for group in KINDS.values() for kind in group.values()]
     return next(DIMENSIONS[known[quantity]].si for kind in kinds
@@ -111,8 +113,8 @@ def lines(one, variable: str, norm: str, fit):
     """The rows of one norm."""
     for k, row in enumerate(one.rows):
         yield [
-            one.scheme, one.method, one.kind, variable, unit(variable), norm, row.level.cells, repr(row.level.size),
-            number(row.level.step), number(row.errors.get(variable, {}).get(norm, math.nan)),
+            one.scheme, one.method, one.kind, variable, unit(variable, one), norm, row.level.cells,
+            repr(row.level.size), number(row.level.step), number(row.errors.get(variable, {}).get(norm, math.nan)),
             number(fit.pairwise[k - 1]) if k else "", fit.marks[k], number(fit.order), number(fit.spread), row.steps,
             row.rhs, row.cell_updates, number(row.seconds),
         ]  # fmt: skip
@@ -130,7 +132,8 @@ def show(one) -> None:
     terminal.line(console, f"errors against: {one.words}")
     for variable in one.variables[:SHOWN]:
         terminal.line(console, "")
-        terminal.line(console, f"{variable} [{unit(variable)}]{'' if '.' in variable else ' at the end, all pipes'}")
+        where = " at the end, all pipes" if variable in ("pressure", "flow") else ""
+        terminal.line(console, f"{variable} [{unit(variable, one)}]{where}")
         terminal.table(["cells", "step [s]", "L1", "order", "L2", "order", "max", "order", "rhs", "seconds", "mark"],
                        rows_of(one, variable), console)  # fmt: skip
     terminal.line(console, "")

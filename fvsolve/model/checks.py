@@ -100,9 +100,9 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if method_named(numerics.method).explicit:
         own = model.wave_rates * model.tables[rec.I_PIPES]["quicker"]
         own = np.maximum(own, [model.steady["unsteady"].get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
-        rate = float(model.evaluate(numerics.start, np.zeros(model.y_size), numerics.start)[1][rec.RATE])
+        rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
     else:  # waves alone: implicit steps cope with the rest
-        own, rate = model.wave_rates, float(model.wave_rates.max(initial=0.0))
+        own, rate = model.wave_rates, model.wave_rate
     if not rate > 0.0:
         return None, "nothing limits it"
     if model.case.fluid.law != "linear" and len(own):

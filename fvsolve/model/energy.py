@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins.energy import weights as basin_weights
 from fvsolve.model.unsteady import memory_shares
 
 RANK = 1e-12  # of the greatest singular value of what hangs together: below, a motion stores no energy
@@ -77,15 +78,13 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     A wave of r [kg/s] stores r^2 dx / (rho A), a flow that unsteady friction remembers (`kernels.unsteady`)
     g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a body m v^2 / 2,
     a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
-    its excess at y. Exact under `linear` about a profile at rest.
-    Devices store what their `squares` say. Positions that nothing holds, one by one or together, store nothing: idle.
+    its excess at y. Exact under `linear` about a profile at rest. Devices store what their `squares` say, cells of
+    basins what `model.basins.energy` says. Positions that nothing holds, one by one or together, store nothing: idle.
     """
     from scipy.sparse import csr_array
 
-    if len(model.tables[rec.I_BASINS]):
-        raise FvsolveError("the energy of basins is not booked yet")
     y = np.zeros(model.y_size) if y is None else y
-    own = energy_weights(model)
+    own = energy_weights(model, y)
     names = [name.rsplit(".", 1)[0] for name in model.state_names]
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
     stored |= {e: (names[e], row) for e, row in swept(model, y)}
@@ -145,8 +144,9 @@ def apart(rows: Any) -> tuple[np.ndarray, list[np.ndarray]]:
     return np.flatnonzero(alone), [others[labels == k] for k in range(count)]
 
 
-def energy_weights(model) -> np.ndarray:
-    """Weights w of states that store w_i y_i^2 by themselves, 0 of cylinders, positions, devices : float64[n]."""
+def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
+    """Weights w of states that store w_i d_i^2 of a deviation d from y by themselves, 0 of others : float64[n]."""
+    y = np.zeros(model.y_size) if y is None else y
     tables, rho = model.tables, model.case.properties.density
     found = np.zeros(model.y_size)
     for row in tables[rec.I_PIPES]:
@@ -154,6 +154,8 @@ def energy_weights(model) -> np.ndarray:
         shares = memory_shares(tables[rec.I_FLOATS], row)
         kept = slice(row["memory"], row["memory"] + shares.size * row["cells"])
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
+    for basin in model.basins:
+        basin.of(found)[:] = basin_weights(basin, basin.of(y))
     for row in tables[rec.I_NODES]:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             found[row["y"]] = stiffness(model, row) / (2.0 * rho)

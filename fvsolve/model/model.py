@@ -90,6 +90,18 @@ class Model:
         return pipes["speed"] / pipes["dx"]
 
     @property
+    def wave_rate(self) -> float:
+        """Cells that the quickest wave crosses in a second, in basins as they count them at the start [1/s]."""
+        found = float(self.wave_rates.max(initial=0.0))
+        if not self.basins:
+            return found
+        armed = self.tables[rec.I_ARMED]
+        kept = armed.copy()
+        rate = self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]
+        armed[:] = kept
+        return max(found, float(rate))
+
+    @property
     def unsteady(self) -> bool:
         """Whether the friction of a pipe remembers the past of its flow."""
         return bool(self.tables[rec.I_PIPES]["terms"].any())

@@ -3,7 +3,8 @@
 A pipe's cells depend on their neighbours as far as the scheme reaches. Where a pipe meets a node, what it offers
 (its edge cells) is read by the node, and what the node makes of all offers together is read by the cells that look
 beyond the end. Tanks, chambers and given pressures part one group of nodes from the next: their pressure is their own,
-but for chambers of cylinders, whose pressure is that of their bodies too.
+but for chambers of cylinders, whose pressure is that of their bodies too. Cells of a basin depend on those about them
+(`model.basins.pattern`), and a patch is a node whose pressure the cells behind it set.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins import pattern
 from fvsolve.model.scalars import ledger_rows
 from fvsolve.steady import union
 
@@ -24,8 +25,6 @@ Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depe
 
 def sparsity(model) -> csc_array:
     """bool[n + ledger, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
-    if len(model.tables[rec.I_BASINS]):
-        raise FvsolveError("basins are stepped by explicit methods and cannot be linearised yet")
     from fvsolve.model.sparsity_scalars import scalar_pairs
 
     n, couplings = model.y_size, Couplings(model)
@@ -76,6 +75,8 @@ class Couplings:
         self.bodies, self.pistons = tables[rec.I_BODIES]["y"], tables[rec.I_PISTONS]
         self.braces = [*tables[rec.I_BRACES], *tables[rec.I_STOPS]]
         self.devices = tables[rec.I_DEVICES]
+        self.basins, self.integers = model.basins, tables[rec.I_INTEGERS]
+        self.patches = {int(row["node"]): row for row in tables[rec.I_PATCHES]}
         self.sets = self.pressures()  # of each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
@@ -84,6 +85,8 @@ class Couplings:
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
             yield from self.remembered(pipe)
+        for basin in self.basins:
+            yield pattern.carried(basin) if basin.part.physics == "transport" else pattern.inside(basin)
         yield from self.stored()
         yield from self.rigid()
         yield from self.moving()
@@ -104,8 +107,18 @@ class Couplings:
         y = self.nodes["y"][i]
         return np.array([y] if y >= 0 else [], dtype=np.int64)
 
+    def behind(self, i: int, quantities: int | None = None) -> np.ndarray:
+        """States of the cells behind a patch, of its basin's first quantities or all; none of another node."""
+        if i not in self.patches:
+            return states()
+        row = self.patches[i]
+        cells = self.integers[row["first"] : row["first"] + row["count"]]
+        return pattern.of_cells(self.basins[row["basin"]], cells, quantities)
+
     def held(self, i: int) -> np.ndarray:
-        """The states that set the pressure of a node that stores: its mass, and where its piston is."""
+        """The states that set the pressure of a node that stores: its mass, its cells, and where its piston is."""
+        if i in self.patches:
+            return self.behind(i, 1)
         filled = (self.held_by(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
         moved = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
         return states(self.own(i), *moved, *filled)
@@ -144,7 +157,7 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.held(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """What flows into tanks, chambers and given pressures: their mass, and their row of the ledger."""
+        """What flows into tanks, chambers, patches and given pressures: what they hold, and their row of the ledger."""
         into = [[self.held(i)] for i in range(len(self.nodes))]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
@@ -160,7 +173,7 @@ class Couplings:
             for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
                 into[i] += [self.places(row, 1), *([self.held(other)] if row["leakage"] > 0.0 else [])]
         for i in np.flatnonzero(~self.inner):
-            yield every(states(self.own(i), self.size + i), states(*into[i]))
+            yield every(states(self.own(i), self.behind(i), self.size + i), states(*into[i]))
 
     def rigid(self) -> Iterator[Pairs]:
         """A column's flow feels the pressures of both its ends."""

@@ -57,7 +57,7 @@ class Loop:
             automatic.watch(stepper, structure())
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
             self.orders[told.CONTROL] = told.FIXED_STEP
-            self.orders[told.SIZE] = numerics.courant / model.wave_rates.max()
+            self.orders[told.SIZE] = numerics.courant / model.wave_rate
 
     @property
     def now(self) -> np.ndarray:

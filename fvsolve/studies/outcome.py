@@ -34,7 +34,8 @@ class Outcome:
     @property
     def cell_updates(self) -> int:
         """Calls of the rates times cells (or states, without cells): a cost that no machine changes."""
-        return self.counts.get("rhs", 0) * max(1, self.model.cells or self.model.y_size)
+        cells = self.model.cells + sum(basin.n for basin in self.model.basins)
+        return self.counts.get("rhs", 0) * max(1, cells or self.model.y_size)
 
 
 class Rows:

@@ -8,12 +8,13 @@ from dataclasses import replace
 from fvsolve.model.checks import rhs_seconds
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
-from fvsolve.studies.accuracy.refine import Plan, pipes, plan
+from fvsolve.studies.accuracy.cells import basins, counts, loads, most, scaled, total
+from fvsolve.studies.accuracy.refine import Plan, plan
 from fvsolve.studies.outcome import prepared
 from fvsolve.studies.points import Points
 
 LONGEST = 40.0  # CPU time that all rows and their reference may take, about [s]
-LEAST = 8  # cells of the pipe with most to begin with
+LEAST = 8  # cells along the pipe or side with most to begin with
 REFERENCE = 21.0 * 7.0  # calls of a reference for each of the finest row's, a stage: 4, 2 and 1 times as fine, 7 stages
 
 
@@ -28,25 +29,22 @@ def affordable(
     asked = {"study": "order", "what": "first cells", "way": made.way, "levels": len(made.levels), "against": against}
     known = None if points is None else points.find(case, asked)
     first = known["cells"] if known else first_cells(case, made, refine, levels, against)
-    if first == most_cells(case):
+    if first == most(counts(case)):
         return made
     if points is not None and known is None:
         points.get(case, asked, lambda: {"cells": first})
-    said = f"begun on {first} of {most_cells(case)} cells, to end within minutes (--cells says otherwise)"
+    said = f"begun on {first} of {most(counts(case))} cells, to end within minutes (--cells says otherwise)"
     made = plan(case, refine, key, levels, first)
     return replace(made, words=f"{made.words}; {said}")
 
 
-def most_cells(case) -> int:
-    """Cells of the pipe with most."""
-    return max(pipe.cells for pipe in pipes(case).values())
-
-
 def first_cells(case, made: Plan, refine: str | None, levels: int | None, against: str) -> int:
-    """Cells to begin with: those of the case, or halved as often as the time asks."""
-    seconds, cells, exact = rhs_seconds(prepared(case)), most_cells(case), case.exact is not None or against != "auto"
-    total = sum(pipe.cells for pipe in pipes(case).values())
-    while cells >= 2 * LEAST and time_of(case, made, seconds / total, exact) > LONGEST:
+    """Cells to begin with: those of the case, or halved as often as the time asks and patches and holes allow."""
+    own, exact = counts(case), case.exact is not None or against != "auto" or bool(basins(case))
+    cells, seconds = most(own), rhs_seconds(prepared(case)) / total(case, own)
+    while cells >= 2 * LEAST and time_of(case, made, seconds, exact) > LONGEST:
+        if not loads(case, scaled(own, (cells // 2) / most(own))):
+            break
         cells //= 2
         made = plan(case, refine, None, levels, cells)
     return cells

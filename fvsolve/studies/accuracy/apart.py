@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.studies.accuracy.refine import pipes
+from fvsolve.studies.accuracy.cells import pipes
+from fvsolve.studies.accuracy.plane import end_errors, size_at_end
 from fvsolve.studies.outcome import Outcome
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # before quantities
@@ -79,6 +80,8 @@ def differences(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
         for k, name in enumerate(("pressure", "flow")):
             apart = np.concatenate([mine[pipe.name][k] - theirs[pipe.name][k] for pipe in model.pipes])
             found[name] = norms(apart, lengths / lengths.sum())
+    if model.basins:
+        found |= end_errors(model, run.y, truth.fields(model), norms)
     apart = run.rows[:, 1:] - truth.rows(run)
     groups: dict[str, list[float]] = {}
     ends = set(end_probes(model.case))
@@ -109,6 +112,8 @@ def size_of(run: Outcome, name: str) -> float:
         found = fields(run.model, waves(run.model, run.y))
         k = ("pressure", "flow").index(name)
         return max(float(np.max(np.abs(pair[k]))) for pair in found.values())
+    if (known := size_at_end(run, name)) is not None:
+        return known
     named = [(text, END.get(text.split(".")[0], "") + text.rsplit(".", 1)[1]) for text in run.probes]
     columns = [k for k, texts in enumerate(named, 1) if name in texts]
     return float(np.max(np.abs(run.rows[:, columns]), initial=0.0))

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.model.schemes import ORDER
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, differences, recorded, size_of
+from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, space_order, starts_with_jump
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.order import Order, Row
+from fvsolve.studies.accuracy.plane import unit_of
 from fvsolve.studies.accuracy.reference import ROUNDING, WORTH, Reference, of_run, reference
-from fvsolve.studies.accuracy.refine import Level, Plan, greatest_rate, pipes
+from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.outcome import Outcome, Told, outcome, prepared
 from fvsolve.studies.points import Points
@@ -35,7 +37,18 @@ class Judge:
         self.own = tuple(probe.text for probe in case.probes)
         if against == "exact" and case.exact is None:
             raise FvsolveError('against = "exact": the case names no solution under [exact]; wanted "finer"')
+        if against == "auto" and case.exact is None and basins(case):  # runs four times finer both ways are too dear
+            self.against = "richardson"
         self.truth: Reference | None = None
+
+    @cached_property
+    def breaks(self) -> list[tuple[float, bool]]:
+        """Kinks and jumps that run through cells: (time [s], whether a value jumps), the start's among them."""
+        found = list(prepared(self.case).breaks)
+        first, second = (level.set for level in self.plan.levels[:2])
+        if self.plan.way != "time" and starts_with_jump(self.case, first, second):
+            found.append((self.case.numerics.start, True))
+        return found
 
     def study(self, points: Points | None, progress: Told) -> Order:
         """Run all rows, coarsest first, and fit; those that `points` has are reused.
@@ -123,8 +136,9 @@ class Judge:
         notes = ["[exact] does not hold with these settings and is left out"] if left_out else []
         notes += [*notes_of(rows, doubtful), *self.expected(), *self.way_out(fits)]
         numerics = self.case.numerics
+        known = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
         return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
-                     tuple(notes))  # fmt: skip
+                     tuple(notes), known)  # fmt: skip
 
     def refuse(self, rows, fits, words: str) -> None:
         """FvsolveError where the reference can judge no row in any variable."""
@@ -141,7 +155,7 @@ class Judge:
 
     def smooth_order(self) -> float:
         """Order that scheme and method have together where all is smooth; NaN where rows are tolerances."""
-        numerics, space = self.case.numerics, ORDER[self.case.numerics.scheme]
+        numerics, space = self.case.numerics, space_order(self.case)
         if self.plan.way == "space" or (self.plan.way == "both" and numerics.rtol is not None):
             return space
         if self.plan.measure == "rtol":
@@ -151,23 +165,26 @@ class Judge:
 
     def theory(self) -> dict[str, float]:
         """Norm -> order that is expected: jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
-        p, breaks = self.smooth_order(), prepared(self.case).breaks
+        p, breaks = self.smooth_order(), self.breaks
         if self.plan.way == "time" or not breaks:
             return dict.fromkeys(NORMS, p)
         s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
+        if s == 0.0 and any(basin.physics == "free-surface" for basin in basins(self.case).values()):
+            return {"L1": 1.0, "L2": 0.5, "max": 0.0}  # bores keep steep
         return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
 
     def expected(self) -> list[str]:
         """What is to be said where jumps or kinks of schedules run through pipes."""
-        breaks = prepared(self.case).breaks
+        breaks = self.breaks
         if self.plan.way == "time" or not breaks:
             return []
         jump, told = any(jumps for _, jumps in breaks), self.theory()
         what = "jumps, so fronts run" if jump else "has kinks, and these run"
+        where = "a schedule" if prepared(self.case).breaks else "the start"
         most = "none in max" if jump else f"{told['max']:.2g} in max"
         more = "; so does what opens or shuts on the way" if prepared(self.case).events else ""
         return [
-            f"a schedule {what} through the pipes{more}: order {self.smooth_order()} in space and time is expected to "
+            f"{where} {what} through the cells{more}: order {self.smooth_order()} in space and time is expected to "
             f"show about {told['L1']:.2g} in L1, {told['L2']:.2g} in L2 and {most}"
         ]
 
@@ -183,10 +200,9 @@ class Judge:
         elif numerics.step is not None:
             key = f"step={0.25 * step:.2g}"
         else:
-            rate = greatest_rate(
-                self.case, {name: self.plan.levels[-1].set[f"links.{name}.cells"] for name in pipes(self.case)}
-            )
-            key = f"courant={0.25 * step * rate:.2g}"
+            last = self.plan.levels[-1].set
+            cells = {name: tuple(np.atleast_1d(last[name]).tolist()) for name in counts(self.case)}
+            key = f"courant={0.25 * step * greatest_rate(self.case, cells):.2g}"
         return [f"what steps do wrong is the same in all rows; where that hides the order: --set numerics.{key}"]
 
     # Richardson ------------------------------------------------------------------------------------------------

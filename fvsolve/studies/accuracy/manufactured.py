@@ -11,10 +11,10 @@ from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.kernels import records as rec
 from fvsolve.studies.accuracy.apart import recorded
+from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
 from fvsolve.studies.accuracy.order import Order
 from fvsolve.studies.accuracy.reference import ExactFields, ExactRows, Reference, finer_reference
-from fvsolve.studies.accuracy.refine import pipes
 from fvsolve.studies.outcome import Outcome, outcome, prepared
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.accuracy.afford import affordable
@@ -39,6 +39,7 @@ class Order:
     """An order study of one scheme and method.
 
     fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> the reference's own error
+    units : of variables that are no probe's
     kind : of the reference, "exact" | "finer" | "richardson" | "function"; notes : what must be said of the numbers
     """
 
@@ -52,6 +53,7 @@ class Order:
     fits: dict[str, dict[str, Fit]]
     own: dict[str, dict[str, float]]
     notes: tuple[str, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -78,8 +80,9 @@ def order(
     """Errors of a case over a refinement and the order at which they fall.
 
     case, set : as `run` takes them; refine, key, levels, cells : as `studies.refine.plan` takes them
-    scheme, method : in place of the case's; against : "auto" (exact if the case names one, else finer), "exact",
-    "finer" (two levels finer by another scheme and method) or "richardson" (each row against the next)
+    scheme, method : in place of the case's; against : "auto" (exact if the case names one, else finer, with basins
+    richardson), "exact", "finer" (two levels finer by another scheme and method) or "richardson" (each row against the
+    next)
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start where `initial` is left out
@@ -94,7 +97,6 @@ def order(
         )
     given = {"numerics.scheme": scheme, "numerics.method": method}
     case = load(case, {**(set or {}), **{name: value for name, value in given.items() if value is not None}})
-    without_basins(case, "order")
     made = affordable(case, refine, key, levels, cells, against, points)
     if initial is None and source is None and exact is None:
         from fvsolve.studies.accuracy.judge import Judge
@@ -103,5 +105,6 @@ def order(
     else:
         from fvsolve.studies.accuracy.manufactured import Manufactured
 
+        without_basins(case, "order by functions of pipes")
         judge = Manufactured(case, made, against, initial, source, exact)
     return judge.study(points, progress or (lambda *_: None))

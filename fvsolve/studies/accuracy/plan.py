@@ -11,7 +11,7 @@ from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHO
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.model.checks import rhs_seconds
 from fvsolve.steppers.methods import AUTO, METHODS
-from fvsolve.studies.accuracy.refine import greatest_rate, pipes
+from fvsolve.studies.accuracy.cells import counts, greatest_rate, total
 from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest, with_cells, without_cells
 from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
 from fvsolve.studies.outcome import prepared
@@ -77,8 +77,8 @@ def coarse(case: Case) -> Coarse:
 def work(case: Case, cells: int) -> float:
     """Cells times steps of a run with so many in the pipe that a wave crosses last."""
     made = load(case, cell_keys(case, cells))
-    counts = {name: pipe.cells for name, pipe in pipes(made).items()}
-    return sum(counts.values()) * (case.numerics.end - case.numerics.start) * greatest_rate(made, counts)
+    own = counts(made)
+    return total(made, own) * (case.numerics.end - case.numerics.start) * greatest_rate(made, own)
 
 
 def default_scheme(case: Case) -> str:

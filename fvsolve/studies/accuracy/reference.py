@@ -17,7 +17,8 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, averaged, differences, fields, recorded, size_of, waves
-from fvsolve.studies.accuracy.refine import greatest_rate, pipes
+from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, keys, pipes, scaled, total
+from fvsolve.studies.accuracy.plane import lowered
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.outcome import Outcome, outcome
 
@@ -35,7 +36,8 @@ class Reference:
     """What a study measures against.
 
     kind : "exact" | "finer" | "function"; words : what it is, for a table
-    fields : fields(model) -> {pipe: (pressure [Pa], flow [m3/s])}, averages over that model's cells at the end
+    fields : fields(model) -> {pipe: (pressure [Pa], flow [m3/s]), ("basin", name): float64[quantities, n]}, averages
+    over that model's cells at the end
     rows : rows(run) -> float64[k, probes], what the probes of a run should show at its rows; NaN: not known
     own : variable -> {"L1", "L2", "max"}, its own error as far as it is known; empty for an exact solution
     """
@@ -159,21 +161,24 @@ def finer_reference(case, avoid: tuple[str, ...], way: str, finer: int = FINER, 
 
 def otherwise(case, avoid, way: str, share: float) -> dict:
     """Keys that make a case `share` times as fine, by another method and, in space, another scheme."""
-    numerics, counts = case.numerics, {name: pipe.cells for name, pipe in pipes(case).items()}
+    numerics, cells = case.numerics, counts(case)
     method = other_method(case)
-    keys: dict = {"numerics.method": method}
-    if way != "time" and counts:
-        counts = {name: max(1, round(n * share)) for name, n in counts.items()}
+    found: dict = {"numerics.method": method}
+    if way != "time" and cells:
+        cells = scaled(cells, share)
         able = [name for name in SCHEMES if name in case.schemes]
-        keys["numerics.scheme"] = next((name for name in able if name not in avoid), able[0])
-        keys |= {f"links.{name}.cells": n for name, n in counts.items()}
+        found["numerics.scheme"] = next((name for name in able if name not in avoid), able[0])
+        found |= keys(cells)
         if numerics.rtol is not None and not METHODS[method].explicit:
-            return keys | {"numerics.rtol": max(1e-13, min(1e-8, 0.01 * numerics.rtol))}
-        return keys | {"numerics.step": COURANT / greatest_rate(case, counts)}
+            return found | {"numerics.rtol": max(1e-13, min(1e-8, 0.01 * numerics.rtol))}
+        if basins(case):  # whose waves may run quicker than at the start
+            return found | {"numerics.courant": COURANT}
+        return found | {"numerics.step": COURANT / greatest_rate(case, cells)}
     if numerics.rtol is not None:
-        return keys | {"numerics.rtol": max(1e-13, numerics.rtol * 0.1 ** (2.0 + 1.5 * math.log2(share)))}
-    step = numerics.step or numerics.courant / greatest_rate(case, counts)
-    return keys | {"numerics.step": (min(step, 1.0 / greatest_rate(case, counts)) if counts else step) / share}
+        return found | {"numerics.rtol": max(1e-13, numerics.rtol * 0.1 ** (2.0 + 1.5 * math.log2(share)))}
+    there = bool(cells or basins(case))
+    step = numerics.step or numerics.courant / greatest_rate(case, cells)
+    return found | {"numerics.step": (min(step, 1.0 / greatest_rate(case, cells)) if there else step) / share}
 
 
 def other_method(case) -> str:
@@ -189,7 +194,9 @@ def of_run(run: Outcome) -> Reference:
     def fields_of(model) -> dict:
         fine = waves(run.model, run.y)
         cells = {pipe.name: pipe.cells for pipe in model.pipes}
-        return fields(model, {name: tuple(averaged(one, cells[name]) for one in pair) for name, pair in fine.items()})
+        found = fields(model, {name: tuple(averaged(one, cells[name]) for one in pair) for name, pair in fine.items()})
+        pairs = zip(run.model.basins, model.basins, strict=True)
+        return found | {("basin", other.name): lowered(one, one.of(run.y), other) for one, other in pairs}
 
     def rows_of(other: Outcome) -> np.ndarray:
         t = run.rows[:, 0]
@@ -205,7 +212,8 @@ def of_run(run: Outcome) -> Reference:
 def words_of(run: Outcome) -> str:
     """A run in words."""
     numerics = run.model.case.numerics
-    cells = f"{run.model.cells} cells, {numerics.scheme}, " if run.model.cells else ""
+    many = total(run.model.case, counts(run.model.case))
+    cells = f"{many} cells, {numerics.scheme}, " if many else ""
     name = next(key for key in ("rtol", "step", "courant") if getattr(numerics, key) is not None)
     steps = f"{name} = {getattr(numerics, name):.4g}{' s' * (name == 'step')}"
     return f"reference run: {cells}{numerics.method}, {steps}"

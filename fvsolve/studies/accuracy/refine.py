@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.model.schemes import ORDER
-from fvsolve.parts import Pipe
 from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.studies.accuracy.cells import (
+    Counts,
+    basins,
+    counts,
+    from_files,
+    greatest_rate,
+    keys,
+    most,
+    pipes,
+    refinable,
+    scaled,
+    size,
+    space_order,
+    total,
+)
 
 WAYS = ("both", "space", "time")
 TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
@@ -24,7 +36,7 @@ LEAST_COURANT = 0.02  # below which that is not worth its time
 class Level:
     """One row: what is set on the case, the size that halves from row to row, and the words of the table.
 
-    set : dotted keys -> values; size : of cells [m], steps [s] or a tolerance; cells : of all pipes
+    set : dotted keys -> values; size : of cells [m], steps [s] or a tolerance; cells : of all pipes and basins
     step : fixed step [s], NaN where steps follow a tolerance
     """
 
@@ -46,8 +58,8 @@ class Plan:
 
 def resolutions(case) -> dict[str, str]:
     """Key -> the way it refines, of every key of a case that is a resolution."""
-    found = {f"links.{name}.cells": "both" for name in pipes(case)}
-    if found:
+    found = dict.fromkeys(counts(case), "both")
+    if pipes(case) or basins(case):
         found["numerics.courant"] = "time"
     if by_cell_time(case):
         found["numerics.cell_time"] = "both"
@@ -59,30 +71,25 @@ def by_cell_time(case) -> list[str]:
     return [name for name in pipes(case) if "cells" not in case.raw["links"][name]]
 
 
-def pipes(case) -> dict[str, Pipe]:
-    """The pipes of a case, by name."""
-    return {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
-
-
 def plan(
     case, refine: str | None = None, key: str | None = None, levels: int | None = None, cells: int | None = None
 ) -> Plan:
     """The rows of a refinement of a case, coarsest first.
 
-    refine : "both" (cells and steps halved together, the default with pipes), "space" (cells halved, one step that
-    suits the finest), "time" (steps halved, or rtol where the case steps by error; the default without pipes)
-    key : one resolution in place of all; cells : of the coarsest row, in the pipe with most (the others in proportion)
-    Raises FvsolveError for a way, key or number of levels that cannot be.
+    refine : "both" (cells and steps halved together, the default with cells), "space" (cells halved, one step that
+    suits the finest), "time" (steps halved, or rtol where the case steps by error; the default without cells)
+    key : one resolution in place of all; cells : of the coarsest row, along the pipe or side with most (the others in
+    proportion). Raises FvsolveError for a way, key or number of levels that cannot be.
     """
     known = resolutions(case)
     if key is not None and key not in known:
         near = did_you_mean(key, known)
         raise FvsolveError(f"{key} is no resolution{near}; those of this case are {', '.join(known)}")
-    refine = refine or (known[key] if key else "both" if pipes(case) else "time")
+    refine = refine or (known[key] if key else "both" if counts(case) else "time")
     if refine not in WAYS:
         raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}; wanted {", ".join(WAYS)}')
-    if refine != "time" and not pipes(case):
-        raise FvsolveError(f'this case has no pipe and so no cells: refine "{refine}" cannot be; wanted "time"')
+    if refine != "time":
+        refinable(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
         raise FvsolveError(f'{key} refines {"time" if known[key] == "time" else "space"}, not "{refine}"')
     levels = LEVELS[refine] if levels is None else levels
@@ -95,38 +102,38 @@ def plan(
 
 
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
-    """Cells of all pipes, or of the one that the key names, doubled from row to row."""
-    counts = coarsest(case, key, cells)
-    moving = [name for name in counts if key in (None, f"links.{name}.cells")]
-    moving = by_cell_time(case) if key == "numerics.cell_time" else moving
-    finest = {name: n * 2 ** (levels - 1) if name in moving else n for name, n in counts.items()}
-    most = sum(finest.values())
-    if most > MOST_CELLS:
-        raise FvsolveError(f"the finest of {levels} levels would have {most:.3g} cells; {MOST_CELLS:.0e} at most: "
+    """Cells of all pipes and basins, or of the one that the key names, doubled from row to row."""
+    first = coarsest(case, key, cells)
+    moving = [name for name in first if key in (None, name)]
+    if key == "numerics.cell_time":
+        moving = [f"links.{name}.cells" for name in by_cell_time(case)]
+    now = [{name: tuple(n * 2**k for n in numbers) if name in moving else numbers for name, numbers in first.items()}
+           for k in range(levels)]  # fmt: skip
+    finest = total(case, now[-1])
+    if finest > MOST_CELLS:
+        raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells; {MOST_CELLS:.0e} at most: "
                            "fewer levels, or fewer cells to begin with")  # fmt: skip
     rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
-    for k in range(levels):
-        now = {name: n * 2**k if name in moving else n for name, n in counts.items()}
-        kept = now if way == "both" else finest
-        step, stepping = stepping_of(case, now, kept, k, courant)
-        size = max(pipes(case)[name].length / now[name] for name in moving)
-        chosen = {f"links.{name}.cells": n for name, n in now.items()} | stepping
-        rows.append(Level(chosen, size, sum(now.values()), step))
-    what = "cells of all pipes" if len(moving) == len(counts) else f"cells of {', '.join(moving)}"
+    for k, own in enumerate(now):
+        step, stepping = stepping_of(case, own, own if way == "both" else now[-1], k, courant)
+        length = max(size(case, name, own[name]) for name in moving)
+        rows.append(Level(keys(own) | stepping, length, total(case, own), step))
+    names = ", ".join(name.split(".")[1] for name in moving)
+    everything = " and ".join(word for word, there in (("pipes", pipes(case)), ("basins", basins(case))) if there)
+    what = f"cells of all {everything}" if len(moving) == len(first) and not from_files(case) else f"cells of {names}"
     return Plan(way, "cell size [m]", tuple(rows), f"{what} doubled, {time_words(case, way, courant)}")
 
 
-def coarsest(case, key: str | None, cells: int | None) -> dict[str, int]:
+def coarsest(case, key: str | None, cells: int | None) -> Counts:
     """Cells of the first row."""
-    counts = {name: pipe.cells for name, pipe in pipes(case).items()}
+    found = counts(case)
     if cells is None:
-        return counts
+        return found
     if cells < 1:
         raise FvsolveError(f"cells = {cells}; wanted 1 at least")
-    if key is not None and key.endswith(".cells"):
-        return counts | {key.split(".")[1]: cells}
-    most = max(counts.values())
-    return {name: max(1, round(n * cells / most)) for name, n in counts.items()}
+    if key in found:
+        return found | scaled({key: found[key]}, cells / max(found[key]))
+    return scaled(found, cells / most(found))
 
 
 def space_courant(case, levels: int) -> float | None:
@@ -137,14 +144,12 @@ def space_courant(case, levels: int) -> float | None:
     numerics = case.numerics
     if numerics.courant is None:
         return None
-    p, q = ORDER[numerics.scheme], METHODS[numerics.method].order
+    p, q = space_order(case), METHODS[numerics.method].order
     share = STEP_SHARE * 2.0 ** (-(levels - 1) * max(p - q, 0))
     return min(numerics.courant, max(LEAST_COURANT, float(f"{share ** (1.0 / q):.2g}")))
 
 
-def stepping_of(
-    case, cells: Mapping[str, int], kept: Mapping[str, int], k: int, courant: float | None
-) -> tuple[float, dict]:
+def stepping_of(case, cells: Counts, kept: Counts, k: int, courant: float | None) -> tuple[float, dict]:
     """(step [s], keys) of a row: at a Courant number on the cells `kept`, or the case's step halved k times."""
     numerics = case.numerics
     if numerics.rtol is not None:
@@ -156,11 +161,6 @@ def stepping_of(
         return step, {"numerics.step": step}
     step = courant / greatest_rate(case, kept)
     return step, {} if kept is cells else {"numerics.step": step}
-
-
-def greatest_rate(case, cells: Mapping[str, int]) -> float:
-    """Cells that the quickest wave crosses in a second [1/s]."""
-    return max(case.wave_speed(name) * n / case.links[name].length for name, n in cells.items())
 
 
 def time_words(case, way: str, courant: float | None) -> str:
@@ -178,7 +178,7 @@ def time_words(case, way: str, courant: float | None) -> str:
 
 def time_plan(case, key: str | None, levels: int) -> Plan:
     """Steps halved from row to row on one grid, or tolerances divided by ten."""
-    numerics, count = case.numerics, sum(pipe.cells for pipe in pipes(case).values())
+    numerics, count = case.numerics, total(case, counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
         if numerics.method != AUTO and not METHODS[numerics.method].adaptive:
@@ -201,8 +201,7 @@ def first_step(case) -> float:
     numerics, every = case.numerics, case.output.every
     if numerics.step is not None:
         return numerics.step
-    if not pipes(case):
+    if not (pipes(case) or basins(case)):
         return every
-    cells = {name: pipe.cells for name, pipe in pipes(case).items()}
-    step = (numerics.courant or 0.9) / greatest_rate(case, cells)
+    step = (numerics.courant or 0.9) / greatest_rate(case, counts(case))
     return every / math.ceil(every / step) if every > step else step

@@ -40,14 +40,15 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
 
     before : at a kink or jump of a schedule, hold the value just before it; else the one just after
     probes : names to be observed beside those of the case, first in their order
-    A case that names no scheme gets the linear one that the default is where all is smooth.
+    A case that names no scheme gets the linear one that the default is where all is smooth, with basins upwind.
     Raises CaseError for a case or probe that cannot be read, FvsolveError where there is no state, or no way there.
     """
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in FROZEN_AS:
-        case = load(case, {"numerics.scheme": FROZEN_AS[case.numerics.scheme]})
+        linear = "upwind" if case.meshes else FROZEN_AS[case.numerics.scheme]
+        case = load(case, {"numerics.scheme": linear})
     names = list(dict.fromkeys([*probes, *(probe.text for probe in case.probes)]))
     last = case.numerics.end if at is None else max(case.numerics.end, float(at))
     model = prepared(case, {"output.probes": names, "numerics.end": last})
@@ -65,7 +66,7 @@ def _arrive(model, at: float | None) -> tuple[float, np.ndarray]:
     """Time and state at `at`, by a run; the start where it is None."""
     start = model.case.numerics.start
     if at is None or at == start:
-        return start, np.zeros(model.y_size)
+        return start, model.start.copy()
     if not start < at < np.inf:
         raise FvsolveError(f"at = {at:g} s is no time after the start of the case, {start:g} s")
     numerics = model.case.numerics.model_copy(update={"end": float(at)})
@@ -108,5 +109,14 @@ def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
 
 
 def has_limiter(model) -> bool:
-    """Whether a limited scheme is at work."""
-    return model.cells > 0 and model.case.numerics.scheme in LIMITED
+    """Whether a limited scheme is at work; in basins all that is not `upwind`, or `upwind5` of a liquid on a grid."""
+    scheme = model.case.numerics.scheme
+    if any(limited(basin, scheme) for basin in model.basins):
+        return True
+    return model.cells > 0 and scheme in LIMITED
+
+
+def limited(basin, scheme: str) -> bool:
+    """Whether a basin limits its slopes under a scheme."""
+    straight = basin.is_grid and basin.part.physics != "free-surface"
+    return scheme != "upwind" and not (scheme == "upwind5" and straight)

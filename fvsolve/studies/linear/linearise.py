@@ -10,6 +10,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import schedule_value
+from fvsolve.model.basins.units import unit_of
 from fvsolve.solve.advance import Input, hold, input_schedules
 from fvsolve.studies.linear.frozen import FROZEN_AS, Frozen, frozen, has_limiter
 from fvsolve.studies.linear.matrices import output_matrix, responses, state_matrix
@@ -56,8 +57,12 @@ class Linear:
     @property
     def state_units(self) -> list[str]:
         """Units of x."""
-        names = set(self.states)
-        return [state_unit(name, f"{name.rsplit('.', 1)[0]}.opening" in names) for name in self.states]
+        names, basins = set(self.states), {basin.name: basin.part.physics for basin in self.at.model.basins}
+        return [
+            unit_of(basins[part], quantity.split("[")[0]) if part in basins
+            else state_unit(name, f"{part}.opening" in names)
+            for name in self.states for part, quantity in [name.rsplit(".", 1)]
+        ]  # fmt: skip
 
     @property
     def sparse(self) -> bool:
@@ -72,7 +77,7 @@ class Linear:
             a = {"row": entries.row, "column": entries.col, "value": entries.data}
         return {
             "case": self.at.model.case.name, "at": self.at.t, "when": self.at.when,
-            "scheme": self.at.model.case.numerics.scheme if self.at.model.cells else None,
+            "scheme": self.at.model.case.numerics.scheme if self.at.model.cells or self.at.model.basins else None,
             "states": self.states, "state_units": self.state_units, "inputs": self.inputs,
             "input_units": self.input_units, "input_values": self.input_values, "outputs": self.outputs,
             "output_units": self.output_units, "output_values": self.output_values,
@@ -130,10 +135,12 @@ def refuse_limiter(model) -> None:
     """Raise where a limited scheme is at work."""
     scheme, able = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
-        smooth = f"{FROZEN_AS[scheme]} (what {scheme} is where all is smooth), upwind or upwind5"
+        smooth = "upwind"
+        if "upwind5" in able and not model.basins:
+            smooth = f"{FROZEN_AS[scheme]} (what {scheme} is where all is smooth), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
-            f"the deviation; linearise with a linear scheme, --scheme {smooth if 'upwind5' in able else 'upwind'}"
+            f"the deviation; linearise with a linear scheme, --scheme {smooth}"
         )
 
 

@@ -15,7 +15,7 @@ GROWS = 1e-9  # of the greatest wave rate or eigenvalue: real parts below are ro
 def notes(row, side, system) -> list[str]:
     """What a reader of the row has to know."""
     found = [*of_the_case(row, side)]
-    if row.scheme in LIMITED and side.at.model.cells:
+    if row.frozen or (row.scheme in LIMITED and side.at.model.cells):
         return found + of_a_limiter(row, side.at.model)
     if not np.isfinite(row.predicted):
         return [*found, "no step up to 1e4 / ||J|| fails", *of_a_state_left(row)]
@@ -119,6 +119,8 @@ def of_a_limiter(row, model) -> list[str]:
     beside = "its weights give the limits beside it"
     if model.cavitates:
         beside = "pipes with cavities know its weights only as upwind"
+    elif model.basins:
+        beside = "basins know its weights only as upwind"
     found = [f"{row.scheme} has no derivative at a constant state: its limit is measured; frozen, {beside}"]
     if np.isfinite(row.longer):
         found.append(f"Euler with a limiter has no sharp limit: {row.courant(row.measured):.3g} in {row.steps} steps, "

@@ -17,7 +17,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.model.energy import EnergyForm, energy_form
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.methods import AUTO
-from fvsolve.studies.linear.frozen import FROZEN_AS, LIMITED, Frozen, frozen, reweighted
+from fvsolve.studies.linear.frozen import FROZEN_AS, Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
 from fvsolve.studies.points import Points
@@ -84,7 +84,7 @@ class Side:
     @property
     def rate(self) -> float:
         """Greatest wave rate [1/s]; 0 without cells."""
-        return float(self.at.model.wave_rates.max(initial=0.0))
+        return self.at.model.wave_rate
 
 
 def stability(
@@ -141,7 +141,7 @@ class Maker:
     def frozen_sides(self) -> Iterator[tuple[str, Side]]:
         """Linear systems with the weights of the limited scheme standing still; same cells, same state."""
         at = self.at(self.scheme)
-        if at.model.cavitates:  # pipes with cavities have no weights but these
+        if at.model.cavitates or at.model.basins:  # which have no linear scheme but this
             yield "upwind", Side(replace(self.at("upwind"), y=at.y))
             return
         from fvsolve.studies.stability.limited import FROZEN
@@ -157,7 +157,7 @@ class Maker:
     def row(self, name: str) -> Row:
         """The row of a method."""
         method = method_named(name)
-        if self.scheme in LIMITED and self.at(self.scheme).model.cells:
+        if has_limiter(self.at(self.scheme).model):
             return self.limited(method)
         side = self.side(self.scheme)
         one = system(method, side.e, self.steps, self.threshold)
@@ -190,7 +190,7 @@ class Maker:
         else:
             left_out["field_of_values"] = f"{model.y_size} states; it is computed up to {WIDE}"
         if model.cells:
-            row["von_neumann"] = on_a_long_pipe(self.scheme, method) / side.rate
+            row["von_neumann"] = on_a_long_pipe(self.scheme, method) / float(model.wave_rates.max())
         if model.y_size > DENSE:
             left_out["squaring"] = f"{model.y_size} states: predicted by {VECTORS} vectors carried along"
         return row | {"left_out": left_out}
@@ -210,7 +210,7 @@ class Maker:
             left_out["frozen weights"] = str(error)
         guess = sorted(starts)[len(starts) // 2] if starts else np.inf  # between the flat and the steep ones
         if left_out and not starts:
-            guess = on_a_long_pipe(FROZEN_AS[self.scheme], method) / side.rate or np.inf
+            guess = on_a_long_pipe(FROZEN_AS.get(self.scheme, self.scheme), method) / side.rate or np.inf
         runs = Runs(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, VISIBLE)
         row = {
             "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,

@@ -1,0 +1,53 @@
+"""Which states of a basin its rates can depend on. Knows neighbours; knows no values."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array, eye_array, kron
+
+from fvsolve.kernels import records as rec
+
+REACH = {rec.UPWIND: 1, rec.MUSCL: 2}  # cells either way; fifth order looks at three
+
+
+def inside(basin) -> tuple[np.ndarray, np.ndarray]:
+    """(rates, as many states that they depend on) of all cells on those about them."""
+    near, many = neighbours(basin), len(basin.quantities)
+    found = kron(coo_array(np.ones((many, many), dtype=bool)), near).tocoo()
+    at = int(basin.row["y"])
+    return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
+
+
+def carried(basin) -> tuple[np.ndarray, np.ndarray]:
+    """The same of amounts that a given velocity carries, each on itself; what is held to bounds looks further."""
+    near, at = neighbours(basin), int(basin.row["carried"])
+    if basin.row["scheme"] == rec.WENO5:
+        near = near @ near
+    found = kron(eye_array(len(basin.scalars), dtype=bool), csr_array(near, dtype=bool)).tocoo()
+    return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
+
+
+def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
+    """States of cells, of the first quantities or all."""
+    many = len(basin.quantities) if quantities is None else quantities
+    return (int(basin.row["y"]) + np.arange(many)[:, None] * basin.n + cells).ravel()
+
+
+def neighbours(basin) -> csr_array:
+    """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
+    mesh, reach = basin.mesh, REACH.get(int(basin.row["scheme"]), 3)
+    left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
+    groups = [slice(None)]
+    if basin.is_grid:
+        across = np.abs(mesh.normal[: mesh.inner, 0]) > 0.5
+        groups = [across, ~across]
+    found = csr_array(eye_array(basin.n, dtype=bool))
+    for group in groups:
+        ones = np.ones(left[group].size, dtype=bool)
+        one = csr_array(coo_array((ones, (left[group], right[group])), shape=(basin.n, basin.n)))
+        ring = one + one.T + eye_array(basin.n, dtype=bool)
+        reached = ring
+        for _ in range(reach - 1):
+            reached = reached @ ring
+        found = found + reached
+    return csr_array(found, dtype=bool)

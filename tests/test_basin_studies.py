@@ -1,0 +1,194 @@
+"""Basins in studies: orders, patterns of Jacobians and implicit steps, limits of steps, energy, dispersion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pytest import approx
+from test_sparsity import stray
+from truth.scenes import AMBIENT, GRAVITY, pipe, ramp, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.errors import FvsolveError
+from fvsolve.model.basins import FreeSurface
+from fvsolve.model.sparsity import sparsity
+from fvsolve.studies.accuracy.cells import counts, keys, scaled
+from fvsolve.studies.accuracy.order import order
+from fvsolve.studies.accuracy.plane import lowered
+from fvsolve.studies.accuracy.refine import plan, resolutions
+from fvsolve.studies.linear.linearise import linearise
+from fvsolve.studies.stability.stability import stability
+
+PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
+SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  # of 10 m by 5 m
+
+
+def pool(cells, level: str | None = None, size=(10.0, 5.0), depth: float = 1.0, **more) -> dict:
+    start = {} if level is None else {"start": {"level": level}}
+    return {"type": "basin", "size": list(size), "cells": list(cells), "level": depth, **start, **more}
+
+
+def alone(basin: dict, end: float, **numerics) -> dict:
+    return scene({"pool": basin}, {}, end, PLANE | numerics, every=end / 20)
+
+
+def built(case: dict):
+    return fvsolve.build(fvsolve.load(case))
+
+
+# order ----------------------------------------------------------------------------------------------------------
+
+
+def test_errors_of_a_smooth_slosh_fall_at_the_order_of_the_scheme():
+    found = order(alone(pool((40, 20), SLOSH), 1.2), levels=4)
+    assert found.kind == "richardson" and [row.level.cells for row in found.rows] == [800, 3200, 12800, 51200]
+    fit = found.fits["pool at the end: depth"]
+    assert fit["L1"].order == approx(2.0, abs=0.25) and fit["L2"].order == approx(2.0, abs=0.25)
+    first = order(alone(pool((40, 20), SLOSH), 1.2, scheme="upwind", method="euler"), levels=4)
+    assert first.fits["pool at the end: depth"]["L1"].order == approx(1.0, abs=0.2)
+    assert found.plain()["rows"][1]["set"]["nodes.pool.cells"] == [80, 40]
+
+
+def test_a_finer_run_judges_as_rows_judge_each_other():
+    case = alone(pool((20, 10), SLOSH), 1.2)
+    by_rows, finer = order(case, levels=5), order(case, levels=3, against="finer")
+    for k in range(3):
+        name = "pool at the end: flow_y"
+        assert finer.rows[k].errors[name]["L1"] == approx(by_rows.rows[k].errors[name]["L1"], rel=0.1)
+
+
+def test_a_broken_dam_is_of_first_order_in_the_mean_and_the_note_says_why():
+    found = order(alone(pool((50, 2), "where(x < 5, 1, 0.4)", size=(10.0, 0.4)), 0.6), levels=4)
+    assert found.fits["pool at the end: depth"]["L1"].order == approx(1.0, abs=0.1)
+    assert any("the start jumps" in note and "about 1 in L1" in note for note in found.notes)
+
+
+def test_steps_alone_are_refined_on_one_mesh():
+    found = order(alone(pool((20, 10), SLOSH), 1.2), refine="time", levels=4)
+    assert found.fits["pool at the end: depth"]["L1"].order == approx(2.0, abs=0.15)
+    assert len({row.level.cells for row in found.rows}) == 1
+
+
+def test_cells_of_pipes_and_basins_double_together_in_both_directions():
+    still = PLANE | {"initial": "rest"}
+    nodes = {"lake": reservoir(2e5), "pool": pool((4, 6), patches={"in": {"side": "west"}})}
+    case = fvsolve.load(scene(nodes, {"main": pipe("lake", "pool.in", 50.0, 0.1, 1000.0, 10)}, 0.1, still))
+    assert resolutions(case)["nodes.pool.cells"] == "both"
+    rows = plan(case, levels=3).levels
+    assert [row.set["nodes.pool.cells"] for row in rows] == [[4, 6], [8, 12], [16, 24]]
+    assert [row.set["links.main.cells"] for row in rows] == [10, 20, 40] and rows[2].cells == 16 * 24 + 40
+    one = plan(case, key="nodes.pool.cells", levels=2).levels[1]
+    assert one.set["nodes.pool.cells"] == [8, 12] and one.set["links.main.cells"] == 10
+    assert keys(scaled(counts(case), 0.5)) == {"links.main.cells": 5, "nodes.pool.cells": [2, 3]}
+
+
+def test_what_a_basin_holds_is_the_same_on_coarser_cells():
+    """Averages keep contents to rounding, graded and holed too, and are those of the function to high order."""
+    for more in ({}, {"grading": [3.0, 0.5]}, {"holes": [[2.5, 1.25, 5.0, 2.5]]}):
+        cases = [fvsolve.load(alone(pool(cells, **more), 1.0)) for cells in ((48, 32), (24, 16))]
+        fine, coarse = (FreeSurface(case, "pool") for case in cases)
+        value = np.cos(0.3 * fine.x) * np.exp(0.2 * fine.y)
+        found = lowered(fine, value[None], coarse)[0]
+        assert found @ coarse.mesh.area == approx(value @ fine.mesh.area, rel=1e-14)
+        wanted = np.cos(0.3 * coarse.x) * np.exp(0.2 * coarse.y)
+        assert np.abs(found - wanted).max() < 5e-3
+
+
+def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
+    import meshio
+
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]))
+    basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
+    case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
+    with pytest.raises(FvsolveError, match="the mesh of pool is a file, which nothing refines"):
+        plan(case, "both")
+
+
+# Jacobians and implicit steps ---------------------------------------------------------------------------------------
+
+
+def fed(scheme: str, end: float = 1.0, **numerics) -> dict:
+    """A sloshing basin between a pipe and a valve that opens, and a drier one behind an orifice."""
+    west = pool((6, 4), SLOSH, elevation=0.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}})
+    east = pool((4, 3), size=(4.0, 3.0), depth=0.5, elevation=0.0, patches={"gate": {"side": "west"}}, bed="0.2*x")
+    links = {
+        "main": pipe("lake", "end", 50.0, 0.3, 1000.0, 6, friction={"model": "steady", "factor": 0.02}),
+        "tap": valve("end", "west.in", 0.02, ramp(0.0, 0.2, 0.0, 1.0)),
+        "hole": valve("west.gate", "east.gate", 0.05),
+    }
+    nodes = {"west": west, "east": east, "end": {"type": "junction", "elevation": 0.0}}
+    nodes["lake"] = reservoir(AMBIENT + 2e4, elevation=0.0)
+    return scene(nodes, links, end, PLANE | {"scheme": scheme} | numerics, ["hole.flow"], end / 10)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
+    model, rng = built(fed(scheme)), np.random.default_rng(1)
+    for t in (0.0, 0.1, 0.9):
+        y = model.start + model.scale * rng.normal(scale=0.2, size=model.y_size)
+        assert stray(model, t, y) < 1e-9
+    entries = sparsity(model).nnz
+    assert entries < 0.35 * model.y_size**2  # a pattern that has everything would show nothing
+
+
+def test_a_cell_feels_its_row_and_column_and_no_corner():
+    """Upwind: five cells of three quantities in the middle of a grid; muscl nine."""
+    for scheme, cells in (("upwind", 5), ("muscl", 9)):
+        model = built(alone(pool((7, 7)), 1.0, scheme=scheme))
+        per_row = np.diff(sparsity(model).tocsr().indptr)
+        assert per_row[24] == 3 * cells
+
+
+@pytest.mark.parametrize("method", ["radau-iia-5", "esdirk-4", "rodas-5p"])
+def test_implicit_steps_come_to_where_explicit_ones_do(method):
+    runs = {}
+    for name, rtol in ((method, 1e-6), ("dormand-prince", 1e-8)):
+        case = fed("muscl", method=name, rtol=rtol, limiter="van-leer")
+        del case["numerics"]["courant"]
+        model = built(case)
+        runs[name] = fvsolve.advance(model, fvsolve.initial_state(model), 1.0).y / model.scale
+    assert np.abs(runs[method] - runs["dormand-prince"]).max() < 2e-3
+    assert fvsolve.run(case).ledger["mass"]["relative"] < 1e-13
+
+
+def test_implicit_steps_may_cross_many_cells():
+    """A deep pool that a shut valve joins: ten times the step that explicit ones can take, and mass stays."""
+    case = alone(pool((16, 8), SLOSH), 4.0, method="radau-iia-5", courant=10.0)
+    run = fvsolve.run(case)
+    assert run.ok and abs(run.ledger["mass"]["relative"]) < 1e-13
+    assert run.summary["steps"] < 100
+
+
+# limits of steps -------------------------------------------------------------------------------------------------
+
+
+def test_a_slosh_blows_up_at_the_predicted_step():
+    """16 by 4 cells at rest: prediction and real runs agree to bisection; about a moving slosh to half a per cent."""
+    still = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
+    assert still.difference == approx(0.0, abs=3e-4)
+    assert still.rate * still.predicted > 2.0  # two half cells: nothing fails at Courant 1
+    moving = stability(alone(pool((16, 4), SLOSH), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
+    assert moving.difference == approx(0.0, abs=1e-2) and any("moves" in note for note in moving.notes)
+
+
+def test_a_limited_basin_is_measured_with_upwind_beside_it():
+    row = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["muscl"], ["ssp-rk2"]).rows[0]
+    assert row.measured == approx(row.frozen["upwind"], rel=0.01)
+    assert any("basins know its weights only as upwind" in note for note in row.notes)
+
+
+def test_a_linearised_basin_sloshes_at_its_natural_frequencies():
+    """Poles about rest: the slowest oscillates as the longest of long waves, sqrt(g h) k, to second order."""
+    depth, size = 1.0, 10.0
+    case = alone(pool((24, 2), size=(size, 1.0), depth=depth), 1.0, scheme="upwind")
+    found = linearise(case)
+    values = np.linalg.eigvals(found.a)
+    slowest = values.imag[values.imag > 1e-6].min()
+    assert slowest == approx(math.sqrt(GRAVITY * depth) * math.pi / size, rel=5e-3)
+    assert found.state_units[0] == "m" and found.state_units[-1] == "m2/s"
+    assert values.real.max() < 1e-9 * abs(values).max()
+    with pytest.raises(FvsolveError, match="--scheme upwind"):
+        linearise(case, scheme="fromm")
