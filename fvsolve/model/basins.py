@@ -6,6 +6,8 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow
+from fvsolve.kernels.plane.basin import NO_SLOPE
+from fvsolve.kernels.plane.shallow_rows import THIN
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER}
 
@@ -30,7 +32,7 @@ def basin_fields(model, basin, row, y: np.ndarray) -> dict[str, np.ndarray]:
     o, at, plane = int(row["y"]), int(row["plan"]), model.tables[rec.I_PLANE]
     depth = np.maximum(plane[at : at + n] + y[o : o + n], 0.0)
     bed = basin.bed_at(np.arange(n)) + (basin.elevation or 0.0)
-    wet = np.maximum(depth, shallow.THIN)
+    wet = np.maximum(depth, THIN)
     share = 2.0 * depth / (depth * depth + wet * wet)
     velocity = np.column_stack([share * y[o + n : o + 2 * n], share * y[o + 2 * n : o + 3 * n], np.zeros(n)])
     return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
@@ -47,15 +49,12 @@ def lower_basins(scene) -> None:
         (nx, ny), (wide, deep) = basin.cells, basin.size
         n = nx * ny
         row["nx"], row["ny"], row["dx"], row["dy"] = nx, ny, wide / nx, deep / ny
-        row["limiter"] = shallow.NO_SLOPE if numerics.scheme == "upwind" else LIMITERS.get(numerics.limiter, 2)
+        row["limiter"] = LIMITERS.get(numerics.limiter, 2) if numerics.scheme != "upwind" else NO_SLOPE
         bed = basin.bed_at(np.arange(n)) - basin.level
         plan = np.zeros((shallow.PLANS, n))
-        plan[shallow.DEPTH], plan[shallow.SURFACE] = np.maximum(-bed, 0.0), np.maximum(bed, 0.0)
-        work, still = np.zeros(shallow.work_size(nx, ny)), np.zeros((3, n))
-        shallow.grid_rates(
-            scene.case.gravity, row["limiter"], nx, ny, nx / wide, ny / deep, plan, *np.zeros((3, n)), work, *still
-        )
-        plan[2:] = still
+        plan[0], plan[1] = np.maximum(-bed, 0.0), np.maximum(bed, 0.0)
+        lengths = np.concatenate([np.full(nx, nx / wide), np.full(ny, ny / deep)])
+        work = np.concatenate([lengths, np.zeros(shallow.work_size(nx, ny))])
         names = [f"{name}.{what}[{i}]" for what in ("depth", "flow_x", "flow_y") for i in range(n)]
         row["y"] = scene.states(names[:n], 0.1)
         scene.states(names[n:], 0.1 * np.sqrt(scene.case.gravity * 0.1))

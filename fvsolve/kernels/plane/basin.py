@@ -11,9 +11,12 @@ from fvsolve.kernels.records import (
     I_PATCHES,
     I_PLANE,
     I_SETTINGS,
+    MUSCL,
     RATE,
+    UPWIND,
 )
 
+NO_SLOPE = -1  # in place of a limiter: first order
 SHALLOW = 1e-3  # depth at a patch below which no more than a share of what is asked can leave [m]
 UNSPLIT = 2.0  # Courant numbers count half cells, so that no depth falls below zero at one
 
@@ -43,10 +46,11 @@ def basin_rates(t, y, dydt, out, handle):
         basin = tables[I_BASINS][b]
         n, o, at = basin["nx"] * basin["ny"], basin["y"], basin["plan"]
         plan = tables[I_PLANE][at : at + PLANS * n].reshape((PLANS, n))
+        work, nx, ny = tables[I_PLANE][basin["work"] :], basin["nx"], basin["ny"]
         rate = grid_rates(
-            st["gravity"], basin["limiter"], basin["nx"], basin["ny"], 1.0 / basin["dx"], 1.0 / basin["dy"], plan,
-            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], tables[I_PLANE][basin["work"] :],
-            dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+            st["gravity"], UPWIND if basin["limiter"] == NO_SLOPE else MUSCL, basin["limiter"], nx, ny,
+            work[:nx], work[nx : nx + ny], work[:0], plan, y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
+            work[:0], work[:0], work[nx + ny :], dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
         )  # fmt: skip
         out[RATE] = max(out[RATE], UNSPLIT * rate)
     for k in range(tables[I_PATCHES].size):
