@@ -5,7 +5,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane.shallow import DEPTH, THIN
+from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     CELL_DEPTH,
     CELL_SPEED,
@@ -66,7 +66,7 @@ def stored(tables, probe, y):
         i = tables[I_INTEGERS][probe["cell"] + m]
         value = y[at + i]
         if probe["kind"] == CELL_DEPTH:
-            value = max(tables[I_PLANE][basin["plan"] + DEPTH * basin["n"] + i] + value, 0.0)
+            value = max(tables[I_PLANE][basin["plan"] + i] + value, 0.0)
         total += tables[I_FLOATS][probe["weights"] + m] * value
     return total
 
@@ -80,7 +80,7 @@ def velocity(tables, probe, axis, y):
         i = tables[I_INTEGERS][probe["cell"] + m]
         flow = y[basin["y"] + axis * n + i]
         if basin["kind"] <= SHALLOW_FACES:  # which fades where water is thin
-            depth = max(tables[I_PLANE][basin["plan"] + DEPTH * n + i] + y[basin["y"] + i], 0.0)
+            depth = max(tables[I_PLANE][basin["plan"] + i] + y[basin["y"] + i], 0.0)
             wet = max(depth, THIN)
             flow *= 2.0 * depth / (depth * depth + wet * wet)
         else:
