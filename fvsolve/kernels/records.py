@@ -315,8 +315,8 @@ POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8
 NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
 
-SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, ACOUSTIC_FACES, LIQUID_GRID, LIQUID_FACES = 0, 1, 2, 3, 4, 5
-CARRIED_GRID, CARRIED_FACES = 6, 7  # kinds of basins: physics, law of the liquid, grid or loop over faces
+SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, LIQUID_GRID, LIQUID_FACES, CARRIED_GRID, CARRIED_FACES = range(7)
+# kinds of basins: physics, and of a liquid on grids law linear or log; grids or meshes of any cells
 
 BASIN = np.dtype(
     [

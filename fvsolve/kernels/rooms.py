@@ -8,9 +8,9 @@ from importlib import import_module
 
 from fvsolve.kernels.devices.loops import loops_of
 from fvsolve.kernels.records import (
-    ACOUSTIC_FACES,
     ACOUSTIC_GRID,
     CARRIED_GRID,
+    LIQUID_FACES,
     LIQUID_GRID,
     SHALLOW_FACES,
     SHALLOW_GRID,
@@ -89,8 +89,8 @@ BASINS = {  # kind of basin
     SHALLOW_GRID: Room(after="plane.rooms: shallow_grids"),
     SHALLOW_FACES: Room(after="plane.rooms: shallow_meshes"),
     ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
-    ACOUSTIC_FACES: Room(after="plane.rooms: acoustic_meshes"),
     LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
+    LIQUID_FACES: Room(after="plane.rooms: liquid_meshes"),
 }
 ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 

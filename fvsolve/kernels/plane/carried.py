@@ -87,9 +87,11 @@ def put_outside(t, tables, patch, basin, q, outer):
 
 
 @njit
-def ring_flow(plane, basin, k):
-    """Flow inward through face k of a grid's boundary."""
+def flow_in(plane, basin, k):
+    """Flow inward through face k of the boundary."""
     nx, ny, at = basin["nx"], basin["ny"], basin["flows"]
+    if basin["faces"] > 0:  # a mesh of any cells
+        return -plane[at + basin["faces"] - basin["outer"] + k]
     if k < ny:
         return plane[at + k * (nx + 1)]
     if k < 2 * ny:
@@ -103,7 +105,7 @@ def carried_rates(t, y, dydt, out, handle):
     """Rates of all amounts in basins on grids; what open boundaries bring and take and what decays to the ledger."""
     tables = open_tables(handle)
     plane, patches, scalars = tables[I_PLANE], tables[I_PATCHES], tables[I_SCALARS]
-    nodes, layout, rho = tables[I_NODES].size, tables[I_LAYOUT][0], tables[I_SETTINGS][0]["rho"]
+    rho = tables[I_SETTINGS][0]["rho"]
     for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
         basin = tables[I_BASINS][b]
         if basin["carried"] < 0 or (basin["kind"] != SHALLOW_GRID and basin["kind"] != CARRIED_GRID):
@@ -128,7 +130,7 @@ def carried_rates(t, y, dydt, out, handle):
             fastest = grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work)
         for q in range(scalars.size):
             scalar = scalars[q]
-            o, ring, lies = basin["carried"] + q * n, basin["outside"] + q * outer, layout["gain"] + q * (nodes + 1)
+            o, ring = basin["carried"] + q * n, basin["outside"] + q * outer
             s, rate, outside = y[o : o + n], dydt[o : o + n], plane[ring : ring + outer]
             for p in range(patches.size):
                 if patches[p]["basin"] == b:
@@ -147,20 +149,26 @@ def carried_rates(t, y, dydt, out, handle):
                     nx, ny, kx, ky, scalar["diffusivity"], factor, flow_x, flow_y, depth, outside, s, work, rate
                 )
                 out[RATE] = max(out[RATE], (fastest if given else 0.0) + spreads)
-            if basin["open"] >= 0:
-                book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
-            lost = 0.0
-            if scalar["decay"] > 0.0:
-                area = plane[basin["area"] : basin["area"] + n]
-                for i in range(n):
-                    high = depth[i] if depth.size > 0 else 1.0
-                    lost += area[i] * (s[i] - high * scalar["ambient"])
-                scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
-                out[lies + nodes] -= per * scalar["decay"] * lost
-                out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
-            for p in range(0 if given else patches.size):
-                if patches[p]["basin"] == b:
-                    bring(tables, patches[p], basin, q, y, rate, out)
+            settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out)
+
+
+@njit
+def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
+    """Add to rates what decays and what links bring; book these, and what passes the boundary."""
+    scalar, patches, nodes, n = tables[I_SCALARS][q], tables[I_PATCHES], tables[I_NODES].size, basin["n"]
+    if basin["open"] >= 0:
+        book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
+    if scalar["decay"] > 0.0:
+        area, lost = tables[I_PLANE][basin["area"] : basin["area"] + n], 0.0
+        for i in range(n):
+            high = depth[i] if depth.size > 0 else 1.0
+            lost += area[i] * (s[i] - high * scalar["ambient"])
+        scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
+        out[tables[I_LAYOUT][0]["gain"] + q * (nodes + 1) + nodes] -= per * scalar["decay"] * lost
+        out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
+    for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
+        if patches[p]["basin"] == b:
+            bring(tables, patches[p], basin, q, y, rate, out)
 
 
 @njit
@@ -177,7 +185,7 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
         into, away = 0.0, 0.0
         for m in range(patches[p]["faces"]):
             k = tables[I_INTEGERS][patches[p]["ring"] + m]
-            flow = factor * ring_flow(plane, basin, k)
+            flow = factor * flow_in(plane, basin, k)
             into += max(flow, 0.0) * outside[k]
             away -= min(flow, 0.0)
         out[lies + patches[p]["node"]] = per * into

@@ -9,8 +9,10 @@ import numpy as np
 
 from fvsolve.case.basins import behind
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
+from fvsolve.model.face_mesh import lower_mesh
 
 if TYPE_CHECKING:
     from fvsolve.mesh.points import Points
@@ -118,6 +120,15 @@ class Basin:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = scene.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
+        else:
+            if row["scheme"] not in (rec.UPWIND, rec.MUSCL):
+                scene.warnings.append(f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; "
+                                      "muscl is taken there")  # fmt: skip
+                row["scheme"] = rec.MUSCL
+            floats, self.integers, _ = lower_mesh(mesh)
+            row["mesh"], row["faces"] = scene.to_plane(floats), mesh.left.size
+            row["links"] = len(scene.integers)
+            scene.integers += self.integers.tolist()
         given = self.reflects()
         row["reflect"], row["outer_given"], row["open"] = scene.to_plane(given), given.size, -1
         if given.size:
@@ -144,7 +155,7 @@ class Basin:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
             toil = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
         else:
-            flows, toil = mesh.left.size, self.n + self.carrying_work()
+            flows, toil = mesh.left.size, self.n + advection_faces.work_size(self.integers)
         if row["flows"] < 0:
             row["flows"] = scene.to_plane(np.zeros(flows))
         row["toil"] = scene.to_plane(np.zeros(toil))

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.case.basins import bed_of
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import shallow
+from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.model.basins.basin import Basin
 
@@ -36,14 +36,18 @@ class FreeSurface(Basin, physics="free-surface"):
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning
         if self.is_grid:
-            self.lower_grid(scene, row, plan)
+            self.lower_grid(scene, row)
         else:
-            self.lower_faces(scene, row, plan)
+            self.lower_faces(scene, row)
         row["plan"] = scene.to_plane(plan)
 
-    def lower_grid(self, scene, row, plan: np.ndarray) -> None:
+    def lower_grid(self, scene, row) -> None:
         row["kind"] = rec.SHALLOW_GRID
         row["work"] = scene.to_plane(np.zeros(shallow.work_size(self.mesh.grid.nx, self.mesh.grid.ny)))
+
+    def lower_faces(self, scene, row) -> None:
+        row["kind"] = rec.SHALLOW_FACES
+        row["work"] = scene.to_plane(np.zeros(shallow_faces.work_size(self.integers)))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import liquid, liquid_log
+from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log
 from fvsolve.model.basins.basin import Basin
 
 SCALE = 1e5  # [Pa]
@@ -48,7 +48,8 @@ class Liquid(Basin, physics="liquid"):
             size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
             row["work"] = scene.to_plane(np.zeros(size))
         else:
-            row["kind"] = rec.ACOUSTIC_FACES if self.linear else rec.LIQUID_FACES
+            row["kind"] = rec.LIQUID_FACES
+            row["work"] = scene.to_plane(np.zeros(liquid_faces.work_size(self.integers)))
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
         """Pressure above that at rest [Pa], of deviations of the density."""
