@@ -225,7 +225,7 @@ def channel(q, out, jump, x):
 
 @pytest.mark.parametrize(("q", "out", "jump", "low"), [(4.42, 2.0, False, 1.9), (0.18, 0.33, True, 1.0)])
 def test_flow_over_a_bump_settles_to_bernoulli_and_its_jump(q, out, jump, low):
-    """Flow held at the west and depth at the east; L1 of the depth. Steeper limiters keep ringing at a jump, a little."""
+    """Flow held at the west and depth at the east; L1 of the depth. Steeper limiters keep ringing at a jump."""
     errors = []
     for n in (100, 200):
         x = even(n, 25.0)
@@ -245,7 +245,7 @@ def test_flow_over_a_bump_settles_to_bernoulli_and_its_jump(q, out, jump, low):
 
 
 def thacker(kind, x, y, t):
-    """Depth and unit flows in a bowl -H (1 - r^2 / a^2), a = 1 m, H = 0.1 m: planar or curved surface (Thacker 1981)."""
+    """Depth and unit flows in the bowl -H (1 - r^2), H = 0.1 m, and the period (Thacker 1981)."""
     deep = 0.1
     r2 = x * x + y * y
     if kind == "planar":

@@ -16,6 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.plane.shallow_rows import (
     EAST,
     FIELDS,
+    FLOW_EAST,
     GHOSTS,
     MASS,
     NORTH,
@@ -58,20 +59,20 @@ def copy(source, target):
 @njit
 def put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top):
     """Row j of cells; also one beyond the first or the last, from those before it."""
-    cells = ring[j & (RING - 1)]
+    cells, fields = ring[j & (RING - 1)], FIELDS if fifth else FLOW_EAST
     if 0 <= j < ny:
         a, b = j * nx, (j + 1) * nx
         put_cells(g, plan[0, a:b], plan[1, a:b], dh[a:b], qx[a:b], qy[a:b], kx, ky[j], cells, top)
         walls = reflect.size > 0
         if fifth:
             put_flows(qx[a:b], qy[a:b], cells)
-        put_ends(nx, reflect[j] if walls else 1.0, reflect[ny + j] if walls else 1.0, cells)
+        put_ends(nx, fields, reflect[j] if walls else 1.0, reflect[ny + j] if walls else 1.0, cells)
         return
     last = 0 if j < 0 else ny - 1
     mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)
     at = 2 * ny if j < 0 else 2 * ny + nx
     walls = reflect[at : at + nx] if reflect.size > 0 else reflect
-    put_beyond(nx, walls, ring[last & (RING - 1)], ring[mirror & (RING - 1)], cells)
+    put_beyond(nx, fields, walls, ring[last & (RING - 1)], ring[mirror & (RING - 1)], cells)
 
 
 @njit
@@ -127,13 +128,13 @@ def grid_rates(
             continue
         # row j - 1 : faces along it, and its rates
         west, east, a, z = sides[2, 0], sides[2, 1], (j - 1) * nx, j * nx
-        put_limited(scheme, limiter, nx + 2, before, one - 1, before, one, before, one + 1, west, east, pushes[2])
+        put_limited(scheme, limiter, (nx + 9) // 8 * 8, before, one - 1, before, one, before, one + 1, west, east, pushes[2])
         if fifth:
             put_smooth(
                 g, scheme, nx + 2, before, one - 2, before, one - 1, before, one, before, one + 1,
                 before, one + 2, west, east, pushes[2],
             )  # fmt: skip
-        put_fluxes(g, nx + 1, EAST, NORTH, fifth, east, 0, west, 1, before, one, before, one + 1, fluxes[2])
+        put_fluxes(g, (nx + 8) // 8 * 8, EAST, NORTH, fifth, east, 0, west, 1, before, one, before, one + 1, fluxes[2])
         if flow_x.size > 0:
             copy(fluxes[2, MASS], flow_x[(j - 1) * (nx + 1) : j * (nx + 1)])
         put_rates(

@@ -51,9 +51,9 @@ def put_flows(qx, qy, cells):
 
 
 @njit
-def put_ends(n, west, east, cells):
+def put_ends(n, fields, west, east, cells):
     """Ghosts of a row of n cells: mirrored by a wall, 1, the last cell again beyond an open end, 0."""
-    for f in range(FIELDS):
+    for f in range(fields):
         p = cells[f]
         turn = -1.0 if f == EAST or f == FLOW_EAST else 1.0
         for k in range(REACH):
@@ -64,9 +64,9 @@ def put_ends(n, west, east, cells):
 
 
 @njit
-def put_beyond(n, walls, last, mirror, cells):
+def put_beyond(n, fields, walls, last, mirror, cells):
     """A row beyond the last one, from that and its mirror image; walls : float64[n] or empty, as in `put_ends`."""
-    for f in range(FIELDS):
+    for f in range(fields):
         a, b, p = last[f, GHOSTS:], mirror[f, GHOSTS:], cells[f, GHOSTS:]
         turn = -1.0 if f == NORTH or f == FLOW_NORTH else 1.0
         if walls.size == 0:
