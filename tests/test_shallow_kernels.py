@@ -10,7 +10,7 @@ from pytest import approx
 from scipy.optimize import brentq
 
 from fvsolve.kernels.plane.friction import DARCY, MANNING, add_friction
-from fvsolve.kernels.plane.shallow import PLANS, grid_rates, work_size
+from fvsolve.kernels.plane.shallow import PLANS, WORK, grid_rates
 from fvsolve.kernels.records import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
@@ -28,7 +28,7 @@ class Water:
         self.bed = np.broadcast_to(bed, (self.ny, self.nx)) - level
         self.plan = np.empty((PLANS, self.nx * self.ny))
         self.plan[0], self.plan[1] = np.maximum(-self.bed, 0.0).ravel(), np.maximum(self.bed, 0.0).ravel()
-        self.work = np.zeros(work_size(self.nx, self.ny))
+        self.work = np.zeros(WORK)
         self.flow_x, self.flow_y = np.zeros(self.ny * (self.nx + 1)), np.zeros((self.ny + 1) * self.nx)
         self.friction, self.hold = None, lambda y: None
 

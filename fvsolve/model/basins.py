@@ -54,7 +54,7 @@ def lower_basins(scene) -> None:
         plan = np.zeros((shallow.PLANS, n))
         plan[0], plan[1] = np.maximum(-bed, 0.0), np.maximum(bed, 0.0)
         lengths = np.concatenate([np.full(nx, nx / wide), np.full(ny, ny / deep)])
-        work = np.concatenate([lengths, np.zeros(shallow.work_size(nx, ny))])
+        work = np.concatenate([lengths, np.zeros(shallow.WORK)])
         names = [f"{name}.{what}[{i}]" for what in ("depth", "flow_x", "flow_y") for i in range(n)]
         row["y"] = scene.states(names[:n], 0.1)
         scene.states(names[n:], 0.1 * np.sqrt(scene.case.gravity * 0.1))
