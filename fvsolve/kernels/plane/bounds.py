@@ -19,7 +19,7 @@ def put_shares(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step,
     for j in range(ny):
         for i in range(nx):
             k, w, n = j * nx + i, j * (nx + 1) + i, (j + 1) * nx + i
-            scale = step * factor * kx[i] * ky[j]
+            scale = step * (factor * (kx[i] * ky[j]))
             depth_then = (depth[k] if depth.size > 0 else 1.0) - scale * (
                 (flow_x[w + 1] - flow_x[w]) + (flow_y[n] - flow_y[k])
             )

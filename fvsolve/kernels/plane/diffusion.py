@@ -67,9 +67,9 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         for i in range(nx):
             inner_p[i] = row[i]
         p[0], p[nx + 1] = outside[j], outside[ny + j]
-        conduct(diffusivity, h, h[1:], inner_w)
+        conduct(1.0, h, h[1:], inner_w)
         for i in range(nx - 1):
-            inner_w[i] *= between(kx[i], kx[i + 1])
+            inner_w[i] *= diffusivity * between(kx[i], kx[i + 1])
         west, east = (depth[a], depth[z - 1]) if depth.size > 0 else (1.0, 1.0)
         wx[0] = 2.0 * kx[0] * diffusivity * west if factor * flow_x[f] > 0.0 else 0.0
         wx[nx] = 2.0 * kx[nx - 1] * diffusivity * east if factor * flow_x[f + nx] < 0.0 else 0.0
