@@ -9,7 +9,7 @@ The ring of a grid is its boundary faces, west (ny), east (ny), south (nx), nort
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.bounds import bound
+from fvsolve.kernels.plane.bounds import bound, bound_work
 from fvsolve.kernels.plane.fifth_order import grid_excesses, grid_excesses_work, settle_excesses
 from fvsolve.kernels.plane.second_order import second_order_rates, second_order_work
 from fvsolve.kernels.records import MUSCL, UPWIND, WENO5
@@ -53,7 +53,7 @@ def advection_work(scheme, nx, ny):
     """Floats that rates of a scheme are worked out in."""
     if scheme == UPWIND or scheme == MUSCL:
         return nx * ny + second_order_work(nx, ny)
-    both = max(grid_excesses_work(nx, ny), 2 * nx * ny, second_order_work(nx, ny))
+    both = max(grid_excesses_work(nx, ny), bound_work(nx, ny), second_order_work(nx, ny))
     return nx * ny + (nx + 1) * ny + nx * (ny + 1) + both
 
 
