@@ -111,13 +111,15 @@ def random_case(scheme, seed, through=False, deep=False, **more) -> tuple[Carrie
     return case, values * (depth if deep else 1.0)
 
 
+@pytest.mark.parametrize("deep", [False, True])
 @pytest.mark.parametrize("through", [False, True])
 @pytest.mark.parametrize("scheme", COURANT)
-def test_a_step_of_euler_keeps_the_values_within_those_around(scheme, through):
+def test_a_step_of_euler_keeps_the_values_within_those_around(scheme, through, deep):
     for seed in range(50):
-        case, s = random_case(scheme, seed, through, bounds=(0.0, 1.1))
-        end = s + COURANT[scheme][through] / case.fastest * case.rates(s)
-        low, high = surroundings(case, s)
+        case, s = random_case(scheme, seed, through, deep, bounds=(0.0, 1.1))
+        depth = case.depth if deep else 1.0
+        end = (s + COURANT[scheme][through] / case.fastest * case.rates(s)) / depth
+        low, high = surroundings(case, s / depth)
         if scheme == "weno5":
             low, high = 0.0, 1.1
         assert np.all(end >= low - 1e-14) and np.all(end <= high + 1e-14)
@@ -209,6 +211,20 @@ def test_what_is_carried_and_spread_is_conserved(scheme, deep):
         assert abs(share.sum()) < 1e-15 * np.abs(share).sum() * np.sqrt(s.size)
 
 
+@pytest.mark.parametrize("deep", [False, True])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_what_comes_in_through_the_boundary_is_what_there_is_more_inside(scheme, deep):
+    for seed in range(5):
+        case, s = random_case(scheme, seed, through=True, deep=deep, bounds=(0.0, 1.1), diffusivity=0.01)
+        share, ring, excesses = case.rates(s, -0.7) * case.mesh.area, np.empty_like(case.outside), (NONE, NONE)
+        if scheme in FIFTH:
+            first, last = s.size + np.cumsum([0, case.flow_x.size])
+            excesses = case.work[first:last], case.work[last : last + case.flow_y.size]
+        size, flows = (case.nx, case.ny, case.kx, case.ky), (-0.7, case.flow_x, case.flow_y, case.depth, case.outside)
+        diffusion.ring_rates(*size, 0.01, *flows, *excesses, s, ring)
+        assert share.sum() == approx(ring.sum(), abs=1e-13 * np.abs(share).sum())
+
+
 def twin(case, steepness, flows, outside):
     """Rates of a case's amounts on its grid laid out otherwise, as a function of amounts and the way to lay them."""
 
@@ -263,7 +279,7 @@ def test_a_step_of_euler_as_long_as_diffusion_allows_keeps_bounds():
         rate = np.zeros_like(s)
         flows = 1.0, case.flow_x, case.flow_y, case.depth, case.outside
         size = case.nx, case.ny, case.kx, case.ky
-        most = diffusion.grid_diffusion(*size, 0.01, *flows, s, case.work, rate)
+        most = diffusion.grid_diffusion(*size, 0.01, *flows, s, case.other, rate)
         low, high = surroundings(case, s / case.depth)
         after = (s + rate / most) / case.depth
         assert np.all(after > low - 1e-14) and np.all(after < high + 1e-14)
@@ -274,7 +290,7 @@ def test_the_rates_that_set_the_step_are_those_of_plain_grids():
     assert case.fastest == approx(3.0 / 0.5 + 2.0 / 0.25)
     size, s = (case.nx, case.ny, case.kx, case.ky), np.zeros(64)
     flows = 1.0, 0.0 * case.flow_x, 0.0 * case.flow_y, NONE, case.outside
-    most = diffusion.grid_diffusion(*size, 0.1, *flows, s, case.work, s.copy())
+    most = diffusion.grid_diffusion(*size, 0.1, *flows, s, case.other, s.copy())
     assert most == approx(2.0 * 0.1 * (1.0 / 0.5**2 + 1.0 / 0.25**2))
 
 

@@ -33,8 +33,8 @@ class Carried:
         self.outside = np.broadcast_to(outside, 2 * (self.nx + self.ny)).astype(float).copy()
         self.scheme, self.limiter = SCHEMES[scheme]
         self.function = advection.grid_advection_fifth if scheme.endswith("5") else advection.grid_advection
-        work = advection.advection_work(self.scheme, self.nx, self.ny), diffusion.diffusion_work(self.nx, self.ny)
-        self.work = np.full(max(work), np.nan)
+        self.work = np.full(advection.advection_work(self.scheme, self.nx, self.ny), np.nan)
+        self.other = np.full(diffusion.diffusion_work(self.nx, self.ny), np.nan)
         size = self.nx, self.ny, self.kx, self.ky
         self.fastest = advection.grid_fastest(*size, flow_x, flow_y, depth, self.work)
 
@@ -44,7 +44,7 @@ class Carried:
         more = *self.bounds, self.fastest
         self.function(self.scheme, self.limiter, *size, *flows, *more, s, self.work, rate)
         if self.diffusivity:
-            diffusion.grid_diffusion(*size, self.diffusivity, *flows, s, self.work, rate)
+            diffusion.grid_diffusion(*size, self.diffusivity, *flows, s, self.other, rate)
         return rate
 
     def run(self, s, end, courant, method="ssp-rk3", factor=lambda t: 1.0):

@@ -1,9 +1,9 @@
 """Scalars carried over a grid of rectangles by given flows. Knows amounts and depths; not what makes the flows.
 
 s_t + div(F c) = 0 for amounts s = depth c per area. Rates of a uniform c are c times the divergence of F, to the bit.
-In flows without divergence, Euler steps up to these Courant numbers (those of `grid_fastest`) keep every value between
-those around it: upwind 1, muscl 1/2 (minmod 2/3); weno5 keeps all between `least` and `most` up to 1/2, upwind5 does
-not. SSP methods do as Euler within their coefficient.
+In flows without divergence, Euler steps up to these Courant numbers (with the rate of `grid_fastest`) keep every value
+between those around it: upwind 1, muscl 1/2 and beside an inlet 1/3, with minmod 2/3 and 1/2. Up to 1/2 weno5 keeps all
+between `least` and `most`; upwind5 promises nothing. SSP methods do as Euler within their coefficient.
 
 The ring of a grid is its boundary faces, west (ny), east (ny), south (nx), north (nx).
 """

@@ -8,9 +8,9 @@ from fvsolve.jit import inner, njit
 
 @njit
 def share(room, need):
-    """How much of a need there is room for, all of it where there is none."""
-    part = (room if room > 0.0 else 0.0) / need
-    return part if part < 1.0 else 1.0
+    """The share of a need that there is room for, at most all of it."""
+    room = room if room > 0.0 else 0.0
+    return room / need if need > room else 1.0
 
 
 @njit
