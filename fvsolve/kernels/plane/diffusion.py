@@ -25,14 +25,16 @@ def conduct(across, a, b, to):
 
 
 @inner
-def spread(kx, ky, p, wx, south, ws, here, north, wn, rate, top):
-    """Add to the rates of a row; p : its values, with one beyond either end; top : greatest rate by column."""
+def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
+    """Add to the rates of a row; p : its values, with one beyond either end; top : greatest rate by column so far."""
     w, e, ww, we = p, p[2:], wx, wx[1:]
     for i in range(rate.size):
         x = kx[i] * (we[i] * (e[i] - here[i]) - ww[i] * (here[i] - w[i]))
         y = ky * (wn[i] * (north[i] - here[i]) - ws[i] * (here[i] - south[i]))
         rate[i] += x + y
-        top[i] = kx[i] * (ww[i] + we[i]) + ky * (ws[i] + wn[i])
+        quick = kx[i] * (ww[i] + we[i]) + ky * (ws[i] + wn[i])
+        quick = quick / max(depth[i], THIN) if depth.size > 0 else quick
+        top[i] = quick if quick > top[i] else top[i]
 
 
 @njit
@@ -59,7 +61,7 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         deep = depth[i] if depth.size > 0 else 1.0
         come = factor * flow_y[i] > 0.0
         below[i], rows[i] = outside[2 * ny + i], 2.0 * ky[0] * diffusivity * deep if come else 0.0
-        above[i] = outside[2 * ny + nx + i]
+        above[i], top[i] = outside[2 * ny + nx + i], 0.0
     for j in range(ny):
         a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
         h, hn = depth[a:], depth[z:]
@@ -81,9 +83,9 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
             for i in range(nx):
                 deep = depth[last + i] if depth.size > 0 else 1.0
                 wn[i] = 2.0 * ky[j] * diffusivity * deep if factor * flow_y[z + i] < 0.0 else 0.0
-        spread(kx, ky[j], p, wx, south, ws, row, north, wn, rate[a:z], top)
-        for i in range(nx):
-            most = max(most, top[i] / depth[a + i] if depth.size > 0 and depth[a + i] > 0.0 else top[i])
+        spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
+    for i in range(nx):
+        most = max(most, top[i])
     return most
 
 
