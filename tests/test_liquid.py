@@ -37,7 +37,7 @@ class Box:
     size: tuple[float, float] = (1.0, 1.0)
     log: bool = False
     limiter: str = "monotonized-central"
-    reflect: np.ndarray = field(default_factory=lambda: WALLS)
+    reflect: np.ndarray | float = field(default_factory=lambda: WALLS)  # a number is for all sides
     stretch: float = 0.0  # cell edges at s + stretch sin(2 pi s) / (2 pi) of the size
 
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
@@ -53,10 +53,13 @@ class Box:
         kernel = liquid_log if self.log else liquid
         given = (C, RHO, 1e-18 * C**2) if self.log else (C, 1e-18 * (RHO * C) ** 2)
         kx, ky = (1.0 / np.diff(e) for e in self.edges())
+        reflect = self.reflect
+        if isinstance(reflect, float):
+            reflect = np.full(2 * (self.nx + self.ny), reflect)
         work, found = np.full(kernel.work_size(self.nx, self.ny), np.nan), np.full((3, self.nx * self.ny), np.nan)
         flat = np.ascontiguousarray(state).reshape(3, -1)
         codes = SCHEMES[self.scheme], LIMITERS[self.limiter]
-        rate = kernel.grid_rates(*given, *codes, self.nx, self.ny, kx, ky, self.reflect, *flat, work, *found)
+        rate = kernel.grid_rates(*given, *codes, self.nx, self.ny, kx, ky, reflect, *flat, work, *found)
         return found.reshape(state.shape), rate
 
     def run(self, state: np.ndarray, end: float, courant: float = 0.8) -> np.ndarray:
@@ -101,10 +104,9 @@ def order(box: Box, exact, end: float, sizes, courant: float = 0.5) -> float:
     """Order at which exact(box, end) is met from exact(box, 0), nx and ny scaled alike, steps finer still."""
     errors = []
     for n in sizes:
-        finer = replace(box, nx=n, ny=max(1, box.ny * n // box.nx))
+        finer = replace(box, nx=n, ny=box.ny * n // box.nx if box.ny > 1 else 1)
         found = finer.run(exact(finer, 0.0), end, courant * (sizes[0] / n) ** 0.25)
         errors.append(mean_error(found, exact(finer, end)))
-    print("ORDER", box.scheme, errors, observed_order(errors, [1 / n for n in sizes]))
     return observed_order(errors, [1 / n for n in sizes])
 
 
@@ -127,19 +129,19 @@ def test_on_graded_cells_every_scheme_is_second_order(scheme):
 
 def wave(box: Box, at: float, way: float) -> np.ndarray:
     """A pulse at x = `at` that runs east (way 1) or west (-1)."""
-    return box.averages(lambda x, y: (np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None]))
+    return box.averages(lambda x, y: np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None])
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_plane_wave_is_carried_unchanged(scheme):
     box = Box(4, 1, scheme, (100.0, 1.0))
-    sizes, end = {1: (800, 1600), 2: (400, 800), 5: (200, 400)}[ORDERS[scheme]], 0.3 if scheme == "upwind" else 3.0
+    sizes, end = {1: (800, 1600), 2: (800, 1600), 5: (200, 400)}[ORDERS[scheme]], 0.3 if scheme == "upwind" else 3.0
     assert order(box, lambda b, t: wave(b, 35.0 + C * t, 1.0), end, sizes) == approx(ORDERS[scheme], abs=0.1)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_row_of_cells_is_a_pipe(scheme):
-    """Rates to round-off inside; after reflections at a reservoir and a dead end, both are as near to the exact waves."""
+    """Rates to round-off inside; after reflections at a reservoir and a dead end, both are as near to what is exact."""
     n, length, diameter = 200, 100.0, 0.5
     section = math.pi / 4 * diameter**2
     fluid = {"name": "user", "density": RHO, "bulk_modulus": RHO * C**2, "viscosity": 1e-3, "vapor_pressure": 100.0}
@@ -162,7 +164,8 @@ def test_a_row_of_cells_is_a_pipe(scheme):
     exact = (wave(box, 70.0, -1.0) - 0.3 * wave(box, 30.0, 1.0))[:2, 0]
     found = box.run(start, 9.0, 0.5)[:2, 0]
     pipe = of_waves(fvsolve.advance(model, state, 9.0).y)
-    print("PIPE", scheme, mean_error(found, exact), mean_error(pipe, exact), mean_error(found, pipe))
+    errors = [mean_error(waves, exact) for waves in (found, pipe)]
+    assert errors[0] == approx(errors[1], rel=0.02) and mean_error(found, pipe) < 0.1 * errors[0]
 
 
 @pytest.mark.parametrize("log", [False, True], ids=["linear", "log"])
@@ -172,7 +175,7 @@ def test_a_side_sends_back_the_stated_share_of_a_wave(share, log):
     box = Box(200, 1, "upwind5", (100.0, 1.0), log=log, reflect=np.array([1.0, share] + [1.0] * 400))
     small = 1e-6 if log else 1.0
     found = box.run(small * wave(box, 60.0, 1.0), 8.0) / small
-    print("SHARE", log, share, np.abs(found[0] - share * wave(box, 60.0, -1.0)[0]).max())
+    assert np.abs(found - share * wave(box, 60.0, -1.0)).max() / C < 1.2e-4 * abs(share) + 1e-9
 
 
 def noise(box: Box, size: float = 1.0) -> np.ndarray:
@@ -181,29 +184,41 @@ def noise(box: Box, size: float = 1.0) -> np.ndarray:
     return numbers * (RHO * np.array([1.0, C, C])[:, None, None])
 
 
+def share(rng) -> float:
+    """A wall, an open side, a given pressure or what lies between them."""
+    return rng.uniform(-1.0, 1.0) if rng.random() < 0.5 else float(rng.integers(-1, 2))
+
+
 def shares(box: Box, seed: int = 3) -> np.ndarray:
-    """Two patches at random on every side: walls, open, given pressures, and what lies between them."""
-    rng, found = np.random.default_rng(seed), []
-    for n in (box.ny, box.ny, box.nx, box.nx):
-        first, second = np.where(rng.random(2) < 0.5, rng.uniform(-1.0, 1.0, 2), rng.integers(-1, 2, 2))
-        found.append(np.where(np.arange(n) < rng.integers(0, n + 1), first, second))
-    return np.concatenate(found)
+    """Of every side another share; in the eastern one a patch that has its own."""
+    rng = np.random.default_rng(seed)
+    counts = (box.ny, box.ny, box.nx, box.nx)
+    found = np.repeat([share(rng) for _ in counts], counts)
+    first, last = sorted(rng.integers(box.ny, 2 * box.ny + 1, 2))
+    found[first:last] = share(rng)
+    return found
+
+
+def holed(box: Box, seed: int) -> np.ndarray:
+    """Walls with a patch anywhere."""
+    rng = np.random.default_rng(seed)
+    found = np.ones(2 * (box.nx + box.ny))
+    first, last = sorted(rng.integers(0, found.size + 1, 2))
+    found[first:last] = share(rng)
+    return found
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "upwind5"])
 def test_no_mode_grows_whatever_the_sides_send_back(scheme):
-    """Eigenvalues per cell time of a linear scheme; a patch in a wall, and any two patches on every side."""
+    """Greatest real part of the eigenvalues of a linear scheme, per cell time."""
     worst = []
     for nx, ny in ((5, 5), (8, 6), (6, 11)) if scheme == "upwind5" else ((1, 1), (1, 4), (3, 2), (8, 6)):
-        hole = np.ones(2 * (nx + ny))
-        hole[: ny // 2] = 0.0
         box = Box(nx, ny, scheme, (nx, ny))
         scale = np.repeat([1.0, C, C], nx * ny)
-        for sides in (WALLS, hole, *(shares(box, seed) for seed in range(10))):
-            units = (np.eye(scale.size) * scale).reshape(-1, 3, ny, nx)
+        units = (np.eye(scale.size) * scale).reshape(-1, 3, ny, nx)
+        for sides in (WALLS, *(kind(box, seed) for seed in range(10) for kind in (shares, holed))):
             matrix = [replace(box, reflect=sides).rates(unit)[0].ravel() / scale for unit in units]
             worst.append(np.linalg.eigvals(np.array(matrix)).real.max() / C)
-    print("GROW", scheme, worst)
     assert max(worst) < 1e-12
 
 
@@ -214,8 +229,10 @@ def test_noise_between_any_sides_dies_away(scheme, log):
         box = Box(nx, ny, scheme, (nx, ny), log=log, limiter="van-leer")
         box = replace(box, reflect=shares(box))
         start = noise(box, 0.02)
-        energy = [((C * s[0]) ** 2 + s[1] ** 2 + s[2] ** 2).sum() for s in (start, box.run(start, 5.0), box.run(start, 50.0))]
-        print("NOISE", scheme, log, nx, ny, energy[1] / energy[0], energy[2] / energy[0])
+        soon = box.run(start, 5.0)
+        states = start, soon, box.run(soon, 45.0)
+        energy = [((C * s[0]) ** 2 + s[1] ** 2 + s[2] ** 2).sum() for s in states]
+        assert energy[2] < energy[1] < 0.1 * energy[0]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -223,9 +240,11 @@ def test_a_round_pulse_stays_round(scheme):
     """Against Hankel's integral; the errors along axes and along diagonals part at the order of the scheme."""
 
     def height(r, t):
-        return quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[0]
+        return quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[
+            0
+        ]
 
-    radii, end = np.linspace(0.0, 9.0, 400), 0.3
+    radii, end = np.linspace(0.0, 9.0, 500), 0.15
     shape = {t: CubicSpline(radii, height(radii, t)) for t in (0.0, end)}
 
     def exact(box, t):
@@ -242,7 +261,8 @@ def test_a_round_pulse_stays_round(scheme):
         axis, diagonal = (angle < 10) | (angle > 80), abs(angle - 45) < 10
         parts.append(abs(miss[axis].mean() - miss[diagonal].mean()))
         errors.append(miss.mean())
-    print("ROUND", scheme, parts, errors, np.log2(parts[0]/parts[1]), np.log2(errors[0]/errors[1]))
+    assert np.log2(parts[0] / parts[1]) == approx(ORDERS[scheme], abs=0.3)
+    assert np.log2(errors[0] / errors[1]) == approx(ORDERS[scheme], abs=0.2)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -279,7 +299,7 @@ def test_rest_is_rest_and_the_rate_is_the_greatest_sum(log):
     assert box.rates(state)[1] == approx(((u + c) * kx + (v + c) * ky[:, None]).max(), rel=1e-14)
 
 
-@pytest.mark.parametrize("nx, ny", itertools.product((1, 2, 3), (1, 2, 4)))
+@pytest.mark.parametrize("nx, ny", list(itertools.product((1, 2, 3), (1, 2, 4))))
 @pytest.mark.parametrize("log", [False, True], ids=["linear", "log"])
 def test_few_cells_between_walls_are_a_corner_of_their_mirror_images(nx, ny, log):
     box = Box(nx, ny, "upwind5", (nx, ny), log=log)
@@ -300,7 +320,7 @@ def test_the_log_law_is_the_linear_one_for_small_waves(scheme):
     for size in (1e-4, 1e-5):
         state = noise(box, size)
         apart.append(np.abs(replace(box, log=True).rates(state)[0] - box.rates(state)[0]).max(axis=(1, 2)))
-    print("SMALL", scheme, apart[0] / apart[1])
+    assert apart[0] / apart[1] == approx(100.0, rel=1e-3)
 
 
 def test_the_logarithm_is_exact_to_round_off():
@@ -323,13 +343,21 @@ def vortex(box: Box, t: float, speed: float = 3.0, drift=(2.0, 1.0)) -> np.ndarr
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_vortex_is_carried_unchanged(scheme):
-    """Mach number 0.3. Averages of products are not products of averages: the fifth order of the waves ends at two here."""
-    for sizes in ((64,128), (128, 256)):
-        errors = []
-        for n in sizes:
-            box = Box(n, n, scheme, (10.0, 10.0), log=True, reflect=np.full(4 * n, -1.0))
-            errors.append(mean_error(box.run(vortex(box, 0.0), 0.2), vortex(box, 0.2)))
-        print("VORTEX", scheme, errors, observed_order(errors, [1 / n for n in sizes]))
+    """Mach number 0.3: averages of products are not products of averages, and fifth order ends at two."""
+    found = order(Box(4, 4, scheme, (10.0, 10.0), log=True, reflect=-1.0), vortex, 0.2, (128, 256))
+    assert found == approx(min(ORDERS[scheme], 2), abs=0.15)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_what_the_flow_carries_along_keeps_the_order_of_the_scheme(scheme):
+    """A velocity along the faces, in a stream that enters and leaves at given pressure."""
+
+    def exact(box, t):
+        return box.averages(lambda x, y: (0 * x, RHO * 2.0 + 0 * x, RHO * np.exp(-(((x - 40.0 - 2.0 * t) / 6) ** 2))))
+
+    box = Box(4, 1, scheme, (100.0, 1.0), log=True, reflect=-1.0)
+    sizes = {1: (800, 1600), 2: (400, 800), 5: (100, 200)}[ORDERS[scheme]]
+    assert order(box, exact, 2.0, sizes) == approx(ORDERS[scheme], abs=0.1)
 
 
 FLUID = LogFluid(RHO, RHO * C**2, 0.0)
@@ -346,41 +374,49 @@ STATES = {
 @pytest.mark.parametrize("scheme", ["muscl", "weno5"])
 @pytest.mark.parametrize("name", STATES)
 def test_exact_riemann_problems_of_the_log_law(name, scheme):
-    """Pressure, velocity and, at the contact, a velocity along it that jumps; L1 falls as jumps allow."""
+    """Error of density and flow in L1, which falls as shocks and corners allow."""
     left, right = STATES[name]
-    exact, errors, end = Riemann(FLUID, left, right), [], 2.5
-    middle = exact.middle()[1]
+    exact, errors, end = Riemann(FLUID, left, right), [], 1.8
 
     def at(xi):
         p, u = exact.at(xi)
-        return FLUID.rho(p) * np.array([1.0, u, 1.0 if xi < middle else -2.0]) - np.array([RHO, 0.0, 0.0])
+        return FLUID.rho(p) - RHO, FLUID.rho(p) * u, 0.0
 
     for n in (100, 200, 400):
         box = Box(n, 1, scheme, (100.0, 1.0), log=True, limiter="van-leer")
         x = (np.arange(n) + 0.5) * 100.0 / n - 50.0
         start = np.array([at(math.copysign(1e9, place)) for place in x]).T[:, None, :]
-        found, inner = box.run(start, end, 0.5)[:, 0], abs(x) < 20.0
+        found, inner = box.run(start, end, 0.5)[:, 0], abs(x) < 27.0
         rays = (x[inner, None] + 100.0 / n * ((np.arange(8) + 0.5) / 8 - 0.5)) / end
         averages = np.array([np.mean([at(xi) for xi in row], axis=0) for row in rays]).T
-        errors.append(np.abs(found[:, inner] - averages).mean(axis=1) / RHO / np.array([1.0, C, 3.0]))
-    print("RIEMANN", scheme, name, errors[-1], np.log2(errors[0] / errors[2]) / 2, np.log2(errors[1] / errors[2]))
+        errors.append(np.abs(found[:, inner] - averages).mean(axis=1)[:2] / RHO / np.array([1.0, C]))
+    assert (errors[0] / errors[2] > 4**0.6).all() and (errors[2] < 4e-3).all()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_stream_is_stopped_by_a_wall_at_the_exact_pressure(scheme):
-    box, u = Box(200, 1, scheme, (100.0, 1.0), log=True), 1.0
+    """A third of the speed of sound, so that the pressure is 8 % above Joukowsky's."""
+    box, u = Box(200, 1, scheme, (100.0, 1.0), log=True), 3.0
     start = np.zeros((3, 1, 200))
     start[1] = RHO * u
-    found = box.run(start, 4.0)[0, 0]
-    stopped = FLUID.stopped(0.0, u)
-    print("STOP", scheme, FLUID.p(RHO + found[-20:]).mean(), stopped, FLUID.p(RHO + found[-5:]))
+    found = FLUID.p(RHO + box.run(start, 4.0)[0, 0, -20:])
+    assert found.mean() == approx(FLUID.stopped(0.0, u), rel=2e-3 if scheme == "upwind" else 2e-5)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_simple_wave(scheme):
-    for size, sizes in ((0.5, (200, 400)), (0.05, (50, 100, 200))):
-        flow = SimpleWave(FLUID, 0.0, lambda x: size * np.exp(-(((x - 30) / 5) ** 2)), lambda x: -size * 2 * (x - 30) / 25 * np.exp(-(((x - 30) / 5) ** 2)))
-        def exact(box, t):
-            rho, flux = flow.averages(box.edges()[0], t)
-            return np.array([rho - RHO, flux, 0 * rho])[:, None, :]
-        print(size, order(Box(4, 1, scheme, (100.0, 1.0), log=True), exact, 3.0, sizes))
+@pytest.mark.parametrize("size", [0.05, 0.5])
+def test_a_simple_wave_steepens_as_the_exact_one(size, scheme):
+    """At Mach number 0.005 the order is still that of the waves; at 0.05 products hold the fifth order down to two."""
+
+    def velocity(x):
+        return size * np.exp(-(((x - 30) / 5) ** 2))
+
+    flow = SimpleWave(FLUID, 0.0, velocity, lambda x: -2 * (x - 30) / 25 * velocity(x))
+
+    def exact(box, t):
+        rho, flux = flow.averages(box.edges()[0], t)
+        return np.array([rho - RHO, flux, 0 * rho])[:, None, :]
+
+    wanted = ORDERS[scheme] if size < 0.1 else min(ORDERS[scheme], 2)
+    sizes, end = ((100, 200), 3.0) if wanted == 5 else ((800, 1600), 0.3 if scheme == "upwind" else 3.0)
+    assert order(Box(4, 1, scheme, (100.0, 1.0), log=True), exact, end, sizes) == approx(wanted, abs=0.3)

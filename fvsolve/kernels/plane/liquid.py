@@ -1,9 +1,9 @@
 """Pressure waves of a liquid on a grid, law `linear`. Knows rows of cells and sides; knows no patch and no network.
 
-r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], mass-flow densities m [kg/(m2 s)], pressure c^2 r.
-Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are carried by their own sides, which is Godunov's
-flux; the system is linear, so that one direction after the other has the full order of the scheme. A row of cells is
-read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
+r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, and mass-flow densities
+m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are carried by their own sides, which is
+Godunov's flux; the system is linear, so that one direction at a time has the full order of the scheme. A row of cells
+is read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
 """
 
 from fvsolve.jit import inner, njit
@@ -92,8 +92,8 @@ def mirror(n, forward, backward):
 def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
     """Three values beyond a side of n cells, at `first`, `first + step`, ..., which sends `reflect` of a wave back.
 
-    On OPEN sides the wave that leaves goes on as a polynomial, and the one that enters has its own value at the side for
-    a datum, as at the ends of pipes. (Both on one side, or this on sides that send all back, would grow: 1e-4 a cell.)
+    On OPEN sides the wave that leaves goes on as a polynomial, and the one that enters has its own value at the side
+    for a datum, as at the ends of pipes. Kinds go by sides: mixed on one, `upwind5` would grow by 1e-4 a cell time.
     """
     near_in, near_out, ghosts = spare[:EDGE], spare[EDGE : 2 * EDGE], spare[2 * EDGE : 2 * EDGE + BEYOND]
     for k in range(EDGE):

@@ -1,10 +1,11 @@
 """Pressure waves of a liquid on a grid, law `log`, the full momentum flux. Knows rows of cells; knows no patch.
 
-r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho); deviation of
+r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho): deviation of
 density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is carried along u + c
-and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed from their own sides, and the state that
-both make at a face is the solution of the Riemann problem by two simple waves (Osher and Solomon 1982, below the speed
-of sound); the velocity along the face comes from the side that the flow comes from. Walls, rows and slots: see `liquid`.
+and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed from their own sides, and the state
+that both make at a face is the Riemann problem's with two simple waves (Osher and Solomon 1982), below the speed of
+sound; the velocity along a face comes from the side that the flow comes from. Fifth order is that of the waves:
+products of averages are of second order, with the Mach number for a factor. Sides, rows and slots: see `liquid`.
 """
 
 from math import sqrt
@@ -35,7 +36,7 @@ from fvsolve.kernels.records import LINEAR, MINMOD, UPWIND, VAN_LEER, WENO5
 
 @njit(forceinline=True)
 def log_sum(y):
-    """ln(1 + y) as 8 artanh of a fourth root, to round-off from 1/2 to 2; no call, so that loops become vectors."""
+    """ln(1 + y) by its fourth root's artanh, to round-off for y from -1/2 to 1; no call, so that loops are vectors."""
     s = sqrt(1.0 + y)
     q = 1.0 + sqrt(s)
     t = y / ((1.0 + s) * (q * q))
