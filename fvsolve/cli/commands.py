@@ -140,7 +140,7 @@ def compare(
 def view(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     time: Annotated[str | None, typer.Option(metavar="T", help='"1.2 s"; the last frame by default')] = None,
-    field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, ...")] = None,
+    field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, a scalar, ...")] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/FIELD.png")] = None,
 ) -> None:
     """Draw a field at a time, off screen, with PyVista."""

@@ -22,19 +22,29 @@ REMEDY = (
 )
 
 
-def view(frames: list[Path], field: str, out: Path, caption: str) -> None:
+def view(frames: list[Path], field: str, out: Path, caption: str, scalars: dict[str, str] | None = None) -> None:
     """Write the picture `out` of `field` on the pipes and basins of .vtu files, water at its surface over the bed.
 
-    Drawn in a process of its own: without an OpenGL library VTK ends the process it is in. FvsolveError where
-    the field is unknown or nothing can be drawn.
+    scalars : unit of each field beside those that every run has. Drawn in a process of its own: without an OpenGL
+    library VTK ends the process it is in. FvsolveError where the field is unknown or nothing can be drawn.
     """
-    if field not in UNITS:
-        raise FvsolveError(f"no field {field!r}{did_you_mean(field, UNITS)}; fields are {listing(UNITS)}")
+    units = UNITS | (scalars or {})
+    if field not in units:
+        raise FvsolveError(f"no field {field!r}{did_you_mean(field, units)}; fields are {listing(units)}")
     package = str(Path(__file__).resolve().parents[2])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([package, *sys.path])}
     if sys.platform.startswith("linux") and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    command = [sys.executable, "-m", __spec__.name, os.pathsep.join(map(str, frames)), field, str(out), caption]
+    command = [
+        sys.executable,
+        "-m",
+        __spec__.name,
+        os.pathsep.join(map(str, frames)),
+        field,
+        str(out),
+        caption,
+        units[field],
+    ]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode < 0 or "OSMesa" in done.stderr or "EGL" in done.stderr:
         raise FvsolveError(REMEDY)
@@ -43,7 +53,7 @@ def view(frames: list[Path], field: str, out: Path, caption: str) -> None:
         raise FvsolveError(f"{out} could not be drawn: {last}")
 
 
-def draw(frames: str, field: str, out: str, caption: str) -> None:
+def draw(frames: str, field: str, out: str, caption: str, unit: str) -> None:
     """Draw in this process."""
     import pyvista
 
@@ -64,7 +74,7 @@ def draw(frames: str, field: str, out: str, caption: str) -> None:
         shape = raised(mesh) if "depth" in mesh.cell_data else tube(mesh)
         plotter.add_mesh(
             shape, scalars=field, cmap="viridis", clim=[least, greatest], smooth_shading=True,
-            scalar_bar_args={"title": f"{field.replace('_', ' ')} [{UNITS[field]}]", **BAR},
+            scalar_bar_args={"title": f"{field.replace('_', ' ')} [{unit}]", **BAR},
         )  # fmt: skip
     plotter.add_text(caption, font_size=12, color="#1f2933", position="upper_left")
     _look(plotter, plotter.bounds, bool(pools))

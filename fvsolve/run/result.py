@@ -215,6 +215,7 @@ class Result:
             field,
             out,
             f"{self.summary['title']}\n{field.replace('_', ' ')} at t = {t:.6g} s",
+            {name: scalar.unit for name, scalar in self.case.scalars.items()},
         )
         return out
 
