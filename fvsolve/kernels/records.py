@@ -282,7 +282,8 @@ LAYOUT = np.dtype(
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
         ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
         ("drive", "i8"),  # relative speeds of pumps now, one a valve
-        ("gain", "i8"),  # amounts of each scalar that enter by nodes, then what decays, behind `supply` in the ledger
+        ("gain", "i8"),  # behind `supply` in the ledger: amounts of each scalar that enter by nodes [kg/s]
+        ("loss", "i8"),  # and, negative, what decays of it
         ("value", "i8"),  # of each scalar at all nodes
         ("edge", "i8"),  # values that the water of pipes has at both ends
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
@@ -375,6 +376,8 @@ SCALAR = np.dtype(
         ("diffusivity", "f8"),
         ("decay", "f8"),  # [1/s]
         ("ambient", "f8"),  # what it decays to
+        ("loss", "i8"),  # first of its rows in the ledger of what decays, and how many: none without decay, one, or
+        ("losses", "i8"),  # one a state, where steps are implicit: their Jacobian wants rows that hang on few states
         ("initial", "f8"),  # what flows in where nothing else is said
         ("least", "f8"),  # bounds of all values that there can be
         ("greatest", "f8"),

@@ -79,6 +79,11 @@ class Model:
         return len(self.state_names)
 
     @property
+    def ledgers(self) -> int:
+        """Rows of the stepper's ledger: supply of every node, and of scalars what enters there and what decays."""
+        return int(self.layout["net"] - self.layout["supply"])
+
+    @property
     def cells(self) -> int:
         """Number of cells of all pipes."""
         return sum(pipe.cells for pipe in self.pipes)

@@ -7,6 +7,7 @@ from math import cos, pi
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import INFINITE, THIN, grid_advection, grid_fastest
 from fvsolve.kernels.plane.diffusion import grid_diffusion, scalar_sources
 from fvsolve.kernels.records import (
@@ -155,7 +156,7 @@ def carried_rates(t, y, dydt, out, handle):
 @njit
 def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
     """Add to rates what decays and what links bring; book these, and what passes the boundary."""
-    scalar, patches, nodes, n = tables[I_SCALARS][q], tables[I_PATCHES], tables[I_NODES].size, basin["n"]
+    scalar, patches, n = tables[I_SCALARS][q], tables[I_PATCHES], basin["n"]
     if basin["open"] >= 0:
         book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
     if scalar["decay"] > 0.0:
@@ -164,7 +165,7 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
             high = depth[i] if depth.size > 0 else 1.0
             lost += area[i] * (s[i] - high * scalar["ambient"])
         scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
-        out[tables[I_LAYOUT][0]["gain"] + q * (nodes + 1) + nodes] -= per * scalar["decay"] * lost
+        lose(out, tables, q, 0, per * scalar["decay"] * lost)
         out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
     for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
         if patches[p]["basin"] == b:
@@ -175,7 +176,7 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
 def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
     """What a given velocity brings in is booked to its patches; what it takes out, all else that cells gain, to one."""
     plane, patches, nodes = tables[I_PLANE], tables[I_PATCHES], tables[I_NODES].size
-    lies, gained = tables[I_LAYOUT][0]["gain"] + q * (nodes + 1), 0.0
+    lies, gained = tables[I_LAYOUT][0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
         gained += plane[basin["area"] + i] * rate[i]
     last, most = basin["open"], 0.0
@@ -200,7 +201,7 @@ def bring(tables, patch, basin, q, y, rate, out):
     """What the network brings through a patch into the cells behind it; each gives of its own where water leaves."""
     layout, nodes, rho = tables[I_LAYOUT][0], tables[I_NODES].size, tables[I_SETTINGS][0]["rho"]
     node = patch["node"]
-    made_up = out[layout["gain"] + q * (nodes + 1) + node]
+    made_up = out[layout["gain"] + q * nodes + node]
     flow = (out[layout["net"] + node] + out[layout["supply"] + node]) / (rho * patch["area"])  # [m/s] of depth
     brought = (out[layout["brought"] + q * nodes + node] + made_up) / (rho * patch["area"])
     leaves = min(flow, 0.0)
