@@ -94,7 +94,7 @@ def draw(frames: Frames, field: str, out: str, contours: int) -> None:
         pictures = []
         for frame in frames:
             scene.show(plotter, *frame)
-            pictures.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(128))
+            pictures.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(255))
         pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=FRAME, loop=0)
 
 
@@ -102,7 +102,7 @@ class Scene:
     """What frames have in common: the range of their field, its unit, how far they reach and how they are seen."""
 
     def __init__(self, frames: Frames, field: str, contours: int) -> None:
-        self.field, self.contours = field, contours
+        self.field, self.contours, self.seen = field, contours, False
         self.unit, known, lows, highs, boxes = "", {}, [], [], []
         for _, files in frames:
             for file in files:
@@ -124,6 +124,7 @@ class Scene:
     def show(self, plotter: Any, caption: str, files: list) -> None:
         """Put a frame on the stage."""
         plotter.clear_actors()
+        plotter.scalar_bars.clear()
         for file in files:
             mesh = read(file, self.field)
             if "depth" in mesh.cell_data:
@@ -134,7 +135,9 @@ class Scene:
         if self.rise != 1.0:
             caption += f"; heights drawn {self.rise:.3g} times"
         plotter.add_text(caption, font_size=12, color=INK, position="upper_left")
-        _look(plotter, [*self.box[:4], self.rise * self.box[4], self.rise * self.box[5]], self.water)
+        if not self.seen:  # a camera that is set twice forgets its zoom
+            _look(plotter, [*self.box[:4], self.rise * self.box[4], self.rise * self.box[5]], self.water)
+            self.seen = True
 
     def basin(self, plotter: Any, mesh: Any) -> None:
         """The bed of a basin and the water over it."""
@@ -267,7 +270,7 @@ def _look(plotter: Any, bounds: list[float], aslant: bool = False) -> None:
     else:
         plotter.view_isometric()
     plotter.reset_camera(bounds=bounds)
-    plotter.camera.zoom(1.1)
+    plotter.camera.zoom(1.35 if aslant else 1.1)
     lift(plotter.camera)
 
 

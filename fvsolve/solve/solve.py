@@ -301,7 +301,7 @@ class Run:
         ledger = mass_ledger(model, loop.now, loop.stepper.ledger[: len(model.node_names)])
         summary = Summary(
             reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
-            find_envelope(model), loop.stepper.counts(), self.methods(), model.cells, self.seconds, self.setup,
+            find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.setup,
             [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model),
         )  # fmt: skip
         self.sink.end(summary)

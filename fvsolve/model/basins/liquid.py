@@ -49,6 +49,9 @@ class Liquid(Basin, physics="liquid"):
         velocity = np.column_stack([y[1], y[2], np.zeros(self.n)]) / self.density
         return {"pressure": self.part.pressure + self.speed**2 * y[0], "velocity": velocity}
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        return {"wave_speed": (self.speed, self.speed)}
+
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field != "pressure":
             return super().lower_probe(row, field, cells, weights)
