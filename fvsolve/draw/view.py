@@ -109,13 +109,15 @@ class Scene:
                 mesh = read(file, field)
                 known |= dict.fromkeys(name for name in mesh.cell_data if name != "pipe")
                 if field in mesh.cell_data:
-                    self.unit = unit_of(mesh, field)
-                    lows.append(float(mesh[field].min()))
-                    highs.append(float(mesh[field].max()))
+                    self.unit, values = unit_of(mesh, field), mesh[field]
+                    if "depth" in mesh.cell_data and field != "bed":
+                        values = values[mesh["depth"] > WET]  # which are all that is drawn
+                    lows.append(float(values.min(initial=math.inf)))
+                    highs.append(float(values.max(initial=-math.inf)))
                 boxes.append(box(mesh))
         if not lows:
             sys.exit(f"no field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
-        self.limits = span(min(lows), max(highs))
+        self.limits = span(min(lows), max(highs)) if min(lows) <= max(highs) else (0.0, 1.0)  # all dry
         self.box = [(min if k % 2 == 0 else max)(one[k] for one in boxes) for k in range(6)]
         self.water = any("depth" in read(file, field).cell_data for file in frames[0][1])
         wide, tall = max(self.box[1] - self.box[0], self.box[3] - self.box[2]), self.box[5] - self.box[4]
@@ -238,9 +240,11 @@ def tube(mesh: Any) -> Any:
 
 def raised(mesh: Any, rise: float) -> Any:
     """The wet cells of a basin at the surface of their water."""
-    found = mesh.cell_data_to_point_data(pass_cell_data=True)
-    found.points[:, 2] = rise * found.point_data["surface"]
-    return found.threshold(WET, scalars="depth", preference="cell")
+    wet = mesh.threshold(WET, scalars="depth", preference="cell")
+    if wet.n_cells:  # of these alone: the bed of a dry bank is no surface
+        wet = wet.cell_data_to_point_data(pass_cell_data=True)
+        wet.points[:, 2] = rise * wet.point_data["surface"]
+    return wet
 
 
 def sides(water: Any, rise: float) -> Any:
