@@ -89,6 +89,11 @@ class Model:
         return sum(pipe.cells for pipe in self.pipes)
 
     @property
+    def all_cells(self) -> int:
+        """Number of cells of all pipes and basins."""
+        return self.cells + sum(basin.n for basin in self.basins)
+
+    @property
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses in a second, for every pipe [1/s]."""
         pipes = self.tables[rec.I_PIPES]

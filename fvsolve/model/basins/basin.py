@@ -37,6 +37,7 @@ class Basin:
         self.case, self.name, self.part, self.mesh = case, name, case.nodes[name], case.meshes[name]
         self.x, self.y = np.ascontiguousarray(self.mesh.centre.T)
         self.n = self.x.size
+        self.memory = 0  # its tables and its state [bytes]
         grid = self.mesh.grid
         self.is_grid = grid is not None and self.n == grid.nx * grid.ny
         self.scalars = list(case.scalars)
@@ -57,6 +58,10 @@ class Basin:
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """What cells hold at deviations float64[quantities, n], SI."""
+        raise NotImplementedError
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest of what tells of its waves at the start, SI."""
         raise NotImplementedError
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
@@ -111,7 +116,7 @@ class Basin:
 
     def lower_common(self, scene, row) -> None:
         """Fill what all kinds need."""
-        numerics, mesh = self.case.numerics, self.mesh
+        numerics, mesh, before = self.case.numerics, self.mesh, scene.plane_size + len(scene.integers)
         self.row, row["n"] = row, self.n
         row["scheme"] = rec.UPWIND if numerics.scheme == "upwind" else FIFTH.get(numerics.scheme, rec.MUSCL)
         row["limiter"] = LIMITERS.get(numerics.limiter, rec.MONOTONIZED_CENTRAL)
@@ -144,6 +149,9 @@ class Basin:
         row["carried"] = scene.size if self.scalars else -1
         for name in self.scalars:
             scene.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
+
+        self.memory = 8 * (scene.plane_size + len(scene.integers) + scene.size - before)
+        scene.warnings += [f"basin {self.name}: {note}" for note in mesh.notes]
 
     def lower_scalars(self, scene, row) -> None:
         """Reserve what scalars are carried by and in, and values beyond the boundary."""

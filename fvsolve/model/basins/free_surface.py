@@ -66,6 +66,12 @@ class FreeSurface(Basin, physics="free-surface"):
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        depth = self.depth + self.start()[0]
+        low, high = float(depth.min()), float(depth.max())
+        speeds = np.sqrt(self.case.gravity * np.array([low, high]))
+        return {"depth": (low, high), "wave_speed": (float(speeds[0]), float(speeds[1]))}
+
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field not in ("depth", "surface", "bed"):
             return super().lower_probe(row, field, cells, weights)

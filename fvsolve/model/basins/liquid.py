@@ -71,6 +71,9 @@ class Liquid(Basin, physics="liquid"):
         velocity = np.column_stack([y[1] / density, y[2] / density, np.zeros(self.n)])
         return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        return {"wave_speed": (self.speed, self.speed)}
+
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field != "pressure":
             return super().lower_probe(row, field, cells, weights)
