@@ -333,6 +333,7 @@ BASIN = np.dtype(
         ("speed", "f8"),  # of waves in a liquid [m/s]
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
         ("roughness", "f8"),  # Manning's n, or a factor
+        ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
     ],
     align=True,
 )

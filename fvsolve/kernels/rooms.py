@@ -65,7 +65,10 @@ ROOMS = {
         before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
-    "patches": Room(before="plane.patches: patch_pressures", after="plane.patches: patch_flows"),
+    "patches": Room(
+        before="plane.patches: patch_pressures", after="plane.patches: patch_flows", power="plane.energy: add_power",
+        stored="plane.energy: add_stored",
+    ),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip

@@ -36,6 +36,8 @@ class Liquid(Basin, physics="liquid"):
 
     def lower(self, scene, row) -> None:
         row["thickness"], row["speed"] = self.part.thickness, self.speed
+        height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
+        row["rest"] = self.part.pressure - self.case.ambient_pressure + height
         row["kind"] = rec.ACOUSTIC_GRID if self.is_grid else rec.ACOUSTIC_FACES
 
     def start(self) -> np.ndarray:
