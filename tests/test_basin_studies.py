@@ -13,6 +13,7 @@ from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, va
 import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.model.basins import FreeSurface
+from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
@@ -270,3 +271,48 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
     assert open_["scheme", "pool"] == approx(shut["scheme", "pool"], rel=1e-9)
     assert abs(open_["rate", "pool"] - shut["rate", "pool"]) > 100.0  # something did pass
     assert open_["dissipated", "pool"] >= 0.0
+
+
+# dispersion ------------------------------------------------------------------------------------------------------
+
+
+def slower(k: float, depth: float) -> float:
+    """Per cent by which real waves of small height run slower than shallow water has them (Airy 1845)."""
+    return 100.0 * (1.0 - math.sqrt(math.tanh(k * depth) / (k * depth)))
+
+
+@pytest.mark.parametrize("more", [{}, {"grading": [2.0, 1.0]}], ids=["even", "graded"])
+def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
+    """One half wave in 10 m is quiet 0.5 m deep, k h = 0.16, and 4.9 % too quick at 1.8 m."""
+    k = math.pi / 10.0
+    for depth in (0.5, 1.8):
+        basin = pool((32, 8), f"{depth} + 0.01*cos({k!r}*x)", depth=depth, **more)
+        said = [one for one in built(alone(basin, 1.0)).warnings if "slower" in one]
+        assert len(said) == (1 if depth > 1.0 else 0)
+    assert f"waves about 20 m long in 1.8 m of water (k h = 0.57): real ones run {slower(k, 1.8):.2g} %" in said[0]
+
+
+def test_wavenumbers_are_those_of_the_waves_that_there_are():
+    """To rounding by cosines, to second order across faces; a dam that breaks is one long wave, not a short one."""
+    k = math.hypot(2.0 * math.pi / 10.0, math.pi / 5.0)
+    level = f"1 + 0.01*cos({2.0 * math.pi / 10.0!r}*x)*cos({math.pi / 5.0!r}*y)"
+    model = built(alone(pool((32, 16), level), 1.0))
+    (basin,), y = model.basins, model.start
+    assert waves(basin, basin.of(y)).k == approx(k, rel=1e-12)
+    surface = basin.of(y)[0]
+    assert on_mesh(basin, surface) == approx(on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0)
+    dam = built(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
+    assert waves(dam.basins[0], dam.basins[0].of(dam.start)).k == approx(math.pi / 10.0, rel=0.1)
+
+
+def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
+    """A valve lets water rush into a deep pool at rest: nothing at the start, one word at the end."""
+    nodes = {
+        "pool": pool((20, 4), depth=3.0, patches={"in": {"side": "west"}}),
+        "lake": {"type": "reservoir", "head": 9},
+    }
+    case = scene(nodes, {"tap": valve("lake", "pool.in", 0.3, ramp(0.0, 0.2, 0.0, 1.0))}, 3.0, PLANE, ["tap.flow"], 0.1)
+    case["output"]["fields"] = 4
+    assert not built(case).warnings
+    said = [one for one in fvsolve.run(case).summary["warnings"] if "slower" in one]
+    assert len(said) == 1 and said[0].startswith("pool: waves about") and " s" in said[0].rsplit("at", 1)[1]
