@@ -7,7 +7,6 @@ from scipy.sparse import coo_array, csr_array, eye_array, kron
 
 from fvsolve.kernels import records as rec
 
-APART = ("transport",)  # physics whose quantities do not feel one another
 REACH = {rec.UPWIND: 1, rec.MUSCL: 2}  # cells either way; fifth order looks at three
 
 
@@ -15,8 +14,9 @@ def inside(basin) -> tuple[np.ndarray, np.ndarray]:
     """(rates, as many states that they depend on) of all cells on those about them."""
     near = neighbours(basin).tocoo()
     many = len(basin.quantities)
-    felt = np.eye(many, dtype=bool) if basin.part.physics in APART else np.ones((many, many), dtype=bool)
-    found = kron(coo_array(felt), near).tocoo()
+    if many == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    found = kron(np.ones((many, many), dtype=bool), near).tocoo()
     at = int(basin.row["y"])
     return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
 
