@@ -13,7 +13,6 @@ import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.models import ladder
-from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.failure.failure_map import failures
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
@@ -216,7 +215,7 @@ def test_what_basins_do_not_go_with_yet_is_said():
     case = alone(basin((4.0, 2.0), (8, 4), 0.2), 1.0)
     with pytest.raises(CaseError, match="one density"):
         fvsolve.load(case | {"fluid": {**case["fluid"], "law": "log"}})
-    for study in (chart, ladder, energy, lambda case: failures(fvsolve.load(case))):
+    for study in (chart, ladder, lambda case: failures(fvsolve.load(case))):
         with pytest.raises(FvsolveError, match="basins"):
             study(case)
 

@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 from pytest import approx
 from test_sparsity import stray
-from truth.scenes import AMBIENT, GRAVITY, pipe, ramp, reservoir, scene, valve
+from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.model.basins import FreeSurface
+from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
+from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.plane import lowered
 from fvsolve.studies.accuracy.refine import plan, resolutions
+from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.stability.stability import stability
 
@@ -192,3 +195,124 @@ def test_a_linearised_basin_sloshes_at_its_natural_frequencies():
     assert values.real.max() < 1e-9 * abs(values).max()
     with pytest.raises(FvsolveError, match="--scheme upwind"):
         linearise(case, scheme="fromm")
+
+
+# energy ----------------------------------------------------------------------------------------------------------
+
+
+def scheme_loss(cells: int, **numerics) -> float:
+    """What the scheme takes of a closed slosh in a second [J]."""
+    found = energy(alone(pool((2 * cells, cells), SLOSH), 1.0, **numerics))
+    assert not found.supplied and not found.dissipated
+    return found.scheme["pool"][-1]
+
+
+def test_what_a_scheme_takes_of_a_slosh_falls_with_its_order():
+    """First order takes as much as cells are wide; limited slopes as their cube, for they differ at third order."""
+    upwind = [scheme_loss(n, scheme="upwind") for n in (8, 16, 32)]
+    muscl = [scheme_loss(n) for n in (8, 16, 32)]
+    assert min(upwind + muscl) > 0.0
+    assert np.log2(upwind[1] / upwind[2]) == approx(1.0, abs=0.15)
+    assert np.log2(muscl[1] / muscl[2]) == approx(3.0, abs=0.2)
+
+
+def test_a_method_that_keeps_squares_leaves_all_the_loss_to_the_scheme():
+    """What cells store is no square but near one: gauss-4 leaves a millionth of a millionth, ssp-rk2 creates."""
+    case = alone(pool((16, 8), SLOSH), 1.0)
+    kept, made = (energy(case, {"numerics.method": method}) for method in ("gauss-4", "ssp-rk2"))
+    size = energy_of_slosh()
+    assert abs(kept.step[-1]) < 1e-9 * size < 1e-4 * size < -made.step[-1]
+    assert kept.stored["pool"][-1] == approx(-kept.scheme["pool"][-1], abs=1e-9 * size)
+
+
+def energy_of_slosh() -> float:
+    """Of a slosh, above that of the lake at rest [J]: rho g a^2 A / 4 of each of two cosines."""
+    return RHO * GRAVITY * (0.05**2 + 0.03**2) / 4.0 * 50.0
+
+
+def test_the_energy_of_the_start_is_that_of_the_surface_over_the_datum():
+    found = energy(alone(pool((64, 32), SLOSH), 0.01))
+    still = 0.5 * RHO * GRAVITY * 50.0  # 1 m of water over the datum
+    assert found.at_start["pool"] - still == approx(energy_of_slosh(), rel=2e-3)
+
+
+def test_a_basin_that_drains_gives_the_valve_what_its_tank_gives():
+    outlet = {"outlet": {"side": "east", "span": [1.25, 3.75]}}
+    shown = {}
+    for kind, place, node in (
+        ("basin", "pool.outlet", pool((20, 8), patches=outlet, elevation=2.0)),
+        ("tank", "pool", {"type": "tank", "area": 50.0, "level": 1.0, "elevation": 2.0}),
+    ):
+        links = {"tap": valve(place, "out", 0.002, ramp(0.0, 10.0, 0.0, 1.0))}
+        numerics = PLANE if kind == "basin" else {}
+        case = scene({"pool": node, "out": reservoir(AMBIENT, elevation=0.0)}, links, 40.0, numerics, ["tap.flow"], 1.0)
+        shown[kind] = energy(case)
+    basin, twin = shown["basin"], shown["tank"]
+    assert basin.dissipated["tap"][-1] == approx(twin.dissipated["tap"][-1], rel=2e-4)
+    assert basin.stored["pool"][-1] == approx(twin.stored["pool"][-1], rel=2e-4)
+    assert 0.0 < basin.made[-1] < 1e-4 * basin.through
+
+
+@pytest.mark.parametrize("head", [0.5, 3.0], ids=["out", "in"])
+def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
+    """Power that the scheme takes at any state: the same to rounding with the valve at a patch open and shut."""
+    found = []
+    for opening in (0.0, 1.0):
+        basin = pool((6, 4), patches={"west": {"side": "west"}}, elevation=0.0, bed="0.1*x")
+        nodes = {"pool": basin, "lake": {"type": "reservoir", "head": head, "elevation": 0.0}}
+        links = {"tap": valve("pool.west", "lake", 0.2) | {"opening": opening}}
+        model = built(scene(nodes, links, 1.0, PLANE, ["tap.flow"]))
+        y = model.scale * np.random.default_rng(5).normal(scale=0.5, size=model.y_size)
+        accounts = Accounts(model)
+        power = accounts.power_at(0.5, y, np.zeros(model.y_size), model.new_out())
+        kinds = {(one.what, one.place): value for one, value in zip(accounts.accounts, power, strict=True)}
+        found.append(kinds)
+    shut, open_ = found
+    assert open_["scheme", "pool"] == approx(shut["scheme", "pool"], rel=1e-9)
+    assert abs(open_["rate", "pool"] - shut["rate", "pool"]) > 100.0  # something did pass
+    assert open_["dissipated", "pool"] >= 0.0
+
+
+# dispersion ------------------------------------------------------------------------------------------------------
+
+
+def slower(k: float, depth: float) -> float:
+    """Per cent by which real waves of small height run slower than shallow water has them (Airy 1845)."""
+    return 100.0 * (1.0 - math.sqrt(math.tanh(k * depth) / (k * depth)))
+
+
+@pytest.mark.parametrize("more", [{}, {"grading": [2.0, 1.0]}], ids=["even", "graded"])
+def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
+    """One half wave in 10 m is quiet 0.5 m deep, k h = 0.16, and 4.9 % too quick at 1.8 m."""
+    k = math.pi / 10.0
+    for depth in (0.5, 1.8):
+        basin = pool((32, 8), f"{depth} + 0.01*cos({k!r}*x)", depth=depth, **more)
+        said = [one for one in built(alone(basin, 1.0)).warnings if "slower" in one]
+        assert len(said) == (1 if depth > 1.0 else 0)
+    assert f"waves about 20 m long in 1.8 m of water (k h = 0.57): real ones run {slower(k, 1.8):.2g} %" in said[0]
+
+
+def test_wavenumbers_are_those_of_the_waves_that_there_are():
+    """To rounding by cosines, to second order across faces; a dam that breaks is as a wave of 1.1 half lengths."""
+    k = math.hypot(2.0 * math.pi / 10.0, math.pi / 5.0)
+    level = f"1 + 0.01*cos({2.0 * math.pi / 10.0!r}*x)*cos({math.pi / 5.0!r}*y)"
+    model = built(alone(pool((32, 16), level), 1.0))
+    (basin,), y = model.basins, model.start
+    assert waves(basin, basin.of(y)).k == approx(k, rel=1e-12)
+    surface = basin.of(y)[0]
+    assert on_mesh(basin, surface) == approx(on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0)
+    dam = built(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
+    assert waves(dam.basins[0], dam.basins[0].of(dam.start)).k == approx(math.sqrt(12.0) / 10.0, rel=1e-3)
+
+
+def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
+    """A valve lets water rush into a deep pool at rest: nothing at the start, one word at the end."""
+    nodes = {
+        "pool": pool((20, 4), depth=3.0, patches={"in": {"side": "west"}}),
+        "lake": {"type": "reservoir", "head": 9},
+    }
+    case = scene(nodes, {"tap": valve("lake", "pool.in", 0.3, ramp(0.0, 0.2, 0.0, 1.0))}, 3.0, PLANE, ["tap.flow"], 0.1)
+    case["output"]["fields"] = 4
+    assert not built(case).warnings
+    said = [one for one in fvsolve.run(case).summary["warnings"] if "slower" in one]
+    assert len(said) == 1 and said[0].startswith("pool: waves about") and " s" in said[0].rsplit("at", 1)[1]

@@ -74,7 +74,7 @@ ROOMS = {
     ),
     "patches": Room(
         before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
-        observe="plane.observe: observe_basins",
+        observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
     "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
     "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),

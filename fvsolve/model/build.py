@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError, Fault
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import at_start, lower_basins
+from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.density import add_law, cavity_pressure
@@ -380,11 +380,13 @@ class Scene:
         inside = sorted(
             (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
         )
+        start = self.start_state()
+        self.warnings += dispersion.warnings(self.basins, start)
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
             self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
-            self.steady, self.profiles, self.devices, self.start_state(), self.events,
+            self.steady, self.profiles, self.devices, start, self.events,
             self.basins,
         )  # fmt: skip
 

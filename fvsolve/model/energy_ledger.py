@@ -30,8 +30,8 @@ class Accounts:
 
     def __init__(self, model: Model) -> None:
         self.model, case = model, model.case
-        if len(model.tables[rec.I_BASINS]):
-            raise FvsolveError("the energy of basins is not booked yet")
+        if model.basins and case.fluid.law != "linear":
+            raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # of stored energy: rows of `stored`
@@ -55,6 +55,7 @@ class Accounts:
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.mechanics()
         self.devices()
+        self.basins()
         self.matrix = matrix_of(self.accounts, self.powers)
         self.holding = matrix_of(self.held, self.stores)
 
@@ -81,6 +82,8 @@ class Accounts:
             self.add("supplied", name, "demand" if kind == "junction" else kind, at)
         elif code == rec.TANK:
             self.add("supplied", name, "over the rim", at)
+        elif code == rec.PATCH:
+            self.add("supplied", name, "dry patch", at)
         stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # a vessel's is its device's
         self.hold(name, kind, at + 1 if stores else None)
 
@@ -137,6 +140,15 @@ class Accounts:
             }.items():
                 self.accounts.append(Account(what, name, kind, tuple(of), (1.0, sign)[: len(of)]))
             self.hold(name, kind, at + 1)
+
+    def basins(self) -> None:
+        for basin in self.model.basins:
+            at = self.take(4)
+            self.add("dissipated", basin.name, "patches", at + 1)
+            self.add("dissipated", basin.name, "friction", at + 2)
+            self.hold(basin.name, "basin", at + 3)
+            rows = (at, at + 1, at + 2, at + 3)
+            self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1)))
 
     def of(self, what: str) -> list[int]:
         """Numbers of the lines of one kind."""

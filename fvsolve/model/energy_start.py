@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins.energy import above as basin_above
 from fvsolve.model.model import Model
 from fvsolve.model.unsteady import memory_shares
 
@@ -24,6 +25,7 @@ def available(model: Model) -> dict[str, float]:
     tank would stand.
     """
     tables, nodes, found = model.tables, model.tables[rec.I_NODES], {}
+    datum = float(tables[rec.I_SETTINGS][0]["datum"])
     vessels = vessels_above(model)
     for name, row in zip(model.node_names, nodes, strict=True):
         if row["y"] >= 0 and row["kind"] != rec.VESSEL:
@@ -38,6 +40,8 @@ def available(model: Model) -> dict[str, float]:
     for name, row in zip(model.body_names, tables[rec.I_BODIES], strict=False):
         if row["y"] >= 0:
             found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
+    for basin in model.basins:
+        found[basin.name] = basin_above(basin, basin.of(model.start), datum)
     springs = [name for name, link in model.case.links.items() if link.kind == "spring"]
     for name, row in zip(springs, tables[rec.I_BRACES], strict=False):
         found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]

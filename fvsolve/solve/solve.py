@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
+from fvsolve.model.basins.dispersion import Watch
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.summary import (
@@ -69,6 +70,7 @@ class Run:
         model.tables[rec.I_MARKS][:] = np.nan
         model.tables[rec.I_ARMED][:] = 0.0
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
+        self.waves = Watch(model)
         self.processor = 0.0  # seconds of CPU time of the steps of this process
         self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
         if not self.fresh:
@@ -136,6 +138,7 @@ class Run:
                 greatest[k], t_greatest[k] = high[k + 1], high[0]
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
+        self.waves.look(t, y)
         self.sink.field(t, self.model.frame(y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
@@ -299,13 +302,15 @@ class Run:
         model, loop = self.model, self.loop
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
+        if reason == "finished":
+            self.waves.look(loop.t, loop.now)
         ledger = loop.stepper.ledger[: loop.stepper.ledger.size // 2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[: len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         summary = Summary(
             reason, reason == "finished", loop.t, find_marks(model), ledgers, find_extremes(model),
             find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.setup,
-            [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model),
+            [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), self.waves.warnings(),
         )  # fmt: skip
         self.sink.end(summary)
         return summary

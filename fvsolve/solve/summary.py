@@ -60,6 +60,7 @@ class Summary:
     seconds_setup: float = 0.0
     events: list[Event] = field(default_factory=list)
     cavities: list[Cavity] = field(default_factory=list)  # that the law `mixture` followed
+    warnings: list[str] = field(default_factory=list)  # of what came about, beside those of the model
 
     @property
     def steps(self) -> int:

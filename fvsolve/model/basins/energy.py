@@ -21,3 +21,21 @@ def weights(basin, y: np.ndarray) -> np.ndarray:
         per = 0.5 * basin.part.thickness * area / basin.density
         return np.array([basin.speed**2 * per, per, per])
     return np.tile(0.5 * area, (len(basin.quantities), 1))
+
+
+def above(basin, y: np.ndarray, datum: float) -> float:
+    """Energy at deviations y over that at rest and at P = 0, a surface at the datum or on the bed [J]."""
+    area, part, gravity = basin.mesh.area, basin.part, basin.case.gravity
+    rho = basin.case.properties.density
+    if part.physics == "free-surface":
+        depth = np.maximum(basin.depth + y[0], 0.0)
+        bed = basin.bed + (part.elevation or 0.0) - datum
+        height = 0.5 * gravity * ((bed + depth) ** 2 - np.maximum(bed, 0.0) ** 2)
+        wet = np.maximum(depth, THIN)
+        moves = depth / (depth**2 + wet**2) * (y[1] ** 2 + y[2] ** 2)
+        return float(rho * np.sum(area * (height + moves)))
+    if part.physics == "liquid":
+        rest = part.pressure - basin.case.ambient_pressure + rho * gravity * ((part.elevation or 0.0) - datum)
+        square = (rest + basin.speed**2 * y[0]) ** 2 / basin.speed**2 + y[1] ** 2 + y[2] ** 2
+        return float(0.5 * part.thickness / rho * np.sum(area * square))
+    return 0.0

@@ -31,7 +31,8 @@ class FreeSurface(Basin, physics="free-surface"):
     def lower(self, scene, row) -> None:
         plan = np.zeros((shallow.PLANS, self.n))
         plan[0], plan[1] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
-        part = self.part
+        part, weight = self.part, self.case.properties.density * self.case.gravity
+        row["rest"] = weight * (part.level + (part.elevation or 0.0))
         if part.manning is not None or part.factor is not None:
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning

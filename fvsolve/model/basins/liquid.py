@@ -42,6 +42,8 @@ class Liquid(Basin, physics="liquid"):
 
     def lower(self, scene, row) -> None:
         row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
+        height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
+        row["rest"] = self.part.pressure - self.case.ambient_pressure + height
         row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
         if self.is_grid:
             row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.LIQUID_GRID

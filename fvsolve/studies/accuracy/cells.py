@@ -12,6 +12,7 @@ from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.model.basins.basin import FIFTH
 from fvsolve.model.schemes import ORDER
 from fvsolve.parts import Basin, Pipe
+from fvsolve.studies.accuracy.plane import contents
 from fvsolve.studies.outcome import prepared
 
 Counts = dict[str, tuple[int, ...]]  # dotted key -> numbers of cells: one of a pipe, two of a basin
@@ -110,7 +111,7 @@ def space_order(case) -> int:
 
 def starts_with_jump(case, coarse: Mapping, fine: Mapping) -> bool:
     """Whether a basin starts from a jump: neighbours lie as far apart on finer cells."""
-    if not any(basin.start for basin in basins(case).values()):
+    if not any(basin.start or getattr(basin, "scalars", {}) for basin in basins(case).values()):
         return False
     steps = [step_at_start(prepared(case, one)) for one in (coarse, fine)]
     return any(b > JUMP * a > 0.0 for a, b in zip(*steps, strict=True))
@@ -122,7 +123,8 @@ def step_at_start(model) -> list[float]:
     for basin in model.basins:
         inner = basin.mesh.inner
         left, right = basin.mesh.left[:inner], basin.mesh.right[:inner]
-        found += [float(np.max(np.abs(one[left] - one[right]), initial=0.0)) for one in basin.of(model.start)]
+        values = contents(basin, model.start).values()
+        found += [float(np.max(np.abs(one[left] - one[right]), initial=0.0)) for one in values]
     return found
 
 

@@ -15,6 +15,13 @@ NEAR = 1e-9  # of its length: how near an edge of coarser cells must be to one o
 DEGREE = 5  # of the spline through contents, where it is not
 
 
+def contents(basin, y: np.ndarray) -> dict[str, np.ndarray]:
+    """What states of a model say of a basin's cells, by quantity, what they carry included."""
+    found = dict(zip(basin.quantities, basin.of(y), strict=True))
+    carried = getattr(basin, "scalars", ())
+    return found | (dict(zip(carried, basin.amounts(y), strict=True)) if carried else {})
+
+
 def variable_of(basin, quantity: str) -> str:
     """Name of a variable."""
     return f"{basin.name} at the end: {quantity}"
@@ -36,7 +43,7 @@ def end_errors(model, y: np.ndarray, truth: Mapping, norms: Callable) -> dict[st
         theirs = truth.get(("basin", basin.name))
         if theirs is not None:
             share = basin.mesh.area / basin.mesh.area.sum()
-            for what, one, other in zip(basin.quantities, basin.of(y), theirs, strict=True):
+            for (what, one), other in zip(contents(basin, y).items(), theirs, strict=True):
                 found[variable_of(basin, what)] = norms(one - other, share)
     return found
 
@@ -44,16 +51,16 @@ def end_errors(model, y: np.ndarray, truth: Mapping, norms: Callable) -> dict[st
 def size_at_end(run, variable: str) -> float | None:
     """How large a variable of a run is, None where it is none of a basin."""
     for basin in run.model.basins:
-        for what, one in zip(basin.quantities, basin.of(run.y), strict=True):
+        for what, one in contents(basin, run.y).items():
             if variable == variable_of(basin, what):
                 return float(np.max(np.abs(one)))
     return None
 
 
-def lowered(fine, values: np.ndarray, coarse) -> np.ndarray:
+def lowered(fine, values, coarse) -> np.ndarray:
     """Averages float64[quantities, n] of a basin over the cells of another one of the same outline."""
     if fine.n == coarse.n and np.array_equal(fine.mesh.centre, coarse.mesh.centre):
-        return values
+        return np.asarray(values)
     one, other = fine.mesh.grid, coarse.mesh.grid
     degree = DEGREE if fine.is_grid else 1  # splines do not see holes
     found = []

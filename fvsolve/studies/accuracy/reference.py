@@ -18,7 +18,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, averaged, differences, fields, recorded, size_of, waves
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, keys, pipes, scaled, total
-from fvsolve.studies.accuracy.plane import lowered
+from fvsolve.studies.accuracy.plane import contents, lowered
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.outcome import Outcome, outcome
 
@@ -196,7 +196,9 @@ def of_run(run: Outcome) -> Reference:
         cells = {pipe.name: pipe.cells for pipe in model.pipes}
         found = fields(model, {name: tuple(averaged(one, cells[name]) for one in pair) for name, pair in fine.items()})
         pairs = zip(run.model.basins, model.basins, strict=True)
-        return found | {("basin", other.name): lowered(one, one.of(run.y), other) for one, other in pairs}
+        return found | {
+            ("basin", other.name): lowered(one, list(contents(one, run.y).values()), other) for one, other in pairs
+        }
 
     def rows_of(other: Outcome) -> np.ndarray:
         t = run.rows[:, 0]

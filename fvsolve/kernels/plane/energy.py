@@ -1,0 +1,149 @@
+"""Power and stored energy of basins under the linear law. Knows the tables; adds nothing up over time.
+
+Water with a free surface stores rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)) per area, a liquid per volume
+P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho), P its potential at rest; squares are those of a cell's mean. Rows of
+`power`, last of all, a basin: what comes in by patches at their potential, what is lost there (water that enters has
+no speed, water that leaves takes its own along and is not paid for it), friction, rate of storage [W]; of `stored`:
+its change since the profile [J].
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.energy import potential
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.plane.patches import mean_deviation
+from fvsolve.kernels.plane.shallow_rows import DEPTH, SURFACE, THIN
+from fvsolve.kernels.records import (
+    CARRIED_GRID,
+    I_BASINS,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_PATCHES,
+    I_PLANE,
+    I_SETTINGS,
+    MANNING,
+    NO_DRAG,
+    SHALLOW_FACES,
+)
+
+ROWS = 4  # of `power` a basin
+
+
+@njit(forceinline=True)
+def per_flow(depth):
+    """Velocity over flow of water so deep [1/m]."""
+    wet = max(depth, THIN)
+    return 2.0 * depth / (depth * depth + wet * wet)
+
+
+@njit(forceinline=True)
+def at_rest(st, basin):
+    """Potential of the profile [Pa]."""
+    return basin["rest"] - st["rho"] * st["gravity"] * st["datum"]
+
+
+@njit
+def add_power(t, y, dydt, out, handle, power):
+    """Rows of all basins."""
+    tables = open_tables(handle)
+    st, basins, patches = tables[I_SETTINGS][0], tables[I_BASINS], tables[I_PATCHES]
+    first = power.size - ROWS * basins.size
+    for b in range(basins.size):
+        rows = power[first + ROWS * b : first + ROWS * (b + 1)]
+        rows[0] = rows[1] = rows[2] = rows[3] = 0.0
+        if basins[b]["kind"] <= SHALLOW_FACES:
+            water_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
+        elif basins[b]["kind"] < CARRIED_GRID:
+            liquid_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
+    for k in range(patches.size):
+        patch, node = patches[k], patches[k]["node"]
+        flow = out[tables[I_LAYOUT][0]["net"] + node] + out[tables[I_LAYOUT][0]["supply"] + node]
+        power[first + ROWS * patch["basin"]] += potential(tables, out, node) * flow / st["rho"]
+        if basins[patch["basin"]]["kind"] <= SHALLOW_FACES:
+            power[first + ROWS * patch["basin"] + 1] += patch_loss(tables, patch, flow / patch["area"], y)
+
+
+@njit
+def water_power(st, basin, plane, y, dydt, rows):
+    """Friction and rate of storage of water with a free surface."""
+    n, o = basin["n"], basin["y"]
+    depths, surface = plane[basin["plan"] + DEPTH * n :], plane[basin["plan"] + SURFACE * n :]
+    weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
+    friction, rate = 0.0, 0.0
+    for i in range(n):
+        d, qx, qy = y[o + i], y[o + n + i], y[o + 2 * n + i]
+        depth = max(depths[i] + d, 0.0)
+        share = per_flow(depth)
+        u, v = share * qx, share * qy
+        level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
+        moves = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
+        rate += area[i] * (level * dydt[o + i] + st["rho"] * moves)
+        friction += area[i] * drag_power(st, basin, depth, u * u + v * v)
+    rows[2], rows[3] = friction, rate
+
+
+@njit
+def drag_power(st, basin, depth, square):
+    """What the bed takes of water that runs over it, per area [W/m2]; square : of its velocity."""
+    if basin["friction"] == NO_DRAG or depth <= 0.0:
+        return 0.0
+    part = basin["roughness"] / 8.0
+    if basin["friction"] == MANNING:
+        part = st["gravity"] * basin["roughness"] ** 2 / max(depth, THIN) ** (1.0 / 3.0)
+    return st["rho"] * part * square * sqrt(square)
+
+
+@njit
+def liquid_power(st, basin, plane, y, dydt, rows):
+    """Rate of storage of a liquid."""
+    n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
+    rate, square = 0.0, basin["speed"] * basin["speed"]
+    for i in range(n):
+        moves = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]
+        rate += area[i] * ((rest + square * y[o + i]) * dydt[o + i] + moves)
+    rows[3] = basin["thickness"] * rate / st["rho"]
+
+
+@njit
+def patch_loss(tables, patch, flow, y):
+    """What speed is lost where `flow` [kg/(s m2)] enters or leaves the cells behind a patch [W]."""
+    basin, plane, integers = tables[I_BASINS][patch["basin"]], tables[I_PLANE], tables[I_INTEGERS]
+    n, o, mean, lost = basin["n"], basin["y"], mean_deviation(tables, patch, y), 0.0
+    depths, area = plane[basin["plan"] + DEPTH * n :], plane[basin["area"] :]
+    for m in range(patch["count"]):
+        i = integers[patch["first"] + m]
+        mean += area[i] * depths[i] / patch["area"]
+    for m in range(patch["count"]):
+        i = integers[patch["first"] + m]
+        depth = max(depths[i] + y[o + i], 0.0)
+        share, square = per_flow(depth), y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+        lost += 0.5 * area[i] * share * share * square * flow
+        if flow < 0.0 and mean > 0.0:
+            lost -= area[i] * share * square / mean * flow
+    return lost
+
+
+@njit
+def add_stored(t, y, dydt, out, handle, stored):
+    """Rows of all basins."""
+    tables = open_tables(handle)
+    st, basins, plane = tables[I_SETTINGS][0], tables[I_BASINS], tables[I_PLANE]
+    first = stored.size - basins.size
+    for b in range(basins.size):
+        basin, total = basins[b], 0.0
+        n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
+        if basin["kind"] <= SHALLOW_FACES:
+            depths, surface = plane[basin["plan"] + DEPTH * n :], plane[basin["plan"] + SURFACE * n :]
+            weight = st["rho"] * st["gravity"]
+            for i in range(n):
+                d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+                share = per_flow(max(depths[i] + d, 0.0))
+                height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
+                total += area[i] * (height + 0.5 * st["rho"] * share * square)
+        elif basin["kind"] < CARRIED_GRID:
+            for i in range(n):
+                r, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+                total += area[i] * (rest * r + 0.5 * (basin["speed"] ** 2 * r * r + square))
+            total *= basin["thickness"] / st["rho"]
+        stored[first + b] = total

@@ -1,0 +1,125 @@
+"""Whether the waves of a free surface are long: shallow water knows no others. Knows surfaces; knows no run.
+
+Waves of wavenumber k run at sqrt(g tanh(k h) / k), in shallow water at sqrt(g h). Of a surface e over that at rest,
+less its mean, k is that of a single wave with the same ratio of e^2 to |grad psi|^2, -div grad psi = e and no slope at
+walls: the mean of 1 / k^2 over its waves, each as its square counts, so that a steep front is no short wave.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+WRONG = 0.01  # share of the speed from which a word is due
+SEEN, MATTERS = 1e-6, 1e-3  # of the depth, root mean square of a surface: given at the start, come about in a run
+
+
+class Waves(NamedTuple):
+    """Of a surface: wavenumber [1/m], mean depth of wet cells [m], root mean square of the surface over that depth."""
+
+    k: float
+    depth: float
+    size: float
+
+    @property
+    def wrong(self) -> float:
+        """Share by which real waves run slower than shallow water has them."""
+        kh = self.k * self.depth
+        return 1.0 - math.sqrt(math.tanh(kh) / kh)
+
+
+def waves(basin, y: np.ndarray) -> Waves | None:
+    """The waves of a basin at deviations y; None without any."""
+    depth, area = basin.depth + y[0], basin.mesh.area
+    wet = depth > 0.0
+    if not wet.any():
+        return None
+    mean, reached = float(np.average(depth[wet], weights=area[wet])), wet | (basin.depth > 0.0)
+    surface = np.where(reached, y[0] - np.average(y[0][reached], weights=area[reached]), 0.0)
+    with np.errstate(over="ignore"):  # of a run that blows up
+        square = float(np.average(surface**2, weights=area))
+    if not SEEN * mean < math.sqrt(square) < math.inf:
+        return None
+    inverse = on_grid(basin, surface) if is_even(basin) else on_mesh(basin, surface)
+    return Waves(math.sqrt(square / inverse), mean, math.sqrt(square) / mean)
+
+
+def is_even(basin) -> bool:
+    """Whether its cells are a grid of equal rectangles."""
+    grid = basin.mesh.grid
+    return basin.is_grid and all(np.ptp(np.diff(one)) < 1e-9 * (one[-1] - one[0]) for one in (grid.x, grid.y))
+
+
+def on_grid(basin, surface: np.ndarray) -> float:
+    """Mean of |grad psi|^2, by cosines."""
+    from scipy.fft import dctn
+
+    grid = basin.mesh.grid
+    square = dctn(surface.reshape(grid.ny, grid.nx), norm="ortho") ** 2 / surface.size
+    kx, ky = (np.pi * np.arange(n) / (one[-1] - one[0]) for n, one in ((grid.nx, grid.x), (grid.ny, grid.y)))
+    k = kx**2 + ky[:, None] ** 2
+    square[0, 0], k[0, 0] = 0.0, 1.0
+    return float(np.sum(square / k))
+
+
+def on_mesh(basin, surface: np.ndarray) -> float:
+    """The same on any mesh, by differences across faces."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import spsolve
+
+    mesh, inner = basin.mesh, basin.mesh.inner
+    left, right, n = mesh.left[:inner], mesh.right[:inner], basin.n
+    apart = np.abs(np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1))
+    per = mesh.length[:inner] / apart
+    rows, columns = np.concatenate([left, right, left, right]), np.concatenate([left, right, right, left])
+    matrix = coo_array((np.concatenate([per, per, -per, -per]), (rows, columns)), shape=(n, n)).tocsc()
+    own = mesh.area * (surface - np.average(surface, weights=mesh.area))
+    psi = np.zeros(n)
+    psi[1:] = spsolve(matrix[1:, 1:], own[1:])
+    return float(own @ psi / mesh.area.sum())
+
+
+def said(basin, found: Waves) -> str:
+    """What a reader has to know."""
+    return (
+        f"{basin.name}: waves about {2.0 * math.pi / found.k:.3g} m long in {found.depth:.3g} m of water (k h = "
+        f"{found.k * found.depth:.2g}): real ones run {100.0 * found.wrong:.2g} % slower than shallow water has them"
+    )
+
+
+def warnings(basins, y: np.ndarray) -> list[str]:
+    """Of basins whose waves are too short at the start y of a model."""
+    pairs = [(basin, waves(basin, basin.of(y))) for basin in surfaces(basins)]
+    return [said(basin, found) for basin, found in pairs if found is not None and found.wrong > WRONG]
+
+
+def surfaces(basins) -> list:
+    """Basins with a free surface."""
+    return [basin for basin in basins if basin.part.physics == "free-surface"]
+
+
+class Watch:
+    """The shortest waves of a run that matter, beside those that its start has been warned of."""
+
+    def __init__(self, model) -> None:
+        self.basins = surfaces(model.basins)
+        start = {basin.name: waves(basin, basin.of(model.start)) for basin in self.basins}
+        known = {name for name, one in start.items() if one is not None and one.wrong > WRONG}
+        self.basins = [basin for basin in self.basins if basin.name not in known]
+        self.found: dict[str, tuple[float, Waves]] = {}
+
+    def look(self, t: float, y: np.ndarray) -> None:
+        """At a state."""
+        for basin in self.basins:
+            one = waves(basin, basin.of(y))
+            if one is None or not one.size > MATTERS:
+                continue
+            if basin.name not in self.found or one.wrong > self.found[basin.name][1].wrong:
+                self.found[basin.name] = t, one
+
+    def warnings(self) -> list[str]:
+        """One for each basin where they are too short."""
+        found = [(basin, *self.found[basin.name]) for basin in self.basins if basin.name in self.found]
+        return [f"{said(basin, one)}, at {t:.4g} s" for basin, t, one in found if one.wrong > WRONG]
