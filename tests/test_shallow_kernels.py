@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from fvsolve.kernels.plane.friction import DARCY, MANNING, add_friction
 from fvsolve.kernels.plane.shallow import PLANS, WORK, grid_rates
+from fvsolve.kernels.plane.shallow_smooth import put_push
 from fvsolve.kernels.records import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
@@ -198,6 +199,18 @@ def test_smooth_flow_over_a_bed_keeps_the_order_of_the_scheme(scheme, low, way):
         inside = abs(middles(x) - 15.0) < 6.0
         errors.append(abs(water.depth(y).ravel() - h)[inside].mean())
     assert slope(errors) > low
+
+
+def test_the_push_of_cubic_depth_and_surface_is_exact():
+    rng = np.random.default_rng(4)
+    h, e = (np.polynomial.Polynomial(c) for c in rng.standard_normal((2, 4)))
+    edges = np.arange(-2.5, 3.0)
+    deep, push = np.ones(1), np.zeros(1)
+    five = [np.atleast_1d(np.diff(f.integ()(edges))[k]) for f in (h, e) for k in range(5)]
+    ends = [np.atleast_1d(f(x)) for f in (h, e) for x in (-0.5, 0.5)]
+    put_push(five[2], deep, *ends, *five[:2], *five[3:5], *five[5:], push)
+    whole = (h * e.deriv()).integ()
+    assert push[0] == approx(whole(0.5) - whole(-0.5), rel=1e-13)
 
 
 def parabola(x):

@@ -69,9 +69,9 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
             put_flows(qx[a:b], qy[a:b], cells)
         block = ring[place(j, -GHOSTS) :]
         if left == 0:
-            put_end(fields, reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
+            put_end(fields, 3 if fifth else 2, reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
         if right == nx:
-            put_end(fields, reflect[ny + j] if walls else 1.0, block, GHOSTS + nx - 1 - first, 1, nx)
+            put_end(fields, 3 if fifth else 2, reflect[ny + j] if walls else 1.0, block, GHOSTS + nx - 1 - first, 1, nx)
         return
     edge = 0 if j < 0 else ny - 1
     mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)

@@ -14,10 +14,9 @@ from fvsolve.kernels.records import MINMOD, UPWIND, VAN_LEER
 THIN = 1e-6  # depth below which velocities fade [m]
 TINY = 1e-300
 LEAST = 1e-280  # product of two differences below which a slope is none, so that four can be multiplied
-MOST = 256  # cells of a row at a time
+MOST = 1024  # cells of a row at a time
 GHOSTS = 8  # three are needed; with eight the cells of a row begin where a cache line does
-REACH = 3
-STRIDE = 280  # an odd number of cache lines, so that rows do not push each other out
+STRIDE = 1048  # an odd number of cache lines, so that rows do not push each other out
 DEPTH, SURFACE, EAST, NORTH, WAVE, FLOW_EAST, FLOW_NORTH = (k * STRIDE for k in range(7))
 MASS, BEFORE, AFTER, ALONG = (k * STRIDE for k in range(4))
 FIELDS = 7
@@ -27,7 +26,7 @@ FIELDS = 7
 def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, cells, top):
     """Depth, surface, velocities and wave speed of a row; top[i] becomes the greatest rate of its column so far.
 
-    Velocity q / h, which fades as 2 h q / (h^2 + THIN^2) below THIN.
+    Velocity is q / h, which fades as 2 h q / (h^2 + THIN^2) below THIN.
     """
     for i in range(dh.size):
         depth = max(depth0[i] + dh[i], 0.0)
@@ -48,7 +47,7 @@ def put_flows(qx, qy, cells):
 
 
 @njit
-def put_end(fields, wall, cells, first, step, deep):
+def put_end(fields, reach, wall, cells, first, step, deep):
     """Ghosts beyond cell `first` of a row, `step` away from it: mirrored by a wall, 1, or that cell again, 0.
 
     deep : number of cells that a mirror finds
@@ -56,7 +55,7 @@ def put_end(fields, wall, cells, first, step, deep):
     for f in range(fields):
         at = f * STRIDE + first
         turn = -1.0 if f * STRIDE == EAST or f * STRIDE == FLOW_EAST else 1.0
-        for k in range(REACH):
+        for k in range(reach):
             image = cells[at - step * min(k, deep - 1)]
             cells[at + step * (k + 1)] = wall * turn * image + (1.0 - wall) * cells[at]
 

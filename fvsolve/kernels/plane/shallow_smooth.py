@@ -1,8 +1,8 @@
 """Fifth-order values of shallow water at faces, where it is deep enough. Knows rows of cells; knows no grid.
 
 Depth, surface and unit flows are reconstructed from cell means, velocities are their quotients. The integral of
-h de/dx over a cell is exact for quartics: product of the parabolas through both faces and the mean, and what
-the third differences of either and the second of the other add.
+h de/dx over a cell is exact for cubics: the product of the parabolas through both faces and the mean, and what the
+third differences of either add to it with the second of the other.
 """
 
 from math import sqrt
