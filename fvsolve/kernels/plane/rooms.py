@@ -19,8 +19,6 @@ from fvsolve.kernels.records import (
     SHALLOW_GRID,
 )
 
-UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one
-
 
 @njit
 def shallow_grids(t, y, dydt, out, handle):
@@ -50,7 +48,7 @@ def shallow_grids(t, y, dydt, out, handle):
                 rate_x, rate_y,
             )  # fmt: skip
         book_open(tables, basin, st["rho"], dydt, out)
-        out[RATE] = max(out[RATE], UNSPLIT * rate)
+        out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
 @njit
@@ -121,7 +119,7 @@ def shallow_meshes(t, y, dydt, out, handle):
                 rate_x, rate_y,
             )  # fmt: skip
         book_open(tables, basin, st["rho"], dydt, out)
-        out[RATE] = max(out[RATE], UNSPLIT * rate)
+        out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
 @njit
