@@ -78,7 +78,7 @@ def through(cells: int, **numerics) -> float:
 def test_a_smooth_front_moves_at_the_speed_of_the_flow_and_through_a_junction(scheme, order):
     many = (40, 80, 160)
     errors = [through(cells, scheme=scheme) for cells in many]
-    assert errors[-1] < {1.0: 0.02, 2.0: 2e-4}[order]
+    assert errors[-1] < {1.0: 0.014, 2.0: 1.2e-4}[order]  # 1.6e-4 without slopes at ends
     assert -observed_order(errors, many) == approx(order, abs=0.2)
 
 
