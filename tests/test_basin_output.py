@@ -301,7 +301,7 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
 def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
     case = draining([], 0.01, {"fields": 1})
     case["nodes"]["pool"]["patches"]["inlet"] = {"side": "west"}
-    case["nodes"]["lake"] = lake(20.0)
+    case["nodes"]["lake"] = lake(2.0)
     case["links"]["main"] = pipe("lake", "pool.inlet", 20.0, 0.2, 1000.0, 10)
     for name, position in (("lake", [-20, 30]), ("pool", [5, 7]), ("out", [20, 9])):
         case["nodes"][name]["position"] = position
