@@ -69,6 +69,7 @@ ROOMS = {
         before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
         observe="plane.observe: observe_basins",
     ),
+    "patches, barotropic": Room(observe="plane.observe: observe_dense_flows"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
@@ -116,6 +117,8 @@ class Scene:
             yield BASINS[kind]
         if self.basins:
             yield ROOMS["patches"]
+            if not linear:
+                yield ROOMS["patches, barotropic"]
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
         yield ALWAYS
