@@ -1,6 +1,6 @@
 """What probes read off basins: fields at points, flows through patches. Knows the tables; changes no state."""
 
-from math import sqrt
+from math import log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density
@@ -20,6 +20,7 @@ from fvsolve.kernels.records import (
     I_PLANE,
     I_PROBES,
     I_SETTINGS,
+    LAW_LOG,
     PATCH_FLOW,
     SHALLOW_FACES,
 )
@@ -71,6 +72,8 @@ def stored(tables, probe, y):
         value = y[at + i]
         if probe["kind"] == CELL_DEPTH:
             value = max(tables[I_PLANE][basin["plan"] + i] + value, 0.0)
+        elif probe["side"] == 0 and tables[I_SETTINGS][0]["law"] == LAW_LOG:  # pressure over the slope at rest
+            value = basin["density"] * log1p(value / basin["density"])
         total += tables[I_FLOATS][probe["weights"] + m] * value
     return total
 
@@ -82,7 +85,9 @@ def velocity(tables, probe, y):
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):
         i = tables[I_INTEGERS][probe["cell"] + m]
-        share = 1.0 / tables[I_SETTINGS][0]["rho"]
+        share = 1.0 / basin["density"] if basin["kind"] > SHALLOW_FACES else 1.0
+        if tables[I_SETTINGS][0]["law"] == LAW_LOG:
+            share = 1.0 / (basin["density"] + y[o + i])
         if basin["kind"] <= SHALLOW_FACES:  # which fades where water is thin
             depth = max(tables[I_PLANE][basin["plan"] + i] + y[basin["y"] + i], 0.0)
             wet = max(depth, THIN)
