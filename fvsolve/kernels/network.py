@@ -141,12 +141,16 @@ def greatest_rate(out, tables):
         valve = valves[k]
         i, j = valve["from_node"], valve["to_node"]
         stiff_i, stiff_j = stiffness_of(nodes, layout, out, i), stiffness_of(nodes, layout, out, j)
+        drop = head_drop(tables, out, k)[1]
+        if nodes[i]["kind"] == PATCH and drop >= 0.0:  # what there is no water for cannot answer
+            stiff_i *= out[layout["had"] + nodes[i]["row"]]
+        if nodes[j]["kind"] == PATCH and drop <= 0.0:
+            stiff_j *= out[layout["had"] + nodes[j]["row"]]
         stiff = stiff_i + stiff_j
         if valve["device"] >= 0 and tables[I_DEVICES][valve["device"]]["row"] >= 0:
             continue  # the gate of a vessel, which says itself how quick it is
         if stiff > 0.0:
             g = conductance(tables, out, k)
-            drop = head_drop(tables, out, k)[1]
             slope = restriction_slope(tables, out, k, drop)
             soft = 0.0
             if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:

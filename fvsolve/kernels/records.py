@@ -277,6 +277,7 @@ LAYOUT = np.dtype(
         ("valve", "i8"),
         ("column", "i8"),
         ("stiffness", "i8"),  # of moving chambers, pressure per mass [Pa/kg]
+        ("had", "i8"),  # of patches, share of the outflow asked for that there is water for
         ("swept", "i8"),  # mass flow that the piston and its leak take from moving chambers [kg/s]
         ("net_force", "i8"),  # on bodies [N]
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
@@ -364,6 +365,7 @@ PATCHES = np.dtype(
         ("first", "i8"),  # of its cells in `integers`
         ("count", "i8"),
         ("area", "f8"),  # of these [m2]
+        ("depth", "f8"),  # of water at rest, their mean [m]
         ("ring", "i8"),  # of its faces' numbers in `integers`, as the boundary has them
         ("faces", "i8"),  # how many these are
         ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value

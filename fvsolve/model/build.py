@@ -336,7 +336,7 @@ class Scene:
             ("loss", sum(self.scalar_table["losses"])),
             ("net", len(self.node_table)),
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
-            ("stiffness", self.moving), ("swept", self.moving),
+            ("stiffness", self.moving), ("had", self.moving), ("swept", self.moving),
             ("net_force", len(self.body_table)), ("push", len(self.push_names)),
             ("conductance", len(self.valve_table)), ("drive", len(self.valve_table)),
             ("value", carried), ("edge", 2 * len(pipes) * many),

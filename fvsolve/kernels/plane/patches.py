@@ -1,6 +1,6 @@
 """Patches as a room of a scene: their pressures, and what the network brings into the cells behind them."""
 
-from math import log1p
+from math import log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -12,10 +12,13 @@ from fvsolve.kernels.records import (
     I_PATCHES,
     I_PLANE,
     I_SETTINGS,
+    I_VALVES,
     LAW_LOG,
+    PATCH,
     RATE,
     SHALLOW_FACES,
 )
+from fvsolve.kernels.restrictions import head_drop
 
 SHALLOW = 1e-3  # depth at a patch below which no more than a share of what is asked can leave [m]
 
@@ -28,6 +31,13 @@ def mean_deviation(tables, patch, y):
         i = tables[I_INTEGERS][patch["first"] + m]
         total += tables[I_PLANE][basin["area"] + i] * y[basin["y"] + i]
     return total / patch["area"]
+
+
+@njit
+def to_be_had(depth):
+    """Share of the outflow that is asked for that water so deep gives."""
+    s = min(max(depth, 0.0) / SHALLOW, 1.0)
+    return s * s * (3.0 - 2.0 * s)
 
 
 @njit
@@ -49,6 +59,8 @@ def patch_pressures(t, y, dydt, out, handle):
             pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
+        water = basin["kind"] <= SHALLOW_FACES
+        out[layout["had"] + node["row"]] = to_be_had(patch["depth"] + stored) if water else 1.0
         out[layout["stiffness"] + node["row"]] = slope / content
 
 
@@ -68,6 +80,7 @@ def patch_flows(t, y, dydt, out, handle):
     """Add what the patches bring or take to the rates of the cells behind them."""
     tables = open_tables(handle)
     layout = tables[I_LAYOUT][0]
+    quickest_inflow(tables, out)
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         asked = out[layout["net"] + patch["node"]]
@@ -81,20 +94,28 @@ def patch_flows(t, y, dydt, out, handle):
 
 
 @njit
+def quickest_inflow(tables, out):
+    """Let steps see what is about to come: waves as quick as the head before a gate makes them, over a dry bed too."""
+    st, valves, patches = tables[I_SETTINGS][0], tables[I_VALVES], tables[I_PATCHES]
+    for k in range(valves.size):
+        drop = head_drop(tables, out, k)[1]
+        taker = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
+        for p in range(patches.size if tables[I_NODES][taker]["kind"] == PATCH else 0):
+            if patches[p]["node"] == taker and tables[I_BASINS][patches[p]["basin"]]["kind"] <= SHALLOW_FACES:
+                wide = sqrt(patches[p]["area"] / patches[p]["count"])
+                out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)
+
+
+@njit
 def shallow_patch(tables, patch, asked, y, dydt, out):
     """What a patch brings or takes of water with a free surface; where it is thin, what is asked may not be had."""
     rho, layout, integers = tables[I_SETTINGS][0]["rho"], tables[I_LAYOUT][0], tables[I_INTEGERS]
-    basin, plane = tables[I_BASINS][patch["basin"]], tables[I_PLANE]
+    basin = tables[I_BASINS][patch["basin"]]
     n, o, first = basin["n"], basin["y"], patch["first"]
-    depth, share = mean_deviation(tables, patch, y), 1.0
-    for m in range(patch["count"]):
-        i = integers[first + m]
-        depth += plane[basin["area"] + i] * plane[basin["plan"] + i] / patch["area"]
+    depth, share = patch["depth"] + mean_deviation(tables, patch, y), 1.0
     if asked < 0.0:  # 1.5, the steepest slope of the share
         out[RATE] = max(out[RATE], -1.5 * asked / (rho * patch["area"] * max(depth, SHALLOW)))
-    if asked < 0.0 and depth < SHALLOW:  # less and less of it can still be had, the rest comes from outside
-        s = max(depth, 0.0) / SHALLOW
-        share = s * s * (3.0 - 2.0 * s)
+        share = to_be_had(depth)  # the rest comes from outside
     supply = (share - 1.0) * asked
     out[layout["supply"] + patch["node"]] += supply
     flow = (asked + supply) / (rho * patch["area"])  # [m/s] of depth

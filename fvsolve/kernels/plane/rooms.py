@@ -21,6 +21,20 @@ from fvsolve.kernels.records import (
 
 
 @njit
+def through_faces(kx, ky, flow_x, flow_y):
+    """Make flows per width of faces, row by row, flows through them."""
+    nx = kx.size
+    for j in range(ky.size):
+        high = 1.0 / ky[j]
+        for i in range(nx + 1):
+            flow_x[j * (nx + 1) + i] *= high
+    for i in range(nx):
+        wide = 1.0 / kx[i]
+        for j in range(ky.size + 1):
+            flow_y[j * nx + i] *= wide
+
+
+@njit
 def shallow_grids(t, y, dydt, out, handle):
     """Rates of water on grids."""
     tables = open_tables(handle)
@@ -42,6 +56,8 @@ def shallow_grids(t, y, dydt, out, handle):
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
             plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
         )  # fmt: skip
+        if f >= 0:
+            through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
         if basin["friction"] != NO_DRAG:  # held below the rate of waves, which the step follows anyhow
             add_friction(
                 basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], rate, plan[0], dh, qx, qy,

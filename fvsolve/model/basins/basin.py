@@ -81,6 +81,10 @@ class Basin:
 
         return Points(self.mesh)
 
+    def rest(self) -> np.ndarray:
+        """Depth of water at rest : float64[n] [m]; 0 where it says nothing."""
+        return np.zeros(self.n)
+
     def formula(self, shape) -> np.ndarray:
         """A formula at centres : float64[n]."""
         return np.zeros(self.n) if shape is None else shape.at(self.x, self.y)
@@ -204,6 +208,7 @@ class Basin:
         cells = behind(self.mesh, patch)
         row["first"], row["count"], row["area"] = len(scene.integers), cells.size, self.mesh.area[cells].sum()
         scene.integers += cells.tolist()
+        row["depth"] = np.average(self.rest()[cells], weights=self.mesh.area[cells])
         faces = np.arange(*self.mesh.patch(patch).indices(self.mesh.left.size)) - self.mesh.inner
         faces = np.argsort(self.ring())[faces] if self.is_grid else faces
         row["ring"], row["faces"] = len(scene.integers), faces.size
