@@ -87,7 +87,7 @@ def find_marks(model: Model) -> list[Mark]:
         "outside its curve": "the pump works backwards or beyond its curve's last flow; a suter table would say how",
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would hold it",
         "below vapor pressure": "pressure falls below vapour pressure; the liquid column would part",
-        "dry": "the tank is dry but outflow is asked for; it goes on at level 0",
+        "dry": "no water is left where outflow is asked for; what flows is made up",
         "spilling": "the tank is full to its height and spills",
     }
     return [

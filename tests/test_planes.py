@@ -1,0 +1,251 @@
+"""Basins through case files: both paths of the kernels, boundaries, joins, and scalars in them."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import numpy as np
+import pytest
+from pytest import approx
+from truth.meshes import write
+from truth.plain import boundary, triangles
+from truth.scenes import AMBIENT, RHO, lake, pipe, ramp, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.errors import CaseError
+
+STEPS = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.8}
+HOLE = [[3.0, 0.0, 4.0, 1.0]]
+WAVY = {"level": "1 + 0.2*cos(pi*x/4)*cos(pi*y/2)"}
+SPEED = math.sqrt(2.2e9 / RHO)
+
+
+def basin(**more) -> dict:
+    return {"type": "basin", "size": [4.0, 2.0], "cells": [32, 16], **more}
+
+
+def water(**more) -> dict:
+    return basin(level=1.0, **more)
+
+
+def liquid(**more) -> dict:
+    return basin(physics="liquid", pressure=2e6, thickness=0.1, **more)
+
+
+def case(pool: dict, end: float, numerics: dict | None = None, **top) -> dict:
+    made = scene({"pool": pool}, {}, end, STEPS | (numerics or {}), (), end / 10, **top)
+    return {key: value for key, value in made.items() if key != "links"}
+
+
+def ended(given: dict):
+    """(model, state) of a case at its end."""
+    model = fvsolve.build(fvsolve.load(given))
+    return model, fvsolve.advance(model, fvsolve.initial_state(model), given["numerics"]["end"])
+
+
+def triangulated(tmp_path, spacing: float = 0.25) -> dict:
+    """A basin of triangles, the same rectangle."""
+    points, cells = triangles((4.0, 2.0), spacing)
+    write(tmp_path / "t.msh", points, [("triangle", cells)])
+    assert len(boundary(cells)) == len(np.unique(boundary(cells), axis=0))
+    return {"type": "basin", "mesh": {"file": str(tmp_path / "t.msh")}}
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
+@pytest.mark.parametrize("path", ["grid", "graded", "holes", "triangles"])
+def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path):
+    pool = water(start=WAVY)
+    if path == "triangles":
+        pool = triangulated(tmp_path) | {"level": 1.0, "start": WAVY}
+    pool |= {"graded": {"grading": [2.0, 1.5]}, "holes": {"holes": HOLE}}.get(path, {})
+    model, state = ended(case(pool, 2.0, {"scheme": scheme}, scalars={"dye": {"initial": 3.0}}))
+    found = model.basins[0].values(state.y)["dye"]
+    assert np.abs(found - 3.0).max() < 1e-13
+    assert np.abs(model.basins[0].of(state.y)).max() > 0.05
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
+    """A rectangle, and the same cells from a file: loops over faces find the rates of loops over rows."""
+    x, y = np.meshgrid(np.linspace(0, 4, 33), np.linspace(0, 2, 17))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    corner = (np.arange(16)[:, None] * 33 + np.arange(32)).ravel()
+    write(tmp_path / "q.msh", points, [("quad", np.column_stack([corner, corner + 1, corner + 34, corner + 33]))])
+    outline = {"type": "basin", "mesh": {"file": str(tmp_path / "q.msh")}}
+    start = {"pressure": "1e5*exp(-((x - 1.5)^2 + (y - 1.2)^2))", "u": "0.1*x", "v": "-0.2*y"}
+    physics = {"physics": "liquid", "pressure": 2e6, "thickness": 0.1, "start": start}
+    if law == "linear":
+        pairs = [(liquid(start=start), physics), (water(start=WAVY), {"level": 1.0, "start": WAVY})]
+    else:
+        pairs = [(liquid(start=start), physics)]
+    for plain, other in pairs:
+        fluid = case(plain, 1.0)["fluid"] | {"law": law}
+        one, two = (
+            fvsolve.build(fvsolve.load(case(pool, 1.0, {"scheme": "upwind"}, fluid=fluid)))
+            for pool in (plain, outline | other)
+        )
+        a, b = (model.basins[0] for model in (one, two))
+        order = np.lexsort((b.x, b.y))
+        rates = a.of(one.rhs(0.0, one.start)), b.of(two.rhs(0.0, two.start))[:, order]
+        assert np.allclose(b.x[order], a.x, atol=1e-12) and np.allclose(b.y[order], a.y, atol=1e-12)
+        for k in range(3):
+            assert np.abs(rates[0][k] - rates[1][k]).max() < 1e-11 * np.abs(rates[0][k]).max()
+
+
+def test_a_plane_wave_of_a_liquid_is_that_of_a_pipe():
+    """A valve shuts at the end of a channel: pressures at the valve are those of a pipe of the same section."""
+    length, wide, thick = 40.0, 0.4, 0.1
+    section = {"size": [length, wide], "cells": [160, 2], "physics": "liquid", "thickness": thick, "pressure": 1e6}
+    channel = basin() | section | {"patches": {"end": {"side": "east"}, "far": {"side": "west", "boundary": "open"}}}
+    bore = math.sqrt(4 * wide * thick / math.pi)
+    closure = ramp(0.002, 0.02, 0.0, 1.0)
+    probes, numerics = ["tap.flow"], STEPS | {"initial": "rest"}
+    nodes = {"pool": channel, "out": reservoir(0.9e6)}
+    there = fvsolve.run(scene(nodes, {"tap": valve("pool.end", "out", 0.002, closure)}, 0.025, numerics, probes, 1e-4))
+    long = {"lake": reservoir(1e6), "end": {"type": "junction"}, "out": reservoir(0.9e6)}
+    main = pipe("lake", "end", length, bore, SPEED, 160)
+    here = fvsolve.run(
+        scene(long, {"main": main, "tap": valve("end", "out", 0.002, closure)}, 0.025, numerics, probes, 1e-4)
+    )
+    assert there.ok and here.ok
+    moved = np.abs(here["tap.flow"]).max()
+    assert moved > 0.01 and np.abs(there["tap.flow"] - here["tap.flow"]).max() < 3e-3 * moved
+
+
+@pytest.mark.parametrize(("boundary", "left"), [({"boundary": "open"}, 0.0), ({"impedance": 3.0 * RHO * SPEED}, 0.5)])
+@pytest.mark.parametrize("holes", [None, [[3.9, 0.0, 4.0, 0.1]]], ids=["grid", "faces"])
+def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
+    """(Z - rho a) / (Z + rho a) of the height of a pulse that runs into it; mass is in the ledger."""
+    pool = liquid(cells=[160, 20], patches={"far": {"side": "west", **boundary}})
+    pool["start"] = {"pressure": "1e5*exp(-100*(x - 1)^2)", "u": f"-1e5*exp(-100*(x - 1)^2)/{RHO * SPEED}"}
+    if holes:
+        pool["holes"] = holes
+    given = case(pool, 2.0 / SPEED)
+    model, state = ended(given)
+    found = model.basins[0].fields(model.basins[0].of(state.y))["pressure"] - 2e6
+    assert found.max() == approx(left * 1e5, abs=1.5e3) and found.min() > -1.5e3
+    ledger = fvsolve.run(given).ledger["mass"]
+    assert abs(ledger["relative"]) < 1e-13 and (ledger["outflow"] > 0.0 or left > 0.0)
+
+
+def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
+    """Given velocity 0.5 m/s: what came in at 1 for 2 s stands between 1 m and 2 m of 4 m after 4 s."""
+    inlet = {"time": [0.0, 2.0], "value": [1.0, 0.0], "kind": "step"}
+    patches = {"in": {"side": "west", "scalars": {"dye": inlet}}, "out": {"side": "east"}}
+    pool = basin(physics="transport", velocity={"u": 0.5}, patches=patches, cells=[160, 4])
+    given = case(pool, 4.0, scalars={"dye": {}})
+    result = fvsolve.run(given)
+    model, state = ended(given)
+    dye, x = model.basins[0].values(state.y)["dye"], model.basins[0].x
+    assert np.abs(dye - ((x > 1.0) & (x < 2.0))).mean() < 0.02 and dye.min() > -1e-12 and dye.max() < 1.0 + 1e-12
+    ledger = result.ledger["dye"]
+    assert abs(ledger["relative"]) < 1e-13
+    assert ledger["by_node"]["pool.in"] == approx(RHO * 2.0 * 0.5 * 2.0, rel=1e-12)  # density, width, velocity, time
+    long = fvsolve.run(given | {"numerics": given["numerics"] | {"end": 12.0}}).ledger["dye"]
+    assert long["outflow"] == approx(long["inflow"], rel=1e-6) and abs(long["relative"]) < 1e-13
+
+
+def test_dye_that_a_pipe_brings_leaves_by_another_and_none_is_lost():
+    pool = basin(level=0.5, patches={"in": {"side": "west"}, "out": {"side": "east"}}, cells=[16, 8])
+    nodes = {"works": {"type": "inflow", "flow": 0.1, "scalars": {"dye": 2.0}}, "pool": pool, "river": lake(0.45)}
+    links = {
+        "feed": pipe("works", "pool.in", 5.0, 0.3, 100.0, 5),
+        "tap": valve("pool.out", "river", 0.1),
+    }
+    given = scene(nodes, links, 400.0, STEPS | {"method": "ssp-rk3"}, ["pool.out.dye", "feed.dye@1"], 10.0)
+    result = fvsolve.run(given | {"scalars": {"dye": {}}})
+    assert result.ok and result["feed.dye@1"][-1] == approx(2.0, rel=1e-9)
+    assert result["pool.out.dye"][-1] == approx(2.0, rel=1e-3) and result["pool.out.dye"].max() < 2.001
+    ledger = result.ledger["dye"]
+    assert abs(ledger["relative"]) < 1e-13 and ledger["outflow"] > 0.0
+
+
+def test_decay_and_diffusion_of_a_still_pool_have_their_closed_form():
+    """A cosine between walls falls as exp(-(D k^2 + r) t)."""
+    k, diffusivity, rate = math.pi / 4.0, 0.05, 0.1
+    pool = water(scalars={"heat": f"1 + cos({k}*x)"})
+    given = case(pool, 3.0, scalars={"heat": {"diffusivity": diffusivity, "decay": rate, "ambient": 1.0}})
+    model, state = ended(given)
+    value, x = model.basins[0].values(state.y)["heat"], model.basins[0].x
+    exact = 1.0 + np.cos(k * x) * math.exp(-(diffusivity * k * k + rate) * 3.0)
+    assert np.abs(value - exact).max() < 2e-3
+    assert abs(fvsolve.run(given).ledger["heat"]["relative"]) < 1e-13
+
+
+def test_a_basin_under_law_log_is_relieved_into_the_network():
+    """Small waves: the same flow as under law linear, but for the change of density."""
+    pool = liquid(patches={"out": {"side": "east", "span": [0.5, 1.5]}})
+    links = {"tap": valve("pool.out", "out", 1e-3, ramp(0.0, 0.002, 0.0, 1.0))}
+    found = []
+    for law in ("linear", "log"):
+        given = scene(
+            {"pool": pool, "out": reservoir(AMBIENT)}, links, 0.01, STEPS | {"initial": "rest"}, ["tap.flow"], 1e-3
+        )
+        given["fluid"] = given["fluid"] | {"law": law}
+        result = fvsolve.run(given)
+        assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-13
+        found.append(result["tap.flow"])
+    assert found[0].max() > 0.01 and np.abs(found[1] - found[0]).max() < 2e-3 * found[0].max()
+
+
+@pytest.mark.parametrize(
+    "pool", [water(start=WAVY), liquid(start={"pressure": "1e4*cos(pi*x/4)"})], ids=["water", "liquid"]
+)
+def test_implicit_steps_of_a_basin_agree_with_explicit_ones(pool):
+    pool = pool | {"cells": [8, 4]}
+    end = 1.0 if "level" in pool else 2.0 / SPEED
+    given = case(pool, end, {"scheme": "upwind"})
+    tight = copy.deepcopy(given)
+    tight["numerics"] = {"end": end, "scheme": "upwind", "method": "radau-iia-5", "rtol": 1e-7}
+    fine = copy.deepcopy(given)
+    fine["numerics"] = {"end": end, "scheme": "upwind", "method": "dormand-prince", "rtol": 1e-9}
+    (_, one), (_, two) = ended(tight), ended(fine)
+    assert np.abs(one.y - two.y).max() < 2e-6 * np.abs(two.y).max()
+
+
+def test_normal_flow_down_a_slope_has_the_velocity_of_manning():
+    """h = 0.2 m on a slope of 0.01 with n = 0.03: u = h^(2/3) sqrt(S) / n, far from both open ends."""
+    pool = basin(size=[100.0, 2.0], cells=[100, 2], level=-1.0, bed="1 - 0.01*x", manning=0.03)
+    pool["start"] = {"level": "1.2 - 0.01*x", "u": 1.0}
+    model, state = ended(case(pool, 12.0))
+    found = model.basins[0].fields(model.basins[0].of(state.y))["velocity"][:, 0]
+    middle = np.abs(model.basins[0].x - 60.0) < 3.0
+    assert found[middle] == approx(0.2 ** (2 / 3) * 0.1 / 0.03, rel=0.02)
+
+
+FAULTS = {
+    "join": (
+        {"physics": "transport", "velocity": {"u": 1.0}},
+        {"tap": valve("pool.out", "end", 0.1)},
+        "given by velocity",
+    ),
+    "expression": ({"physics": "transport", "velocity": {"expression": "swril"}}, {}, 'did you mean "swirl"'),
+    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "wanted"),
+    "impedance": (
+        {"level": 1.0, "patches": {"out": {"side": "east", "impedance": 1.0}}},
+        {},
+        "means nothing to physics",
+    ),
+    "scalar": ({"level": 1.0, "scalars": {"dye": 1.0}}, {}, "no scalar named"),
+    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, {}, "means nothing to physics"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults(name):
+    more, links, words = FAULTS[name]
+    nodes = {"pool": basin(**({"patches": {"out": {"side": "east"}}} | more))}
+    if links:
+        nodes["end"] = reservoir(AMBIENT)
+    with pytest.raises(CaseError, match=words):
+        fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, STEPS, (), 0.1)))
+
+
+def test_a_patch_that_runs_dry_does_not_shorten_steps():
+    """The flow fades with the water: no step is lost on a drop that ends at zero."""
+    pool = basin(level=0.05, cells=[8, 4], patches={"out": {"side": "east"}})
+    links = {"tap": valve("pool.out", "out", 0.05)}
+    result = fvsolve.run(scene({"pool": pool, "out": reservoir(AMBIENT)}, links, 60.0, STEPS, ["tap.flow"], 1.0))
+    assert result.ok and result.summary["steps"] < 3000 and 0.0 <= result["tap.flow"][-1] < 1e-3
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
