@@ -2,24 +2,67 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.sections import Numerics
+from fvsolve.case.sections import Numerics, Output
 from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
+from fvsolve.parts.formula import Formula
 from fvsolve.parts.series import find_file
 from fvsolve.parts.value import Misfit, Setting
+from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
+    from fvsolve.mesh.points import Points
 
 Found = Iterator[tuple[tuple, str]]
+
+
+@dataclass(frozen=True)
+class Pool:
+    """A basin as probes see it: its fields, name -> dimension, and its mesh."""
+
+    fields: dict[str, str]
+    mesh: Mesh
+    kind: ClassVar[str] = "basin"
+    quantities: ClassVar[dict[str, str]] = {}
+
+    def point(self, what: str, place: str | None) -> tuple[float, float]:
+        """The point inside that a text such as "3.5,1.2" means [m]; ValueError where it means none."""
+        middle = ",".join(f"{value:.4g}" for value in self.mesh.centre[len(self.mesh.centre) // 2])
+        if place is None:
+            raise ValueError(f'a basin is read at points: say where, for example "{what}@{middle}"')
+        try:
+            x, y = (float(one) for one in place.split(","))
+        except ValueError:
+            raise ValueError(f'"@{place}" is no point x,y [m]; wanted for example "@{middle}"') from None
+        return self.inside(x, y)
+
+    def inside(self, x: float, y: float) -> tuple[float, float]:
+        """The same point; ValueError where it lies outside or in a hole."""
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise ValueError(f"{x:g}, {y:g} is no point")
+        if self.points.cell(x, y) < 0:
+            near = ",".join(f"{value:.6g}" for value in self.points.nearest(x, y))
+            raise ValueError(f"{x:g},{y:g} m lies outside the mesh or in a hole; the nearest point inside is {near}")
+        return x, y
+
+    @cached_property
+    def points(self) -> Points:
+        """Finds points of the mesh."""
+        from fvsolve.mesh.points import Points
+
+        return Points(self.mesh)
 
 
 def mesh_of(basin: Basin, setting: Setting) -> Mesh:
@@ -46,6 +89,27 @@ def keys(place: str) -> tuple:
     return tuple(found) if found and found[0] in Basin.keys() else ()
 
 
+def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
+    """Faults of lines across basins; `nodes` are kinds, or what of a basin can be read."""
+    for name, line in output.lines.items():
+        pool, key = nodes.get(line.basin), ("output", "lines", name)
+        if not re.fullmatch(r"[\w-]+", name):
+            yield key, f"{show(name)} is no name; a name has letters, digits, _ and -"
+        if not isinstance(pool, Pool):
+            pools = [one for one, kind in nodes.items() if isinstance(kind, Pool)]
+            yield (*key, "basin"), f"no basin named {show(line.basin)}; basins are {listing(pools) or 'none'}"
+            continue
+        for end, point in (("from", line.from_), ("to", line.to)):
+            try:
+                pool.inside(*point)
+            except ValueError as error:
+                yield (*key, end), str(error)
+        if line.from_ == line.to:
+            yield (*key, "to"), "is where the line starts; wanted another point"
+    if output.lines and output.fields == 0:
+        yield ("output", "lines"), "are written at every frame, and fields is 0; wanted fields = 1 or more"
+
+
 def patch_names(mesh: Mesh) -> tuple[str, ...]:
     """Patches that a file may name; the last one is all that has no name."""
     return mesh.patches[:-1]
@@ -65,7 +129,7 @@ def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     """Patches as places, at the mean height of the bed behind them."""
     found, bed = {}, bed_of(basin, mesh)
-    for patch in patch_names(mesh) if basin.physics != "transport" else ():
+    for patch in patch_names(mesh):
         cells = behind(mesh, patch)
         height = float(np.average(bed[cells], weights=mesh.area[cells]))
         depth = None
@@ -79,21 +143,32 @@ def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     return found
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any) -> Found:
+def misfits(
+    nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any, scalars: dict
+) -> Found:
     """Faults of patches, and of what basins do not go with."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
+    method = METHODS.get(numerics.method or "")
+    implicit = numerics.method == AUTO or (method is not None and not method.explicit)
+    if scalars and implicit and any(basin.physics == "free-surface" for basin in found.values()):
+        what = f"{show(numerics.method)} is implicit; scalars in a free surface are stepped by explicit methods"
+        yield ("numerics", "method"), f"{what}, such as ssp-rk2"
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)
         if fluid is not None and fluid.law != "linear" and basin.physics == "free-surface":
             what = f"{show(fluid.law)} does not go with a free surface, whose water has one density"
             yield ("fluid", "law"), f'{what}; wanted "linear"'
+        if fluid is not None and fluid.law not in ("linear", "log") and basin.physics == "liquid":
+            yield ("fluid", "law"), f'{show(fluid.law)} does not go with basins; wanted "linear" or "log"'
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; patches are {listing(known) or 'none'}"
+            elif f"{name}.{patch}" in joined and basin.physics == "transport":
+                yield (*key, "patches", patch), "a link joins here, but what flows is given by velocity"
             elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:
                 what = "boundary" if one.boundary else "impedance"
                 yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
@@ -106,6 +181,10 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics
             other = {"free-surface": "pressure", "liquid": "level", "transport": "u"}[basin.physics]
             if getattr(basin.start, other) is not None:
                 yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
+        shapes |= {("scalars", scalar): shape for scalar, shape in basin.scalars.items()}
+        if basin.velocity is not None:
+            given = basin.velocity.given.items()
+            shapes |= {("velocity", what): shape for what, shape in given if isinstance(shape, Formula)}
         for below, shape in shapes.items():
             try:
                 if shape is not None:

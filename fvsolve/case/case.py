@@ -13,7 +13,7 @@ from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.fluid import Fluid
-from fvsolve.parts import Link, Node, Pipe
+from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.table import plain
 
 
@@ -39,6 +39,7 @@ class Case:
     nodes: dict[str, Node]
     links: dict[str, Link]
     signals: dict[str, Any]
+    scalars: dict[str, Scalar]
     numerics: Numerics
     output: Output
     expect: dict[str, Expect]
@@ -135,6 +136,7 @@ class Case:
             "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
             "links": {name: {"type": link.kind, **link.table()} for name, link in self.links.items()},
             "signals": {name: plain(signal) for name, signal in self.signals.items()},
+            "scalars": {name: one.table() for name, one in self.scalars.items()},
             "numerics": self.numerics.table(),
             "output": self.output.table(),
             "expect": {name: one.table() for name, one in self.expect.items()},

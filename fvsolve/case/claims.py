@@ -17,7 +17,7 @@ from fvsolve.parts.value import NEEDED, Misfit, Number, Quantity, Setting, Text,
 from fvsolve.units import show
 
 FUNCTIONS = ("max", "min", "mean", "final", "at")
-_CLAIM = re.compile(r"\s*(\w+)\s*\(\s*([^,()]+?)\s*(?:,\s*([^()]+?)\s*)?\)\s*")
+_CLAIM = re.compile(r"\s*(\w+)\s*\(\s*([^()]+?)\s*\)\s*")
 _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -65,9 +65,14 @@ def read_expect(claim: str, given: Any, kinds: Kinds, setting: Setting) -> Expec
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
         raise ValueError(f"no such claim; wanted max, min, mean or final(PROBE), or at(PROBE, TIME){hint}")
-    function, probe_text, when = match.groups()
-    if (function == "at") != (when is not None):
-        raise ValueError("wanted at(PROBE, TIME)" if function == "at" else f"wanted {function}(PROBE)")
+    function, probe_text = match.groups()
+    when = None
+    if function == "at":  # the last comma: a point in a basin has one of its own
+        probe_text, comma, when = map(str.strip, probe_text.rpartition(","))
+        if not comma:
+            raise ValueError("wanted at(PROBE, TIME)")
+    elif "," in probe_text and "@" not in probe_text:
+        raise ValueError(f"wanted {function}(PROBE)")
     time = None
     if when is not None:
         given_time = float(when) if _BARE.fullmatch(when) else when.strip("\"'")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, check, text
+from fvsolve.case import basins, check, scalars, text
 from fvsolve.case.case import Case, default_cells
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
@@ -17,7 +17,8 @@ from fvsolve.case.raw import Raw, override, read_raw
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
-from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe
+from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
+from fvsolve.parts.basin import Place
 from fvsolve.parts.pipe import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -42,7 +43,7 @@ GROUPS = {
 }
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "numerics", "output", "expect", "compare", "exact",
+    "signals", "scalars", "numerics", "output", "expect", "compare", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
@@ -86,16 +87,21 @@ class _Reader:
         top = self.top()
         fluid, properties = self.fluid()
         self.setting.signals = self.group("signals")
+        carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
         meshes = self.meshes(parts["nodes"])
         self.unused_signals()
         numerics = self.table("numerics", Numerics)
-        kinds = {group: self.kinds(group) for group in parts}
+        kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
+        has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name in [*kinds["nodes"]]:
-            own = [f"{name}.{patch}" for patch in basins.patch_names(meshes[name])] if name in meshes else ()
-            kinds["nodes"] |= dict.fromkeys(own, Chamber)
+            if name in meshes:
+                pool = parts["nodes"][name]
+                own = {} if pool.physics == "liquid" else dict.fromkeys(carried, "number")
+                kinds["nodes"][name] = basins.Pool(pool.fields() | own, meshes[name])
+                kinds["nodes"] |= {f"{name}.{patch}": Place for patch in basins.patch_names(meshes[name])}
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.with_patches(meshes)))
@@ -103,12 +109,12 @@ class _Reader:
             check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
         )
         if numerics is not None:
-            has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
-            self.add(basins.misfits(parts["nodes"], parts["links"], meshes, numerics, properties))
+            self.add(basins.misfits(*parts.values(), meshes, numerics, properties, carried))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
+        self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         named = self.table("exact", ExactSpec) if "exact" in self.raw.table else None
         self.stop()
@@ -121,6 +127,7 @@ class _Reader:
             nodes=parts["nodes"],
             links=links,
             signals=dict(self.setting.used),
+            scalars=carried,
             numerics=numerics,
             output=output,
             expect=expect,
@@ -291,6 +298,17 @@ class _Reader:
             return None
         return known[kind]
 
+    def scalars(self) -> dict[str, Any]:
+        """What the fluid carries, by name; None in the place of what is at fault itself."""
+        found = {}
+        for name, given in self.group("scalars").items():
+            found[name] = None
+            try:
+                found[name] = Scalar.model_validate(given, context=self.setting)
+            except ValueError as error:
+                self.misfit(("scalars", name), error)
+        return found
+
     def unused_signals(self) -> None:
         for name, given in self.setting.signals.items():
             if name in self.setting.used or (isinstance(given, dict) and "signal" in given):
@@ -335,6 +353,7 @@ class _Reader:
         else:
             named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(output.probes)]
             probes = list({probe.text: probe for probe in named if probe is not None}.values())
+        self.add(basins.line_faults(output, kinds["nodes"]))
         changes: dict[str, Any] = {"probes": probes}
         if output.every is None and numerics is not None:
             changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS

@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import Link, Node
+from fvsolve.parts import Link, Node, Scalar
 from fvsolve.units import show
+
+if TYPE_CHECKING:
+    from fvsolve.case.basins import Pool
 
 _PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*))?")
 
@@ -19,7 +23,8 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 
 @dataclass(frozen=True)
 class Probe:
-    """What is recorded: text of the case, part and quantity, and along a pipe the fraction from `from`."""
+    """What is recorded: text of the case, part and quantity; along a pipe the fraction from `from`, in a basin the
+    point [m]."""
 
     text: str
     part: str  # "nodes" | "links"
@@ -27,16 +32,18 @@ class Probe:
     quantity: str
     fraction: float | None
     dimension: str
+    point: tuple[float, float] | None = None
+    unit: str = ""  # of a scalar, a label
 
 
-Kinds = Mapping[str, Mapping[str, type[Node] | type[Link] | None]]
+Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | Scalar | None"]]
 
 
 def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """The probe a text names; None where its part is at fault itself.
 
-    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown). Raises
-    ValueError.
+    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown), of a basin what of
+    it can be read, and the "scalars". Raises ValueError.
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
@@ -53,8 +60,7 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     found, problems = [], []
     for part in parts:
         try:
-            fraction, dimension = _quantity(kinds[part][name], name, quantity, place)
-            found.append(Probe(given.strip(), part, name, quantity, fraction, dimension))
+            found.append(_probe(given.strip(), part, name, quantity, place, kinds))
         except ValueError as error:
             problems.append(str(error))
     if not found:
@@ -70,22 +76,40 @@ def default_probes(kinds: Kinds) -> list[Probe]:
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
-            for quantity in quantities if kind is not None else ():
-                if quantity in kind.quantities:
-                    text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
-                    found.append(Probe(text, part, name, quantity, *_quantity(kind, name, quantity, None)))
+            own = [one for one in quantities if one in kind.quantities] if kind is not None else []
+            for quantity in [*own, *_carried(kind, kinds, "quantities")] if own else []:
+                text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
+                found.append(_probe(text, part, name, quantity, None, kinds))
     return found
 
 
-def _quantity(kind: type[Node] | type[Link], name: str, quantity: str, place: str | None) -> tuple[float | None, str]:
-    along = getattr(kind, "along", {})
-    known = {**along, **kind.quantities}
+def _carried(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
+    """Scalars that the places of a kind carry: those that have a pressure."""
+    return dict.fromkeys(kinds["scalars"] if "pressure" in getattr(kind, where, {}) else (), "number")
+
+
+def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:
+    kind, scalar = kinds[part][name], kinds["scalars"].get(quantity)
+    unit = scalar.unit if scalar is not None else ""
+    if quantity in (fields := getattr(kind, "fields", {})):  # of a basin
+        point = kind.point(f"{name}.{quantity}", place)
+        return Probe(text, part, name, quantity, None, fields[quantity], point, unit)
+    along = getattr(kind, "along", {}) | _carried(kind, kinds, "along")
+    quantities = kind.quantities | _carried(kind, kinds, "quantities")
+    fraction, dimension = _quantity(kind, along, quantities, name, quantity, place)
+    return Probe(text, part, name, quantity, fraction, dimension, unit=unit)
+
+
+def _quantity(
+    kind: Any, along: dict[str, str], own: dict[str, str], name: str, quantity: str, place: str | None
+) -> tuple[float | None, str]:
+    known = {**along, **own, **getattr(kind, "fields", {})}
     article = "an" if kind.kind[0] in "aeiou" else "a"
     if quantity not in known:
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
         raise ValueError(f"{name} is {article} {kind.kind}, without {show(quantity)}; {has}")
     if place is None:
-        if quantity not in kind.quantities:
+        if quantity not in own:
             raise ValueError(f'{name} is a {kind.kind}: say where, for example "{name}.{quantity}@0.5"')
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:

@@ -6,7 +6,7 @@ from typing import Any
 
 from fvsolve.case.load import GROUPS, KEYS, TOP
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
-from fvsolve.parts import KINDS
+from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import keys_json
 from fvsolve.parts.value import Quantity
@@ -23,6 +23,8 @@ def schema() -> dict[str, Any]:
     for group, kinds in KINDS.items():
         any_kind = [_typed(kind, made, definitions) for kind, made in kinds.items()]
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
+    scalar = _hoisted(Scalar, definitions)
+    properties["scalars"] = {"type": "object", "additionalProperties": scalar}
     properties["signals"] = {"type": "object", "additionalProperties": Scheduled("number").json()}
     properties["expect"] = properties["compare"] = {
         "type": "object",

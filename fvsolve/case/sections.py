@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Annotated, Any, ClassVar
 
+from pydantic import Field
+
 from fvsolve import units
 from fvsolve.errors import did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
-from fvsolve.parts.table import Table
+from fvsolve.parts.table import Named, Table
 from fvsolve.parts.value import (
     Choice,
     Flag,
     Misfit,
     Number,
     Quantity,
+    Rows,
     Setting,
     Text,
     Value,
@@ -175,18 +178,28 @@ class Names(Value):
         return {"type": "array", "items": {"type": "string"}}
 
 
+class Line(Table):
+    """A line across a basin along which its fields are written at every frame."""
+
+    basin: Annotated[str, Text("its name")]
+    from_: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of its start [m]"), Field(alias="from")]
+    to: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of its end [m]")]
+    points: Annotated[int, Whole(between(2, 10**5), "evenly along it, both ends among them")] = 101
+
+
 class Output(Table):
     """`[output]`: when and what is recorded, and in which units it is shown."""
 
     every: Annotated[float | None, Quantity("time", positive, "between rows of the history [s]")] = None
     fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none")] = DEFAULT_FRAMES
     probes: Annotated[Any, Names()] = None
+    lines: Annotated[Any, Named(Line, "lines by name: { centre = { basin, from, to, points } }")] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     def table(self) -> dict[str, Any]:
         """What the file would say."""
         made = {**super().table(), "probes": [probe.text for probe in self.probes]}
-        return made if self.units else {key: value for key, value in made.items() if key != "units"}
+        return {key: value for key, value in made.items() if value != {}}
 
 
 class ExactSpec(Table):

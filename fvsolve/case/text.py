@@ -25,7 +25,7 @@ def path(keys: tuple[Any, ...]) -> str:
 
 
 def _section(key: str, table: dict[str, Any]) -> list[str]:
-    deep = key in ("nodes", "links", "signals")
+    deep = key in ("nodes", "links", "signals", "scalars")
     if deep:
         lines = []
         for name, part in table.items():

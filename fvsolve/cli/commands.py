@@ -141,9 +141,11 @@ def view(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     time: Annotated[str | None, typer.Option(metavar="T", help='"1.2 s"; the last frame by default')] = None,
     field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, ...")] = None,
+    contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="lines of equal values")] = 0,
+    animate: Annotated[Path | None, typer.Option(metavar="FILE", help="all frames, as .gif or .mp4")] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/FIELD.png")] = None,
 ) -> None:
-    """Draw a field at a time, off screen, with PyVista."""
+    """Draw a field at a time, or all times, off screen, with PyVista."""
     from fvsolve.run import open_run
     from fvsolve.units import parse
 
@@ -151,7 +153,10 @@ def view(
         when = None if time is None else parse(value_of(time), "time")
     except ValueError as error:
         raise FvsolveError(f"--time: {error}") from None
-    print(open_run(directory).view(when, field, out))
+    if animate is not None and not time is out is None:
+        raise FvsolveError("--animate draws all times into its own file; leave --time and --out out")
+    run = open_run(directory)
+    print(run.view(when, field, out, contours) if animate is None else run.animate(animate, field, contours))
 
 
 def _places(cases: list[str], out: Path | None) -> dict[str, Path]:

@@ -105,7 +105,7 @@ PIPE = np.dtype(
             "i8",
         ),  # offsets in `profile`: mass per length at faces, momentum flux there, mass at centres
         ("flux", "i8"),
-        ("center", "i8"),
+        ("center", "i8"),  # the last with scalars under the linear law too
         ("from_base", "f8"),  # laws log and table: flow into the node that the profile computes to
         ("to_base", "f8"),
         ("from_mass", "f8"),  # and the mass per length at the end that it computes to [kg/m]
@@ -282,6 +282,11 @@ LAYOUT = np.dtype(
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
         ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
         ("drive", "i8"),  # relative speeds of pumps now, one a valve
+        ("gain", "i8"),  # amounts of each scalar that enter by nodes, then what decays, behind `supply` in the ledger
+        ("value", "i8"),  # of each scalar at all nodes
+        ("edge", "i8"),  # values that the water of pipes has at both ends
+        ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
+        ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
         ("size", "i8"),
     ],
     align=True,
@@ -292,20 +297,23 @@ OUT_HEAD = 4
 PROBE = np.dtype(
     [
         ("kind", "i8"),
-        ("index", "i8"),  # of the node, pipe, valve, column, body, push or piston
-        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside
-        ("cell", "i8"),  # first of the cells that are read
+        ("index", "i8"),  # of the node, pipe, valve, column, body, push, piston or basin
+        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside; CELL_STATE: which of a basin's quantities
+        ("cell", "i8"),  # first of the cells that are read; of a basin, offset of their numbers in `integers`
         ("count", "i8"),  # how many
         ("weights", "i8"),  # offset of their weights in `floats`
         ("scale", "f8"),
         ("offset", "f8"),
         ("head", "i8"),  # laws log and table: 1 a head, 2 a velocity
         ("mass", "f8"),  # laws log and table: mass per length of the profile there [kg/m]
+        ("scalar", "i8"),
     ],
     align=True,
 )
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
+NODE_SCALAR, PIPE_SCALAR = 13, 14
+CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
 
 SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, ACOUSTIC_FACES, LIQUID_GRID, LIQUID_FACES = 0, 1, 2, 3, 4, 5
 CARRIED_GRID, CARRIED_FACES = 6, 7  # kinds of basins: physics, law of the liquid, grid or loop over faces
@@ -326,11 +334,20 @@ BASIN = np.dtype(
         ("area", "i8"),  # of cells [m2]
         ("reflect", "i8"),  # what comes back of waves, a value for each face of the boundary
         ("outer_given", "i8"),  # how many values these are: 0 for walls everywhere
+        ("open", "i8"),  # node of the first patch that is no wall, to whom what passes is booked; -1 for none
         ("mesh", "i8"),  # numbers of a mesh, in `plane` and
         ("links", "i8"),  # in `integers`
         ("work", "i8"),
         ("thickness", "f8"),  # [m]
-        ("speed", "f8"),  # of waves in a liquid [m/s]
+        ("speed", "f8"),  # of waves in a liquid at rest [m/s]
+        ("density", "f8"),  # of a liquid at rest [kg/m3]
+        ("small", "f8"),  # what is too small to mean anything, squared
+        ("carried", "i8"),  # first state of scalars, depth times value, one after the other; -1 for none
+        ("flows", "i8"),  # flows through faces: of columns, then of rows, or of a mesh; -1 where nobody asks
+        ("outside", "i8"),  # of each scalar, values beyond the boundary
+        ("toil", "i8"),  # what scalars are carried in
+        ("fastest", "f8"),  # rate of a given velocity [1/s]
+        ("period", "f8"),  # of its turning back [s]; 0 for none
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
         ("roughness", "f8"),  # Manning's n, or a factor
         ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
@@ -345,6 +362,23 @@ PATCHES = np.dtype(
         ("first", "i8"),  # of its cells in `integers`
         ("count", "i8"),
         ("area", "f8"),  # of these [m2]
+        ("ring", "i8"),  # of its faces' numbers in `integers`, as the boundary has them
+        ("faces", "i8"),  # how many these are
+        ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
+    ],
+    align=True,
+)
+
+SCALAR = np.dtype(
+    [
+        ("y", "i8"),  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes that store
+        ("places", "i8"),  # offset in `integers`, one a node: where its amount is in y, or the schedule of its value
+        ("diffusivity", "f8"),
+        ("decay", "f8"),  # [1/s]
+        ("ambient", "f8"),  # what it decays to
+        ("initial", "f8"),  # what flows in where nothing else is said
+        ("least", "f8"),  # bounds of all values that there can be
+        ("greatest", "f8"),
     ],
     align=True,
 )
@@ -366,6 +400,7 @@ RECORDS = {
     "devices": DEVICE,
     "basins": BASIN,
     "patches": PATCHES,
+    "scalars": SCALAR,
 }
 ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare", "plane")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
@@ -387,6 +422,7 @@ TABLES = (*RECORDS, *ARRAYS, *MATRICES)
     I_DEVICES,
     I_BASINS,
     I_PATCHES,
+    I_SCALARS,
     I_INTEGERS,
     I_FLOATS,
     I_PROFILE,

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from fvsolve.kernels.devices.loops import loops_of
-from fvsolve.kernels.records import ACOUSTIC_FACES, ACOUSTIC_GRID, SHALLOW_FACES, SHALLOW_GRID
+from fvsolve.kernels.records import (
+    ACOUSTIC_FACES,
+    ACOUSTIC_GRID,
+    CARRIED_GRID,
+    LIQUID_GRID,
+    SHALLOW_FACES,
+    SHALLOW_GRID,
+)
 
 HOME = "fvsolve.kernels"
 
@@ -66,17 +73,24 @@ ROOMS = {
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
     "patches": Room(
-        before="plane.patches: patch_pressures", after="plane.patches: patch_flows", power="plane.energy: add_power",
-        stored="plane.energy: add_stored",
+        before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
+        observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
+    "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
+    "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
+}  # fmt: skip
+GRIDS = (SHALLOW_GRID, CARRIED_GRID)
+CARRIED = {  # scalars in basins, on grids and on other meshes
+    True: Room(after="plane.carried: carried_rates"), False: Room(after="plane.carried_faces: carried_rates"),
 }  # fmt: skip
 BASINS = {  # kind of basin
     SHALLOW_GRID: Room(after="plane.rooms: shallow_grids"),
     SHALLOW_FACES: Room(after="plane.rooms: shallow_meshes"),
     ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
     ACOUSTIC_FACES: Room(after="plane.rooms: acoustic_meshes"),
+    LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
 }
 ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 
@@ -97,6 +111,7 @@ class Scene:
     memory: bool = False
     kinds: tuple[int, ...] = ()
     basins: tuple[int, ...] = ()
+    scalars: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -112,12 +127,16 @@ class Scene:
         for kind in self.kinds:
             loops = loops_of(kind)
             yield Room(**{job: f"{loops.__name__}: {job}" for job in vars(Room()) if hasattr(loops, job)})
-        for kind in self.basins:
-            yield BASINS[kind]
-        if self.basins:
-            yield ROOMS["patches"]
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
+        for kind in self.basins:
+            yield BASINS.get(kind, Room())
+        if self.basins:
+            yield ROOMS["patches"]
+        if self.scalars:  # carried by the flow that rates of waves now have
+            yield ROOMS["values"] if self.basins else Room()
+            yield ROOMS["scalars"]
+            yield from (CARRIED[grid] for grid in (True, False) if any((kind in GRIDS) == grid for kind in self.basins))
         yield ALWAYS
 
     def functions(self, *jobs: str) -> list:

@@ -43,6 +43,8 @@ class BarotropicStart(Start):
         return law.pressure_of_enthalpy(self.st, self.floats, float(potential / self.rho - self.g * elevation))
 
     def given_pressure(self, row, node) -> float:
+        if row["kind"] == rec.PATCH:
+            return self.case.ambient_pressure if node.pressure is None else node.pressure
         if row["kind"] == rec.TANK:
             return head_pressure(self.st, self.floats, float(node.level))
         value = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
@@ -110,7 +112,7 @@ class BarotropicStart(Start):
     def fill_nodes(self) -> None:
         super().fill_nodes()
         for i in range(len(self.nodes)):
-            if self.nodes["kind"][i] not in (rec.FIXED, rec.TANK):
+            if self.nodes["kind"][i] not in (rec.FIXED, rec.TANK, rec.PATCH):
                 self.nodes["pressure"][i] = self.pressure(i)
         for row in self.nodes:
             if row["kind"] in STORED:

@@ -16,6 +16,7 @@ from fvsolve.model.devices import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
+from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import quicker, scheme_settings
 from fvsolve.model.start import start_profile
@@ -39,6 +40,9 @@ def build(case) -> Model:
     scene.links()
     scene.settle()
     return scene.model()
+
+
+LINE = 8  # floats of a cache line
 
 
 class Scene:
@@ -75,10 +79,18 @@ class Scene:
         return self.size - len(names)
 
     def to_plane(self, values: np.ndarray) -> int:
-        """Offset of new values in `plane`."""
-        self.pieces_of_plane.append(np.ravel(values))
-        self.plane_size += values.size
-        return self.plane_size - values.size
+        """Offset of new values in `plane`, where a cache line begins."""
+        self.pieces_of_plane.append(np.append(np.ravel(values), np.zeros(-values.size % LINE)))
+        self.plane_size += self.pieces_of_plane[-1].size
+        return self.plane_size - self.pieces_of_plane[-1].size
+
+    def plane(self) -> np.ndarray:
+        """All values of the plane, from a cache line on."""
+        room = np.zeros(self.plane_size + LINE)
+        first = -(room.ctypes.data // 8) % LINE
+        made = room[first : first + self.plane_size]
+        np.concatenate([np.zeros(0), *self.pieces_of_plane], out=made)
+        return made
 
     @property
     def device_names(self) -> list[str]:
@@ -279,17 +291,19 @@ class Scene:
     def settle(self) -> None:
         sort_nodes(self)
         lower_basins(self)
+        lower_scalars(self)
         self.check()
         self.profiles: dict[int, np.ndarray] = {}  # pipe -> pressure of the profile at centres [Pa]
         self.pack(np.zeros(self.profile_size()))
         self.steady = start_profile(self)
+        settle_scalars(self)
         self.check()
 
     def profile_size(self) -> int:
         """Place of every pipe's profile: a threshold a cell; under `log` and `table` masses and fluxes behind it."""
         at = self.cells
         if self.case.fluid.law == "linear":
-            return at
+            return 2 * at if self.case.scalars else at
         for row in self.pipe_table:
             n = row["cells"]
             row["face"], row["flux"], row["center"] = at, at + n + 1, at + 2 * n + 2
@@ -313,14 +327,19 @@ class Scene:
         most, cells = max(pipes["cells"], default=0), self.cells
         system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in self.cluster_table), default=0)
         system += 7 * len(self.node_table) + 2 * len(self.valve_table)
+        many = len(self.scalar_table)
+        carried = many * len(self.node_table)
         layout = np.zeros(1, rec.LAYOUT)
         at = rec.OUT_HEAD
         for name, size in (
-            ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("net", len(self.node_table)),
+            ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("gain", carried + many),
+            ("net", len(self.node_table)),
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
             ("stiffness", self.moving), ("swept", self.moving),
             ("net_force", len(self.body_table)), ("push", len(self.push_names)),
             ("conductance", len(self.valve_table)), ("drive", len(self.valve_table)),
+            ("value", carried), ("edge", 2 * len(pipes) * many),
+            ("carried", 2 * len(pipes) * many), ("brought", carried),
         ):  # fmt: skip
             layout[name], at = at, at + size
         layout["size"] = at
@@ -335,11 +354,11 @@ class Scene:
         self.tables = (
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,
-            self.device_table, self.basin_table, self.patch_table,
+            self.device_table, self.basin_table, self.patch_table, self.scalar_table,
             np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
-            np.zeros(max(4 * most + 64, system, 2 * len(self.body_table))), marks,
+            np.zeros(max((5 if many else 4) * most + 64, system, 2 * len(self.body_table), 4 * carried)), marks,
             np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at),
-            np.concatenate([np.zeros(0), *self.pieces_of_plane]),
+            self.plane(),
             pieces, envelope, extremes,
         )  # fmt: skip
 
@@ -349,12 +368,18 @@ class Scene:
             k = stiff[row["from_node"]] + stiff[row["to_node"]]
             yield math.sqrt(k * row["area"] / row["length"])
 
+    def start_state(self) -> np.ndarray:
+        """No deviation from the profile but in basins that start from one, and the amounts of scalars."""
+        found = at_start(self.basins, self.size)
+        start_amounts(self, found)
+        return found
+
     def model(self) -> Model:
         case = self.case
         inside = sorted(
             (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
         )
-        start = at_start(self.basins, self.size)
+        start = self.start_state()
         self.warnings += dispersion.warnings(self.basins, start)
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,

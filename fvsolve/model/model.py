@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.scalars import node_values, pipe_values
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
@@ -115,7 +116,8 @@ class Model:
         law, many = self.case.fluid.law, [len(table) > 0 for table in self.tables]
         there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
         basins = tuple(int(kind) for kind in np.unique(self.tables[rec.I_BASINS]["kind"]))
-        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins)
+        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins,
+                      many[rec.I_SCALARS])  # fmt: skip
         return functions(scene)
 
     @property
@@ -253,19 +255,19 @@ class Model:
             found[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / swollen,
                 "flow": flow, "least_pressure": np.minimum(low, pressure),
-                "greatest_pressure": np.maximum(high, pressure),
+                "greatest_pressure": np.maximum(high, pressure), **pipe_values(self, k, y),
             }  # fmt: skip
         nodes = self.tables[rec.I_NODES]
         at = int(self.layout["pressure"])
         for basin in self.basins:
-            found[basin.name] = basin.fields(basin.of(y))
+            found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
             found["nodes"][name] = {
                 "pressure": pressure,
-                "head": float(self.head(pressure, self.elevation[name])),
-            }
+                "head": float(self.head(pressure, self.elevation[name])), **node_values(self, i, out),
+            }  # fmt: skip
         return found
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
@@ -286,9 +288,9 @@ class Model:
                 change += float(y[row["y"]])
         for basin in self.basins:
             rest, per = basin.mass()
-            own, start = basin.of(y)[0], basin.of(self.start)[0]
-            initial += rest + float(np.sum(per * start))
-            change += float(np.sum(per * (own - start)))
+            for own, start in zip(basin.of(y)[:1], basin.of(self.start)[:1], strict=True):
+                initial += rest + float(np.sum(per * start))
+                change += float(np.sum(per * (own - start)))
         for row in self.tables[rec.I_PISTONS]:  # what moving chambers hold is their excess and what was swept
             places = self.tables[rec.I_BODIES][[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)

@@ -18,7 +18,14 @@ def lower_probes(scene) -> np.ndarray:
     table = np.zeros(len(scene.case.probes), rec.PROBE)
     for row, probe in zip(table, scene.case.probes, strict=True):
         name = inside(scene, probe)
-        if name in scene.device_names and probe.quantity in scene.device_of(name).quantities:
+        if probe.point is not None:
+            lower_point(scene, row, probe)
+        elif probe.part == "nodes" and probe.quantity == "flow":
+            row["index"], row["kind"] = scene.node_index[probe.name], rec.PATCH_FLOW
+            row["scale"] = 1.0 / scene.fluid.density
+        elif probe.quantity in scene.case.scalars:
+            scalar_probe(scene, row, probe, name)
+        elif name in scene.device_names and probe.quantity in scene.device_of(name).quantities:
             row["index"], row["kind"] = scene.device_names.index(name), rec.DEVICE_VALUE
             row["side"] = scene.device_of(name).quantities.index(probe.quantity)
         elif probe.part == "nodes" and probe.name in scene.body_index:
@@ -47,19 +54,44 @@ def lower_probes(scene) -> np.ndarray:
     return table
 
 
+def scalar_probe(scene, row, probe, name: str) -> None:
+    """Of a scalar at a node or along a pipe, there straight between the centres of cells."""
+    row["scalar"] = list(scene.case.scalars).index(probe.quantity)
+    if probe.part == "nodes":
+        row["kind"], row["index"] = rec.NODE_SCALAR, scene.node_index[name]
+    else:
+        row["kind"], row["index"] = rec.PIPE_SCALAR, scene.pipe_names.index(probe.name)
+        place(scene, row, probe.fraction, 1)
+
+
 def inside(scene, probe) -> str:
     """What lies behind the connection of a part, or the part itself."""
     name = f"{probe.name}.inside"
     return name if probe.part == "nodes" and name in scene.node_index else probe.name
 
 
-def place(scene, row, fraction: float) -> None:
-    """Where along its pipe a probe reads: an end, or cells with the weights of the scheme's polynomial."""
+def lower_point(scene, row, probe) -> None:
+    """The cells of a basin that a probe reads, and their weights."""
+    k = list(scene.case.meshes).index(probe.name)
+    basin = scene.basins[k]
+    cells, weights = basin.points.reading(*probe.point)
+    row["index"], row["count"], row["cell"] = k, cells.size, len(scene.integers)
+    row["weights"] = len(scene.floats)
+    scene.integers += cells.tolist()
+    scene.floats += weights.tolist()
+    if probe.quantity in scene.case.scalars:
+        row["kind"], row["scalar"] = rec.CELL_SCALAR, list(scene.case.scalars).index(probe.quantity)
+    else:
+        basin.lower_probe(row, probe.quantity, cells, weights)
+
+
+def place(scene, row, fraction: float, degree: int | None = None) -> None:
+    """Where along its pipe a probe reads: an end, or cells by a polynomial, of the scheme's degree if left out."""
     if fraction in (0.0, 1.0):
         row["side"] = -1 if fraction == 0.0 else 1
         return
     n = int(scene.pipe_table[row["index"]]["cells"])
-    degree = min(max(ORDER[scene.case.numerics.scheme] - 1, 1), n - 1)
+    degree = min(degree or max(ORDER[scene.case.numerics.scheme] - 1, 1), n - 1)
     x = fraction * n
     first = int(np.clip(round(x - 0.5 * (degree + 1)), 0, n - degree - 1))
     row["cell"], row["count"], row["weights"] = first, degree + 1, len(scene.floats)
@@ -77,6 +109,8 @@ def reading_weights(x: float, degree: int) -> np.ndarray:
 def probe_offsets(scene, start) -> None:
     """Scale and offset of every probe, once the profile is known."""
     for row, probe in zip(scene.probe_table, scene.case.probes, strict=True):
+        if row["kind"] >= rec.CELL_STATE:  # their profile is known to basins
+            continue
         if scene.case.fluid.law == "linear":
             linear_offsets(scene, start, row, probe)
         else:

@@ -17,17 +17,22 @@ from scipy.sparse import coo_array, csc_array
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import pattern
+from fvsolve.model.scalars import ledger_rows
 from fvsolve.steady import union
 
 Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depend on
 
 
 def sparsity(model) -> csc_array:
-    """bool[n + nodes, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
-    n, nodes = model.y_size, len(model.node_names)
-    pairs = [(np.arange(n), np.arange(n)), *Couplings(model).pairs()]
+    """bool[n + ledger, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
+    from fvsolve.model.sparsity_scalars import scalar_pairs
+
+    n, couplings = model.y_size, Couplings(model)
+    pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    return csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + nodes, n)), dtype=bool)
+    return csc_array(
+        coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + ledger_rows(model.case), n)), dtype=bool
+    )
 
 
 class Reach(NamedTuple):
@@ -81,7 +86,7 @@ class Couplings:
             yield from self.beyond(pipe)
             yield from self.remembered(pipe)
         for basin in self.basins:
-            yield pattern.inside(basin)
+            yield pattern.carried(basin) if basin.part.physics == "transport" else pattern.inside(basin)
         yield from self.stored()
         yield from self.rigid()
         yield from self.moving()

@@ -88,7 +88,7 @@ class Start:
         if row["kind"] == rec.PATCH and node.pressure is not None:
             return node.pressure
         if row["kind"] == rec.PATCH:
-            return self.case.ambient_pressure + self.weight * node.depth
+            return self.case.ambient_pressure + self.weight * (node.depth or 0.0)
         if row["kind"] == rec.TANK:
             return self.case.ambient_pressure + self.weight * node.level
         return schedule_value(self.scene.tables, int(row["schedule"]), self.t)

@@ -37,20 +37,24 @@ class Column:
 
     def span_from_si(self, value: float) -> float:
         """A difference of two values, from SI to this column's unit: the zero point does not matter."""
+        if self.plain:
+            return value
         unit = units.find(self.unit, self.dimension)
         return value * unit.denominator / unit.numerator
 
     @property
     def plain(self) -> bool:
         """True where the column is in SI itself, so that not one bit is touched."""
-        return self.unit == units.DIMENSIONS[self.dimension].si
+        return self.dimension == "number" or self.unit == units.DIMENSIONS[self.dimension].si
 
 
-def column(name: str, dimension: str, case) -> Column:
-    """The column of a quantity in the unit that `case.output.units` asks for, SI where it is silent."""
+def column(name: str, dimension: str, case, label: str = "") -> Column:
+    """The column of a quantity in the unit that `case.output.units` asks for, SI where it is silent; or a number's."""
     known = units.DIMENSIONS[dimension]
     asked = case.output.units
-    return Column(name, dimension, asked.get(dimension) or asked.get(known.base) or known.si, case.ambient_pressure)
+    return Column(
+        name, dimension, label or asked.get(dimension) or asked.get(known.base) or known.si, case.ambient_pressure
+    )
 
 
 def time_column(case) -> Column:
@@ -60,7 +64,7 @@ def time_column(case) -> Column:
 
 def probe_columns(model) -> list[Column]:
     """One column per probe of a model, in its order."""
-    return [column(probe.text, probe.dimension, model.case) for probe in model.probes]
+    return [column(probe.text, probe.dimension, model.case, probe.unit) for probe in model.probes]
 
 
 def split_header(header: str) -> tuple[str, str]:

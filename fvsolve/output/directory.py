@@ -10,6 +10,7 @@ from fvsolve.output.column import probe_columns, time_column
 from fvsolve.output.envelope import read_envelope, with_start, write_envelope
 from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
+from fvsolve.output.lines import LineSeries, clear_lines
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary import read_summary
 
@@ -38,6 +39,7 @@ class RunDirectory:
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
         drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
+        self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
 
     @property
     def ended(self) -> bool:
@@ -59,13 +61,17 @@ class RunDirectory:
         self.history.continue_from(self.restart.rows, self.restart.history_bytes)
         if self.fields:
             self.fields.continue_from(self.restart.frames)
+        if self.lines:
+            self.lines.continue_from(self.restart.frames)
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
         self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
-        """Write a frame of all pipes at time `t` [s]."""
+        """Write a frame of all pipes and basins at time `t` [s]."""
+        if self.lines:
+            self.lines.write(self.fields.frames, frame)
         if self.fields:
             self.fields.write(t, frame)
 
@@ -114,6 +120,8 @@ class RunDirectory:
         self.history.start()
         if self.fields:
             self.fields.start()
+        if self.lines:
+            self.lines.start()
 
     def _write_case(self) -> None:
         case = self.model.case
@@ -145,6 +153,7 @@ def clear(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.vtu"):
         path.unlink()
+    clear_lines(folder)
 
 
 def _refuse_names(case) -> None:

@@ -1,6 +1,7 @@
 """fields.pvd and its .vtu frames: what every cell is doing at a time. Knows VTK files; knows no physics.
 
-Pipes are chains of line cells along the layout, elevation upwards; cell data are in SI, pressures absolute.
+Pipes are chains of line cells along the layout, elevation upwards; cell data are in SI, pressures absolute, and every
+array carries its unit as VTK's own UNITS_LABEL.
 """
 
 from __future__ import annotations
@@ -12,7 +13,11 @@ import numpy as np
 from fvsolve.errors import RunError
 from fvsolve.output import layout
 
-QUANTITIES = ("pressure", "head", "velocity", "flow", "least_pressure", "greatest_pressure")
+UNITS = {
+    "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "least_pressure": "Pa", "greatest_pressure": "Pa",
+}  # fmt: skip
+UNIT = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
+ARRAY = b"</DataArray>"
 
 HEAD = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
@@ -28,8 +33,10 @@ class FieldSeries:
         self.folder = folder
         self.frames = 0
         self.points, self.lines = geometry(model) if model.pipes else (np.zeros((0, 3)), np.zeros((0, 2), dtype=int))
-        self.basins = {basin.name: shape(basin) for basin in model.basins}
+        carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
+        self.basins = {basin.name: (*shape(basin), basin.units | carried) for basin in model.basins}
         self.pipes = [pipe.name for pipe in model.pipes]
+        self.units = UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
         self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
 
@@ -54,20 +61,18 @@ class FieldSeries:
 
     def write(self, t: float, frame: dict) -> None:
         """Add the frame at time `t` [s]: pipe -> quantity -> float64[cells], SI."""
-        import meshio
-
         name = f"fields/{self.frames:06d}.vtu"
-        for part, (basin, (points, cells)) in enumerate(self.basins.items(), 1):
+        for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
             file = f"fields/{basin}-{self.frames:06d}.vtu"
             found = {key: parted(value, cells) for key, value in frame[basin].items()}
-            meshio.Mesh(points, cells, cell_data=found).write(self.folder / file)
+            write_frame(self.folder / file, points, cells, found, units)
             self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
         if not self.pipes:
             self.frames += 1
             return
-        data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in QUANTITIES}
+        data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
         data["pipe"] = [self.pipe]
-        meshio.Mesh(self.points, [("line", self.lines)], cell_data=data).write(self.folder / name)
+        write_frame(self.folder / name, self.points, [("line", self.lines)], data, self.units)
         self._list(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
         self.frames += 1
 
@@ -76,6 +81,18 @@ class FieldSeries:
         with open(self.folder / "fields.pvd", "r+b", buffering=0) as file:
             file.seek(-len(TAIL), 2)
             file.write((line + TAIL).encode())
+
+
+def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
+    """Write a .vtu; `data` are arrays block by block. meshio knows no units, so they are put in behind it."""
+    import meshio
+
+    meshio.Mesh(points, cells, cell_data=data).write(path)
+    text = path.read_bytes()
+    for name, unit in units.items():
+        end = text.index(ARRAY, text.index(f' Name="{name}"'.encode()))
+        text = text[:end] + UNIT.format(unit).encode() + text[end:]
+    path.write_bytes(text)
 
 
 def geometry(model) -> tuple[np.ndarray, np.ndarray]:

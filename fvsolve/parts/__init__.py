@@ -24,6 +24,7 @@ from fvsolve.parts.regulating import FlowControl, PressureReducing, PressureSust
 from fvsolve.parts.relief_valve import ReliefValve
 from fvsolve.parts.reservoir import Reservoir
 from fvsolve.parts.rigid_column import RigidColumn
+from fvsolve.parts.scalar import Scalar
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.spool_valve import EDGES, SpoolValve
 from fvsolve.parts.spring import Spring
@@ -37,5 +38,5 @@ __all__ = [
     "EDGES", "KINDS", "Accumulator", "AirValve", "AreaTable", "Basin", "Chamber", "Characteristic", "CheckValve",
     "Cylinder", "Damper", "EndStop", "FlowControl", "Force", "Frame", "Friction", "Inflow", "Junction", "Leak", "Link",
     "Mass", "Node", "Orifice", "Pipe", "PressureReducing", "PressureSustaining", "Pump", "ReliefValve", "Reservoir",
-    "RigidColumn", "Schedule", "SpoolValve", "Spring", "Tank", "Torque", "Valve", "Wall",
+    "RigidColumn", "Scalar", "Schedule", "SpoolValve", "Spring", "Tank", "Torque", "Valve", "Wall",
 ]  # fmt: skip

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.errors import listing
 from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
-from fvsolve.parts.table import Table, at_most_one, misfits
+from fvsolve.parts.scalar import Carried
+from fvsolve.parts.series import copy_name, find_file
+from fvsolve.parts.table import Named, Table, at_most_one
 from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
 from fvsolve.units import show
 
@@ -20,6 +23,12 @@ OF_ONE = {  # keys that mean something to some physics alone
 }  # fmt: skip
 NEEDS = {"free-surface": ("level",), "liquid": ("pressure", "thickness"), "transport": ("velocity",)}
 OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
+MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}
+FIELDS = {  # what can be read at a point: name -> dimension
+    "free-surface": {"depth": "level", "surface": "level", "bed": "level", **MOVES},
+    "liquid": {"pressure": "pressure", **MOVES},
+    "transport": {},
+}
 
 
 class Patch(Table):
@@ -34,6 +43,7 @@ class Patch(Table):
     impedance: Annotated[
         float | None, Quantity("number", nonnegative, "of the boundary to waves, pressure over velocity [Pa s/m]")
     ] = None
+    scalars: Annotated[dict[str, Any], Carried("of scalars that the given velocity brings in")] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"),)
 
 
@@ -45,27 +55,6 @@ class Inside(Value):
 
     def read(self, given: Any, setting: Setting) -> Table:
         return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
-
-
-class Patches(Value):
-    """Patches by name."""
-
-    about = "patches by name: { outlet = { side, span } }"
-
-    def read(self, given: Any, setting: Setting) -> dict[str, Patch]:
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table of patches; wanted {{ NAME = {{ side, span }} }}")
-        found, faults = {}, []
-        for name, one in given.items():
-            try:
-                found[name] = one if isinstance(one, Patch) else Patch.model_validate(one, context=setting)
-            except Misfit as error:
-                faults += [((name, *below), message) for below, message in error.faults]
-            except ValueError as error:
-                faults += [((name, *below), message) for below, message in misfits(error, Patch.keys())]
-        if faults:
-            raise Misfit(faults)
-        return found
 
 
 class Cells(Value):
@@ -109,11 +98,57 @@ class Start(Table):
     v: Annotated[Formula, Shaped("number", "velocity along y [m/s]")] = even(0.0)
 
 
+@dataclass(frozen=True)
+class Velocity:
+    """A given velocity: `way` "u, v" | "stream" | "expression" | "file", what it takes, and when it turns back [s].
+
+    given : {"u": Formula, "v": Formula} | {"stream": Formula} | {"expression": name, its parameters} | {"file": path}
+    """
+
+    way: str
+    given: dict[str, Any]
+    period: float | None
+    said: dict[str, Any]
+
+    def table(self) -> dict[str, Any]:
+        """What the file would say."""
+        return self.said
+
+
+class Flowing(Value):
+    """A velocity: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
+
+    about = "{ u, v } or { stream }, formulas of x and y in SI, { expression, its parameters } or { file }; and period"
+
+    def read(self, given: Any, setting: Setting) -> Velocity:
+        if isinstance(given, Velocity):
+            return given
+        ways = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
+        if not ways or (len(ways) > 1 and ways != ["u", "v"]):
+            raise ValueError(f"{show(given)}; wanted {self.about}")
+        found = {key: value for key, value in given.items() if key != "period"}
+        period, said = None, dict(given)
+        if "period" in given:
+            period = said["period"] = Quantity("time", positive).read(given["period"], setting)
+        way = "u, v" if ways[0] in "uv" else ways[0]
+        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(found))
+        faults = [((key,), f"unknown key; wanted {listing([*known, 'period'])}") for key in found if key not in known]
+        if faults:
+            raise Misfit(faults)
+        if way in ("u, v", "stream"):
+            found = {key: Shaped("number").read(found.get(key, 0.0), setting) for key in known}
+        elif way == "file":
+            path = find_file(str(found["file"]), setting)
+            found, said["file"] = {"file": path}, copy_name(path, setting)
+        return Velocity(way, found, period, said)
+
+
 class Place(Node):
     """A patch as a place: pressure in the cells behind it, flow into them."""
 
     fixes_pressure: ClassVar[bool] = True
     kind: ClassVar[str] = "patch"
+    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "flow": "flow"}  # into the basin
 
     basin: str
     patch: str
@@ -141,7 +176,7 @@ class Basin(Node, kind="basin"):
     ] = None
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[MeshFile | None, Inside(MeshFile, "a mesh in place of a rectangle: { file, unit }")] = None
-    patches: Annotated[Any, Patches()] = {}
+    patches: Annotated[Any, Named(Patch, "patches by name: { outlet = { side, span } }")] = {}
     start: Annotated[Start | None, Inside(Start, "where the start is not rest: { level | pressure, u, v }")] = None
 
     level: Annotated[float | None, Quantity("level", anything, "of the water at rest, above the elevation [m]")] = None
@@ -152,6 +187,13 @@ class Basin(Node, kind="basin"):
     pressure: Annotated[float | None, Quantity("pressure", positive, "at rest")] = None
     thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]")] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "the fluid's own if left out [m/s]")] = None
+
+    velocity: Annotated[Any, Flowing()] = None
+    scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
+
+    def fields(self) -> dict[str, str]:
+        """What can be read at a point of it: name -> dimension."""
+        return FIELDS[self.physics]
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:

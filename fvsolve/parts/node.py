@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, Rows
 
@@ -24,6 +25,7 @@ class Node(Table):
 
     elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = None
     position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None
+    scalars: Annotated[dict[str, Any], Carried("of scalars that flow in from it, or that it holds at the start")] = {}
 
     @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:

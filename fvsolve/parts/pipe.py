@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 from fvsolve.parts.conduit import Conduit
+from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Quantity, Setting, Value, Whole, between, positive
+from fvsolve.parts.value import Number, Quantity, Setting, Value, Whole, between, positive
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
@@ -52,3 +53,4 @@ class Pipe(Conduit, kind="pipe"):
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]")] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     cells: Annotated[int | None, Whole(between(1, MOST_CELLS), "finite volumes along it")] = None
+    scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}

@@ -96,6 +96,31 @@ class Table(BaseModel):
         return made
 
 
+class Named(Value):
+    """Tables of one kind by name."""
+
+    def __init__(self, model: type[Table], about: str) -> None:
+        self.model, self.about = model, about
+
+    def read(self, given: Any, setting: Setting) -> dict[str, Any]:
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is no table of tables by name; wanted {self.about}")
+        found, faults = {}, []
+        for name, one in given.items():
+            try:
+                found[name] = one if isinstance(one, self.model) else self.model.model_validate(one, context=setting)
+            except Misfit as error:
+                faults += [((name, *below), message) for below, message in error.faults]
+            except ValueError as error:
+                faults += [((name, *below), message) for below, message in misfits(error, self.model.keys())]
+        if faults:
+            raise Misfit(faults)
+        return found
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "object", "additionalProperties": {"type": "object"}}
+
+
 def plain(value: Any) -> Any:
     """A field's value as the file would say it."""
     if hasattr(value, "table"):

@@ -194,27 +194,44 @@ class Result:
             figure.savefig(path)
         return figure
 
-    def view(self, time: float | None = None, field: str | None = None, path=None) -> Path:
-        """Draw `field` at the frame nearest to `time` [s] (the last by default) with PyVista.
+    def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
+        """Draw `field` at the frame nearest to `time` [s] (the last by default) with PyVista; its path.
 
-        Left out, `field` is pressure, or depth where there are no pipes. The path of the picture; RunError where there
-        are no frames, FvsolveError where nothing can be drawn.
+        Left out, `field` is pressure, or where there are no pipes the first of the first basin; `contours` are lines of
+        equal values. RunError where there are no frames, FvsolveError where nothing can be drawn.
         """
-        from fvsolve.draw.view import view
+        times = [t for t, _ in self._frames()]
+        t = times[-1] if time is None else min(times, key=lambda one: abs(one - time))
+        return self._draw([t], field, path, ".png", contours)
 
+    def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
+        """Draw all frames as `view` does, as a .gif or .mp4; its path."""
+        return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
+
+    def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
-            raise RunError("no frames to draw: the case has no pipes, [output] fields is 0, or nothing was written")
+            raise RunError(
+                "no frames to draw: the case has no pipes and no basins, [output] fields is 0, or nothing was written"
+            )
         frames = read_series(self.directory / "fields.pvd")
         if not frames:
             raise RunError(f"{self.directory / 'fields.pvd'} lists no frames")
-        t = frames[-1][0] if time is None else min(frames, key=lambda one: abs(one[0] - time))[0]
-        field = field or ("pressure" if any(link.kind == "pipe" for link in self.case.links.values()) else "depth")
-        out = Path(path) if path else self.directory / f"{field}.png"
+        return frames
+
+    def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:
+        from fvsolve.draw.view import view
+
+        if field is None:
+            pipes = any(link.kind == "pipe" for link in self.case.links.values())
+            basins = [node for node in self.case.nodes.values() if node.kind == "basin"]
+            field = "pressure" if pipes or not basins else next(iter(basins[0].fields()))
+        out = Path(path) if path else self.directory / f"{field}{suffix}"
+        frames, what = self._frames(), f"{self.summary['title']}\n{field.replace('_', ' ')}"
         view(
-            [file for at, file in frames if at == t],
+            [(f"{what} at t = {t:.6g} s", [file for at, file in frames if at == t]) for t in times],
             field,
             out,
-            f"{self.summary['title']}\n{field.replace('_', ' ')} at t = {t:.6g} s",
+            contours,
         )
         return out
 

@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
+from fvsolve.model.scalars import amounts, ledger_rows
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.stepper import Stepper, arguments
@@ -33,9 +34,13 @@ class Loop:
         self.rhs, self.observe, self.record, self.events = arguments((call.rhs, call.observe, call.record, call.events))
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
-        ledgers, structure = len(model.node_names), structure or (lambda: model.structure)
+        ledgers, structure = ledger_rows(model.case), structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
-        sums = [*model.tables[rec.I_NODES]["y"], *model.tables[rec.I_BODIES]["y"]]  # travel is part of what is stored
+        sums = [
+            *model.tables[rec.I_NODES]["y"],
+            *model.tables[rec.I_BODIES]["y"],
+            *amounts(model),
+        ]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))

@@ -10,6 +10,7 @@ from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.model.basins.dispersion import Watch
+from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.summary import (
     Event,
@@ -303,9 +304,11 @@ class Run:
             self.save()
         if reason == "finished":
             self.waves.look(loop.t, loop.now)
-        ledger = mass_ledger(model, loop.now, loop.stepper.ledger[: len(model.node_names)])
+        ledger = loop.stepper.ledger[: loop.stepper.ledger.size // 2]
+        ledgers = {"mass": mass_ledger(model, loop.now, ledger[: len(model.node_names)])}
+        ledgers |= scalar_ledgers(model, loop.now, ledger)
         summary = Summary(
-            reason, reason == "finished", loop.t, find_marks(model), {"mass": ledger}, find_extremes(model),
+            reason, reason == "finished", loop.t, find_marks(model), ledgers, find_extremes(model),
             find_envelope(model), loop.stepper.counts(), self.methods(), model.cells, self.seconds, self.setup,
             [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), self.waves.warnings(),
         )  # fmt: skip

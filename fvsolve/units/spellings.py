@@ -69,6 +69,7 @@ DIMENSIONS = {
     "temperature": Dimension("a temperature", "K", "20 degC"),
     "number": Dimension("a number", "-", "0.5"),
     "kinematic viscosity": Dimension("a kinematic viscosity", "m2/s", "1 cSt"),
+    "diffusivity": Dimension("a diffusivity", "m2/s", "1e-9 m2/s", base="kinematic viscosity"),
     "mass": Dimension("a mass", "kg", "3 kg"),
     "mass flow": Dimension("a mass flow", "kg/s", "3 kg/s"),
     "force": Dimension("a force", "N", "3 N"),

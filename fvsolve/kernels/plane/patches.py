@@ -1,5 +1,7 @@
 """Patches as a room of a scene: their pressures, and what the network brings into the cells behind them."""
 
+from math import log1p
+
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
@@ -10,6 +12,8 @@ from fvsolve.kernels.records import (
     I_PATCHES,
     I_PLANE,
     I_SETTINGS,
+    LIQUID_FACES,
+    LIQUID_GRID,
     RATE,
     SHALLOW_FACES,
 )
@@ -35,12 +39,29 @@ def patch_pressures(t, y, dydt, out, handle):
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
+        stored = mean_deviation(tables, patch, y)
         if basin["kind"] <= SHALLOW_FACES:
-            per, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
+            slope, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
         else:
-            per, content = basin["speed"] * basin["speed"], basin["thickness"] * patch["area"]
-        out[layout["pressure"] + patch["node"]] = per * mean_deviation(tables, patch, y)
-        out[layout["stiffness"] + node["row"]] = per / content
+            slope, content = basin["speed"] * basin["speed"], basin["thickness"] * patch["area"]
+        pressure = slope * stored
+        if basin["kind"] == LIQUID_GRID or basin["kind"] == LIQUID_FACES:
+            strain = stored / basin["density"]
+            pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
+        out[layout["pressure"] + patch["node"]] = pressure
+        out[layout["supply"] + patch["node"]] = 0.0
+        out[layout["stiffness"] + node["row"]] = slope / content
+
+
+@njit
+def book_open(tables, basin, per, dydt, out):
+    """What passes the open boundary of a basin is what its contents gain before links bring any."""
+    if basin["open"] >= 0:
+        n, gained = basin["n"], 0.0
+        area, rate = tables[I_PLANE][basin["area"] : basin["area"] + n], dydt[basin["y"] : basin["y"] + n]
+        for i in range(n):
+            gained += area[i] * rate[i]
+        out[tables[I_LAYOUT][0]["supply"] + basin["open"]] += per * gained
 
 
 @njit
@@ -51,7 +72,6 @@ def patch_flows(t, y, dydt, out, handle):
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         asked = out[layout["net"] + patch["node"]]
-        out[layout["supply"] + patch["node"]] = 0.0
         if tables[I_BASINS][patch["basin"]]["kind"] <= SHALLOW_FACES:
             shallow_patch(tables, patch, asked, y, dydt, out)
         elif dydt.size > 0:
@@ -77,7 +97,7 @@ def shallow_patch(tables, patch, asked, y, dydt, out):
         s = max(depth, 0.0) / SHALLOW
         share = s * s * (3.0 - 2.0 * s)
     supply = (share - 1.0) * asked
-    out[layout["supply"] + patch["node"]] = supply
+    out[layout["supply"] + patch["node"]] += supply
     flow = (asked + supply) / (rho * patch["area"])  # [m/s] of depth
     for m in range(patch["count"] if dydt.size > 0 else 0):
         i = o + integers[first + m]

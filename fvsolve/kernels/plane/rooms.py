@@ -2,8 +2,19 @@
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane import shallow
-from fvsolve.kernels.records import I_BASINS, I_PLANE, I_SETTINGS, RATE, SHALLOW_GRID, UPWIND
+from fvsolve.kernels.plane import liquid, liquid_log, shallow
+from fvsolve.kernels.plane.friction import add_friction
+from fvsolve.kernels.plane.patches import book_open
+from fvsolve.kernels.records import (
+    ACOUSTIC_GRID,
+    I_BASINS,
+    I_PLANE,
+    I_SETTINGS,
+    LIQUID_GRID,
+    NO_DRAG,
+    RATE,
+    SHALLOW_GRID,
+)
 
 UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one
 
@@ -17,12 +28,64 @@ def shallow_grids(t, y, dydt, out, handle):
         basin = tables[I_BASINS][b]
         if basin["kind"] != SHALLOW_GRID:
             continue
-        n, o, at, k = basin["n"], basin["y"], basin["plan"], basin["spacing"]
-        plan = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n))
-        limiter = shallow.NO_SLOPE if basin["scheme"] == UPWIND else basin["limiter"]
+        n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
+        nx, ny = basin["nx"], basin["ny"]
+        plan, many = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n)), ny * (nx + 1)
+        flow_x, flow_y = plane[:0], plane[:0]
+        if f >= 0:  # scalars are carried by them
+            flow_x, flow_y = plane[f : f + many], plane[f + many : f + many + (ny + 1) * nx]
+        dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+        rate_x, rate_y = dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n]
         rate = shallow.grid_rates(
-            st["gravity"], limiter, basin["nx"], basin["ny"], plane[k], plane[k + basin["nx"]], plan,
+            st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
+            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
+            plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
+        )  # fmt: skip
+        if basin["friction"] != NO_DRAG:  # held below the rate of waves, which the step follows anyhow
+            add_friction(
+                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], rate, plan[0], dh, qx, qy,
+                rate_x, rate_y,
+            )  # fmt: skip
+        book_open(tables, basin, st["rho"], dydt, out)
+        out[RATE] = max(out[RATE], UNSPLIT * rate)
+
+
+@njit
+def acoustic_grids(t, y, dydt, out, handle):
+    """Rates of a liquid under law linear on grids."""
+    tables = open_tables(handle)
+    plane = tables[I_PLANE]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] != ACOUSTIC_GRID:
+            continue
+        n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
+        rate = liquid.grid_rates(
+            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
+            plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
             y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
             dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
         )  # fmt: skip
-        out[RATE] = max(out[RATE], UNSPLIT * rate)
+        book_open(tables, basin, basin["thickness"], dydt, out)
+        out[RATE] = max(out[RATE], rate)
+
+
+@njit
+def liquid_grids(t, y, dydt, out, handle):
+    """Rates of a liquid under law log on grids."""
+    tables = open_tables(handle)
+    plane = tables[I_PLANE]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] != LIQUID_GRID:
+            continue
+        n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
+        rate = liquid_log.grid_rates(
+            basin["speed"], basin["density"], basin["small"], basin["scheme"], basin["limiter"], nx, ny,
+            plane[k : k + nx], plane[k + nx : k + nx + ny],
+            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
+            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
+            dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+        )  # fmt: skip
+        book_open(tables, basin, basin["thickness"], dydt, out)
+        out[RATE] = max(out[RATE], rate)

@@ -1,189 +1,145 @@
 """Shallow water on a grid of rectangles: rates of depth and flow. Knows rows of cells; knows no patch and no network.
 
 h_t + (q_x)_x + (q_y)_y = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed). Depth h, surface e = h + bed and
-velocities are reconstructed with limited slopes; both sides of a face see its higher bed (hydrostatic reconstruction,
-Audusse et al. 2004), so that a lake at rest stays at rest, with dry islands too, and no depth falls below zero. Flux of
-Harten, Lax and van Leer. Rows of `plan`, float64[PLANS, n], are what is fixed: the profile's depth, its surface less
-the level, and the rates that the scheme makes of the profile, rounding, which are taken off.
+velocities are reconstructed; both sides of a face see its higher bed (hydrostatic reconstruction, Audusse et al. 2004).
+The pressure of a cell on its faces and the push of its bed are one term, g h (rise of e), so a lake at rest stays at
+rest to the bit, with dry islands too. Flux of Harten, Lax and van Leer with the contact (HLLC, Toro 2001): what moves
+along a face goes with the mass. The speeds that bound its waves are those of the cells on either side, between which
+limited values lie, so that no depth falls below zero.
+
+Fifth order (`LINEAR`, `WENO5`) reconstructs unit flows in place of velocities, wherever the shallowest of five cells
+has half the depth of the deepest, and limited values elsewhere. It is of that order along one direction and on even
+cells; in the plane of second order, since a flux of mean values is not the mean flux.
 """
 
-from math import sqrt
-
 from fvsolve.jit import njit
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.records import MINMOD, VAN_LEER
+from fvsolve.kernels.plane.shallow_rows import (
+    EAST,
+    FIELDS,
+    GHOSTS,
+    MASS,
+    NORTH,
+    put_beyond,
+    put_cells,
+    put_ends,
+    put_flows,
+    put_fluxes,
+    put_limited,
+    put_rates,
+)
+from fvsolve.kernels.plane.shallow_smooth import put_smooth
+from fvsolve.kernels.records import LINEAR, WENO5
 
-DEPTH, SURFACE, PLANS = 0, 1, 5
-THIN = 1e-6  # depth below which velocities fade [m]
-TINY = 1e-300
-NO_SLOPE = -1  # in place of a limiter: first order
+__all__ = ["PLANS", "grid_rates", "width", "work_size"]
 
-
-@njit
-def put_primitives(depth0, surface0, dh, qx, qy, h, e, u, v):
-    """Depth, surface and both velocities of a row."""
-    for i in range(dh.size):
-        depth = max(depth0[i] + dh[i], 0.0)
-        wet = max(depth, THIN)
-        part = 2.0 * depth / (depth * depth + wet * wet)
-        h[i], e[i] = depth, surface0[i] + dh[i]
-        u[i], v[i] = qx[i] * part, qy[i] * part
-
-
-@njit
-def half_slopes(limiter, low, here, high, slope):
-    """Half the limited slopes of a row, from the values before and after."""
-    if limiter == NO_SLOPE:
-        for i in range(slope.size):
-            slope[i] = 0.0
-    elif limiter == MINMOD:
-        for i in range(slope.size):
-            slope[i] = 0.5 * slope_minmod(here[i] - low[i], high[i] - here[i])
-    elif limiter == VAN_LEER:
-        for i in range(slope.size):
-            slope[i] = 0.5 * slope_van_leer(here[i] - low[i], high[i] - here[i])
-    else:
-        for i in range(slope.size):
-            slope[i] = 0.5 * slope_monotonized_central(here[i] - low[i], high[i] - here[i])
+PLANS = 2  # rows of `plan`: depth and surface of the profile
+RING = 8  # rows of cells at hand
 
 
 @njit
-def fluxes(g, h_l, e_l, n_l, t_l, sh_l, se_l, sn_l, st_l, h_r, e_r, n_r, t_r, sh_r, se_r, sn_r, st_r, f0, fl, fr, ft):
-    """Through a row of faces, from cells and half slopes on either side: depth, normal flow by side, other.
-
-    h, e, n, t : depth, surface, velocities normal to the faces and along them
-    """
-    half = 0.5 * g
-    for i in range(f0.size):
-        hl, el, ul, tl = h_l[i] + sh_l[i], e_l[i] + se_l[i], n_l[i] + sn_l[i], t_l[i] + st_l[i]
-        hr, er, ur, tr = h_r[i] - sh_r[i], e_r[i] - se_r[i], n_r[i] - sn_r[i], t_r[i] - st_r[i]
-        bed = max(el - hl, er - hr)
-        a, b = max(0.0, el - bed), max(0.0, er - bed)
-        ca, cb = sqrt(g * a), sqrt(g * b)
-        low, high = min(min(ul - ca, ur - cb), 0.0), max(max(ul + ca, ur + cb), 0.0)
-        both = 1.0 / (high - low + TINY)
-        qa, qb = a * ul, b * ur
-        mass = both * (high * qa - low * qb + high * low * (b - a))
-        pa, pb = half * a * a, half * b * b
-        flow = both * (high * (qa * ul + pa) - low * (qb * ur + pb) + high * low * (qb - qa))
-        f0[i] = mass
-        fl[i], fr[i] = flow + (half * hl * hl - pa), flow + (half * hr * hr - pb)
-        ft[i] = mass * (tl if mass > 0.0 else tr)
-
-
-@njit
-def settle_row(g, k, h, sh, se, f0, fl, fr, ft, dh, dn, dt):
-    """Rates of a row of cells from faces i and i + 1: k times what comes in less what goes out, and the bed's push."""
-    f0b, flb, ftb = f0[1:], fl[1:], ft[1:]
-    for i in range(dh.size):
-        dh[i] = k * (f0[i] - f0b[i])
-        dn[i] = k * ((fr[i] - flb[i]) - 2.0 * g * h[i] * (se[i] - sh[i]))
-        dt[i] = k * (ft[i] - ftb[i])
-
-
-@njit
-def settle_column(g, k, h, sh, se, f0a, fra, fta, f0b, flb, ftb, dh, dn, dt):
-    """The same, added, of a row of cells between two rows of faces."""
-    for i in range(dh.size):
-        dh[i] += k * (f0a[i] - f0b[i])
-        dn[i] += k * ((fra[i] - flb[i]) - 2.0 * g * h[i] * (se[i] - sh[i]))
-        dt[i] += k * (fta[i] - ftb[i])
-
-
-@njit
-def quickest(g, kx, ky, h, u, v, top):
-    """Let top[i] be the greatest (|u| + c) kx + (|v| + c) ky of its column so far."""
-    for i in range(top.size):
-        c = sqrt(g * h[i])
-        rate = (abs(u[i]) + c) * kx + (abs(v[i]) + c) * ky
-        top[i] = rate if rate > top[i] else top[i]
+def width(nx):
+    """Floats of a row with its ghosts, an odd number of cache lines, so that rows do not push each other out."""
+    return 8 * ((nx + 2 * GHOSTS + 7) // 8 | 1)
 
 
 @njit
 def work_size(nx, ny):
     """Floats that `grid_rates` works in."""
-    return 4 * nx * (ny + 4) + 8 * (nx + 4) + 4 * (nx + 1) + 16 * nx + nx
+    return (RING * FIELDS + 52) * width(nx)
 
 
 @njit
-def mirrored(a, n, turn):
-    """Fill two values beyond either end of a[2 : n + 2] as a wall reflects them."""
-    a[1], a[0] = turn * a[2], turn * a[3 if n > 1 else 2]
-    a[n + 2], a[n + 3] = turn * a[n + 1], turn * a[n if n > 1 else n + 1]
+def copy(source, target):
+    """target = source[: target.size]."""
+    for i in range(target.size):
+        target[i] = source[i]
 
 
 @njit
-def grid_rates(g, limiter, nx, ny, kx, ky, plan, dh, qx, qy, work, rate_h, rate_x, rate_y):
-    """Rates of all cells of a basin with walls around; returns its greatest rate (|u| + c) kx + (|v| + c) ky [1/s].
+def put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top):
+    """Row j of cells; also one beyond the first or the last, from those before it."""
+    cells = ring[j & (RING - 1)]
+    if 0 <= j < ny:
+        a, b = j * nx, (j + 1) * nx
+        put_cells(g, plan[0, a:b], plan[1, a:b], dh[a:b], qx[a:b], qy[a:b], kx, ky[j], cells, top)
+        walls = reflect.size > 0
+        if fifth:
+            put_flows(qx[a:b], qy[a:b], cells)
+        put_ends(nx, reflect[j] if walls else 1.0, reflect[ny + j] if walls else 1.0, cells)
+        return
+    last = 0 if j < 0 else ny - 1
+    mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)
+    at = 2 * ny if j < 0 else 2 * ny + nx
+    walls = reflect[at : at + nx] if reflect.size > 0 else reflect
+    put_beyond(nx, walls, ring[last & (RING - 1)], ring[mirror & (RING - 1)], cells)
 
-    kx, ky : cells per length [1/m]; plan : float64[PLANS, n]; work : float64[work_size(nx, ny)]
+
+@njit
+def grid_rates(
+    g, scheme, limiter, nx, ny, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, work, rate_h, rate_x, rate_y
+):
+    """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+
+    scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
+    kx float64[nx], ky float64[ny] : 1 / widths of columns and rows [1/m]
+    reflect : float64[2 (nx + ny)], 1 a wall and 0 open, west, east, south, north; or empty, walls all around
+    plan : float64[PLANS, n], depth of the profile at rest and its surface less the level [m]
+    dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]
+    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
+    work : float64[work_size(nx, ny)], fastest where it begins at a cache line
     """
-    size, wide = nx * (ny + 4), nx + 4
-    h, e, u, v = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size : 4 * size]
-    rest = work[4 * size :]
-    top = rest[:nx]
-    rest = rest[nx:]
+    wide, fifth = width(nx), scheme == LINEAR or scheme == WENO5
+    ring, at = work[: RING * FIELDS * wide].reshape((RING, FIELDS, wide)), RING * FIELDS * wide
+    sides, at = work[at : at + 36 * wide].reshape((3, 2, 6, wide)), at + 36 * wide
+    fluxes, at = work[at : at + 12 * wide].reshape((3, 4, wide)), at + 12 * wide
+    pushes, at = work[at : at + 3 * wide].reshape((3, wide)), at + 3 * wide
+    top = work[at : at + nx]
     for i in range(nx):
         top[i] = 0.0
-    for j in range(ny):
-        a, b, at = j * nx, (j + 1) * nx, (j + 2) * nx
-        to = at + nx
-        put_primitives(
-            plan[DEPTH, a:b], plan[SURFACE, a:b], dh[a:b], qx[a:b], qy[a:b], h[at:to], e[at:to], u[at:to], v[at:to]
-        )
-        quickest(g, kx, ky, h[at:to], u[at:to], v[at:to], top)
-    for side in range(2):  # rows beyond the walls
-        for k in range(2):
-            to = (1 - k) * nx if side == 0 else (ny + 2 + k) * nx
-            of = (2 + min(k, ny - 1)) * nx if side == 0 else (ny + 1 - min(k, ny - 1)) * nx
-            for i in range(nx):
-                h[to + i], e[to + i], u[to + i], v[to + i] = h[of + i], e[of + i], u[of + i], -v[of + i]
-    # along rows
-    hp, ep, up, vp = rest[:wide], rest[wide : 2 * wide], rest[2 * wide : 3 * wide], rest[3 * wide : 4 * wide]
-    rest = rest[4 * wide :]
-    sh, se, su, sv = rest[:wide], rest[wide : 2 * wide], rest[2 * wide : 3 * wide], rest[3 * wide : 4 * wide]
-    rest = rest[4 * wide :]
-    f = nx + 1
-    f0, fl, fr, ft = rest[:f], rest[f : 2 * f], rest[2 * f : 3 * f], rest[3 * f : 4 * f]
-    rest = rest[4 * f :]
-    for j in range(ny):
-        a, b, at = j * nx, (j + 1) * nx, (j + 2) * nx
-        for i in range(nx):
-            hp[i + 2], ep[i + 2], up[i + 2], vp[i + 2] = h[at + i], e[at + i], u[at + i], v[at + i]
-        mirrored(hp, nx, 1.0)
-        mirrored(ep, nx, 1.0)
-        mirrored(up, nx, -1.0)
-        mirrored(vp, nx, 1.0)
-        for p, s in ((hp, sh), (ep, se), (up, su), (vp, sv)):
-            half_slopes(limiter, p[: nx + 2], p[1 : nx + 3], p[2:], s[1 : nx + 3])
-        m, n = nx + 2, nx + 3
-        fluxes(g, hp[1:m], ep[1:m], up[1:m], vp[1:m], sh[1:m], se[1:m], su[1:m], sv[1:m],
-               hp[2:n], ep[2:n], up[2:n], vp[2:n], sh[2:n], se[2:n], su[2:n], sv[2:n], f0, fl, fr, ft)  # fmt: skip
-        settle_row(g, kx, hp[2:m], sh[2:m], se[2:m], f0, fl, fr, ft, rate_h[a:b], rate_x[a:b], rate_y[a:b])
-    # across rows: slopes and faces of two rows at a time, in turn
-    for j in range(-1, ny + 1):  # row of cells; its faces are those towards row j - 1
-        at, now, before = (j + 2) * nx, (j + 1) % 2, j % 2
-        s, o = rest[4 * nx * now : 4 * nx * (now + 1)], rest[4 * nx * before : 4 * nx * (before + 1)]
-        q, r = rest[8 * nx + 4 * nx * now :], rest[8 * nx + 4 * nx * before :]
-        for k in range(4):
-            p = work[k * size : (k + 1) * size]
-            half_slopes(limiter, p[at - nx : at], p[at : at + nx], p[at + nx : at + 2 * nx], s[k * nx : (k + 1) * nx])
+    reach = 3 if fifth else 2
+    ahead = min(reach, ny)
+    for j in range(ahead):
+        put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+    for j in range(-1, -1 - reach, -1):
+        put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+    one = GHOSTS - 1  # the cell beyond the first
+    for j in range(-1, ny + 1):
+        while ahead < j + reach:
+            put_row(g, ahead, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+            ahead += 1
+        # values of row j at its southern and northern faces
+        now, was, r = j & 1, (j - 1) & 1, RING - 1
+        before, here, after = ring[(j - 1) & r], ring[j & r], ring[(j + 1) & r]
+        low, high, push = sides[now, 0], sides[now, 1], pushes[now]
+        put_limited(scheme, limiter, nx, before, GHOSTS, here, GHOSTS, after, GHOSTS, low, high, push)
+        if fifth:
+            put_smooth(
+                g, scheme, nx, ring[(j - 2) & r], GHOSTS, before, GHOSTS, here, GHOSTS, after, GHOSTS,
+                ring[(j + 2) & r], GHOSTS, low, high, push,
+            )  # fmt: skip
         if j < 0:
             continue
-        b, c, d = at - nx, at, at + nx
-        fluxes(g, h[b:c], e[b:c], v[b:c], u[b:c], o[:nx], o[nx : 2 * nx], o[3 * nx : 4 * nx], o[2 * nx : 3 * nx],
-               h[c:d], e[c:d], v[c:d], u[c:d], s[:nx], s[nx : 2 * nx], s[3 * nx : 4 * nx], s[2 * nx : 3 * nx],
-               q[:nx], q[nx : 2 * nx], q[2 * nx : 3 * nx], q[3 * nx : 4 * nx])  # fmt: skip
-        if j > 0:
-            a, z = (j - 1) * nx, j * nx
-            settle_column(
-                g, ky, h[b:c], o[:nx], o[nx : 2 * nx], r[:nx], r[2 * nx : 3 * nx], r[3 * nx : 4 * nx],
-                q[:nx], q[nx : 2 * nx], q[3 * nx : 4 * nx], rate_h[a:z], rate_y[a:z], rate_x[a:z],
+        # faces between rows j - 1 and j
+        put_fluxes(g, nx, NORTH, EAST, fifth, sides[was, 1], 0, low, 0, before, GHOSTS, here, GHOSTS, fluxes[now])
+        if flow_y.size > 0:
+            copy(fluxes[now, MASS], flow_y[j * nx : (j + 1) * nx])
+        if j == 0:
+            continue
+        # row j - 1 : faces along it, and its rates
+        west, east, a, z = sides[2, 0], sides[2, 1], (j - 1) * nx, j * nx
+        put_limited(scheme, limiter, nx + 2, before, one - 1, before, one, before, one + 1, west, east, pushes[2])
+        if fifth:
+            put_smooth(
+                g, scheme, nx + 2, before, one - 2, before, one - 1, before, one, before, one + 1,
+                before, one + 2, west, east, pushes[2],
             )  # fmt: skip
-    for i in range(dh.size):
-        rate_h[i] -= plan[2, i]
-        rate_x[i] -= plan[3, i]
-        rate_y[i] -= plan[4, i]
+        put_fluxes(g, nx + 1, EAST, NORTH, fifth, east, 0, west, 1, before, one, before, one + 1, fluxes[2])
+        if flow_x.size > 0:
+            copy(fluxes[2, MASS], flow_x[(j - 1) * (nx + 1) : j * (nx + 1)])
+        put_rates(
+            g, kx, ky[j - 1], pushes[2, 1:], pushes[was], fluxes[2], fluxes[was], fluxes[now],
+            rate_h[a:z], rate_x[a:z], rate_y[a:z],
+        )  # fmt: skip
     most = 0.0
     for i in range(nx):
         most = max(most, top[i])

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fvsolve.case.basins import behind
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.plane.advection import THIN, advection_work
+from fvsolve.kernels.plane.diffusion import diffusion_work
+
+if TYPE_CHECKING:
+    from fvsolve.mesh.points import Points
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
 FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
+MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
 SIDES = ("west", "east", "south", "north")  # in the order of a grid's boundary faces
 
 
@@ -30,6 +37,7 @@ class Basin:
         self.n = self.x.size
         grid = self.mesh.grid
         self.is_grid = grid is not None and self.n == grid.nx * grid.ny
+        self.scalars = list(case.scalars)
 
     # what a physics says ------------------------------------------------------------------------------------
 
@@ -49,11 +57,22 @@ class Basin:
         """What cells hold at deviations float64[quantities, n], SI."""
         raise NotImplementedError
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        """Fill what a probe of a field is, beside the cells that it reads; scalar fields are its physics' own."""
+        row["kind"], row["scale"] = MOVES[field], 1.0
+
     def mass(self) -> tuple[float, np.ndarray]:
         """Mass of the start's profile [kg], and mass per deviation of the first quantity : float64[n]."""
         raise NotImplementedError
 
     # ----------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def points(self) -> Points:
+        """Finds points of its mesh, and the cells that are read there."""
+        from fvsolve.mesh.points import Points
+
+        return Points(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
         """A formula at centres : float64[n]."""
@@ -100,19 +119,79 @@ class Basin:
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = scene.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         given = self.reflects()
-        row["reflect"], row["outer_given"] = scene.to_plane(given), given.size
+        row["reflect"], row["outer_given"], row["open"] = scene.to_plane(given), given.size, -1
+        if given.size:
+            known = (name for name, patch in self.part.patches.items() if self.reflection(patch) != 1.0)
+            row["open"] = scene.node_index[f"{self.name}.{next(known)}"]
+        row["carried"] = row["flows"] = -1
         self.lower(scene, row)
-        first, *others = ([f"{self.name}.{what}[{i}]" for i in range(self.n)] for what in self.quantities)
-        scales = self.scales()
-        row["y"] = scene.states(first, scales[0])
-        for names, scale in zip(others, scales[1:], strict=True):
-            scene.states(names, scale)
+        if self.scalars:
+            self.lower_scalars(scene, row)
+        row["y"] = scene.size
+        for what, scale in zip(self.quantities, self.scales(), strict=True):
+            scene.states([f"{self.name}.{what}[{i}]" for i in range(self.n)], scale)
+        row["carried"] = scene.size if self.scalars else -1
+        for name in self.scalars:
+            scene.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
+
+    def lower_scalars(self, scene, row) -> None:
+        """Reserve what scalars are carried by and in, and values beyond the boundary."""
+        mesh, grid = self.mesh, self.mesh.grid
+        outer = mesh.left.size - mesh.inner
+        row["outside"] = scene.to_plane(np.zeros(len(self.scalars) * outer))
+        row["outer"] = outer
+        if self.is_grid:
+            flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
+            toil = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
+        else:
+            flows, toil = mesh.left.size, self.n + self.carrying_work()
+        if row["flows"] < 0:
+            row["flows"] = scene.to_plane(np.zeros(flows))
+        row["toil"] = scene.to_plane(np.zeros(toil))
+
+    def scalar_scale(self, name: str) -> float:
+        """What counts as a small amount of a scalar per area."""
+        given, scalar = self.part.scalars.get(name), self.case.scalars[name]
+        values = np.abs([scalar.initial, scalar.ambient]) if given is None else np.abs(self.formula(given))
+        return float(values.max()) or 1.0
+
+    def depth_of(self, y: np.ndarray) -> np.ndarray:
+        """Depth that amounts of scalars are spread over : float64[n]."""
+        return np.ones(self.n)
+
+    def start_scalars(self, y: np.ndarray) -> None:
+        """Amounts at the start, into the states of a model."""
+        for name, amounts in zip(self.scalars, self.amounts(y), strict=True):
+            given = self.part.scalars.get(name)
+            value = self.case.scalars[name].initial if given is None else self.formula(given)
+            amounts[:] = value * self.depth_of(self.of(y))
+
+    def amounts(self, y: np.ndarray) -> np.ndarray:
+        """Amounts per area in the states of a model : float64[scalars, n]."""
+        at = int(self.row["carried"])
+        return y[at : at + len(self.scalars) * self.n].reshape(-1, self.n)
+
+    def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
+        """Values of scalars in cells, by name."""
+        depth = np.maximum(self.depth_of(self.of(y)), THIN)
+        return {name: one / depth for name, one in zip(self.scalars, self.amounts(y), strict=True)}
+
+    def held(self) -> np.ndarray:
+        """Mass that holds a scalar, per depth : float64[n] [kg/m]."""
+        raise NotImplementedError
 
     def lower_patch(self, scene, patch: str, row) -> None:
         """Fill the row of a patch that links may join."""
         cells = behind(self.mesh, patch)
         row["first"], row["count"], row["area"] = len(scene.integers), cells.size, self.mesh.area[cells].sum()
         scene.integers += cells.tolist()
+        faces = np.arange(*self.mesh.patch(patch).indices(self.mesh.left.size)) - self.mesh.inner
+        faces = np.argsort(self.ring())[faces] if self.is_grid else faces
+        row["ring"], row["faces"] = len(scene.integers), faces.size
+        scene.integers += faces.tolist()
+        given = self.part.patches[patch].scalars if patch in self.part.patches else {}
+        row["values"] = len(scene.integers)
+        scene.integers += [scene.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
 
 
 def lower_basins(scene) -> None:
@@ -134,4 +213,6 @@ def at_start(basins: list[Basin], size: int) -> np.ndarray:
     found: Any = np.zeros(size)
     for basin in basins:
         basin.of(found)[:] = basin.start()
+        if basin.scalars:
+            basin.start_scalars(found)
     return found

@@ -7,6 +7,7 @@ import numpy as np
 from fvsolve.case.basins import bed_of
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow
+from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.model.basins.basin import Basin
 
 SCALE = 0.1  # [m] of depth
@@ -29,7 +30,7 @@ class FreeSurface(Basin, physics="free-surface"):
 
     def lower(self, scene, row) -> None:
         plan = np.zeros((shallow.PLANS, self.n))
-        plan[shallow.DEPTH], plan[shallow.SURFACE] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
+        plan[0], plan[1] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
         part, weight = self.part, self.case.properties.density * self.case.gravity
         row["rest"] = weight * (part.level + (part.elevation or 0.0))
         if part.manning is not None or part.factor is not None:
@@ -42,15 +43,8 @@ class FreeSurface(Basin, physics="free-surface"):
         row["plan"] = scene.to_plane(plan)
 
     def lower_grid(self, scene, row, plan: np.ndarray) -> None:
-        grid = self.mesh.grid
         row["kind"] = rec.SHALLOW_GRID
-        work, still = np.zeros(shallow.work_size(grid.nx, grid.ny)), np.zeros((3, self.n))
-        shallow.grid_rates(
-            self.case.gravity, row["limiter"] if row["scheme"] != rec.UPWIND else shallow.NO_SLOPE, grid.nx, grid.ny,
-            1.0 / np.diff(grid.x)[0], 1.0 / np.diff(grid.y)[0], plan, *np.zeros((3, self.n)), work, *still,
-        )  # fmt: skip
-        plan[2:] = still
-        row["work"] = scene.to_plane(work)
+        row["work"] = scene.to_plane(np.zeros(shallow.work_size(self.mesh.grid.nx, self.mesh.grid.ny)))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
@@ -64,11 +58,24 @@ class FreeSurface(Basin, physics="free-surface"):
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         depth = np.maximum(self.depth + y[0], 0.0)
-        bed, wet = self.bed + (self.part.elevation or 0.0), np.maximum(depth, shallow.THIN)
+        bed, wet = self.bed + (self.part.elevation or 0.0), np.maximum(depth, THIN)
         share = 2.0 * depth / (depth * depth + wet * wet)
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
 
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field not in ("depth", "surface", "bed"):
+            return super().lower_probe(row, field, cells, weights)
+        row["kind"], row["scale"] = rec.CELL_DEPTH, float(field != "bed")
+        if field != "depth":
+            row["offset"] = weights @ self.bed[cells] + (self.part.elevation or 0.0)
+
     def mass(self) -> tuple[float, np.ndarray]:
         per = self.case.properties.density * self.mesh.area
         return float(np.sum(per * self.depth)), per
+
+    def depth_of(self, y: np.ndarray) -> np.ndarray:
+        return np.maximum(self.depth + y[0], 0.0)
+
+    def held(self) -> np.ndarray:
+        return self.case.properties.density * self.mesh.area

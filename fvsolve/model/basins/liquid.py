@@ -7,13 +7,18 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.plane import liquid, liquid_log
 from fvsolve.model.basins.basin import Basin
 
 SCALE = 1e5  # [Pa]
+SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
 
 
 class Liquid(Basin, physics="liquid"):
-    """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)]."""
+    """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
+
+    law linear: p = a^2 (rho - rho0); law log: p = K ln(rho / rho0), with the full momentum flux.
+    """
 
     quantities = ("density", "flow_x", "flow_y")
     units = {"pressure": "Pa", "velocity": "m/s"}
@@ -21,9 +26,10 @@ class Liquid(Basin, physics="liquid"):
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
         fluid = case.properties
-        self.density, self.speed = fluid.density, self.part.wave_speed
-        if self.speed is None:
-            self.speed = math.sqrt(fluid.bulk_modulus / fluid.density)
+        self.linear = case.fluid.law == "linear"
+        strain = (self.part.pressure - fluid.pressure) / fluid.bulk_modulus
+        self.density = fluid.density * (1.0 if self.linear else math.exp(strain))
+        self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
 
     def scales(self) -> list[float]:
         return [SCALE / self.speed**2, SCALE / self.speed, SCALE / self.speed]
@@ -35,23 +41,48 @@ class Liquid(Basin, physics="liquid"):
         return (patch.impedance - own) / (patch.impedance + own)
 
     def lower(self, scene, row) -> None:
-        row["thickness"], row["speed"] = self.part.thickness, self.speed
+        row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
+        row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
         height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
         row["rest"] = self.part.pressure - self.case.ambient_pressure + height
-        row["kind"] = rec.ACOUSTIC_GRID if self.is_grid else rec.ACOUSTIC_FACES
+        if self.is_grid:
+            row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.LIQUID_GRID
+            size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
+            row["work"] = scene.to_plane(np.zeros(size))
+        else:
+            row["kind"] = rec.ACOUSTIC_FACES if self.linear else rec.LIQUID_FACES
+
+    def pressure(self, deviation: np.ndarray) -> np.ndarray:
+        """Pressure above that at rest [Pa], of deviations of the density."""
+        if self.linear:
+            return self.speed**2 * deviation
+        return self.density * self.speed**2 * np.log1p(deviation / self.density)
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
         if given is not None:
-            found[0] = self.formula(given.pressure) / self.speed**2
-            found[1], found[2] = self.density * self.formula(given.u), self.density * self.formula(given.v)
+            pressure, k = self.formula(given.pressure), self.density * self.speed**2
+            found[0] = pressure / self.speed**2 if self.linear else self.density * np.expm1(pressure / k)
+            density = self.density + (0.0 if self.linear else found[0])
+            found[1], found[2] = density * self.formula(given.u), density * self.formula(given.v)
         return found
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        velocity = np.column_stack([y[1], y[2], np.zeros(self.n)]) / self.density
-        return {"pressure": self.part.pressure + self.speed**2 * y[0], "velocity": velocity}
+        density = self.density + (np.zeros(self.n) if self.linear else y[0])
+        velocity = np.column_stack([y[1] / density, y[2] / density, np.zeros(self.n)])
+        return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
+
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field != "pressure":
+            return super().lower_probe(row, field, cells, weights)
+        row["kind"], row["scale"], row["offset"] = rec.CELL_STATE, self.speed**2, self.part.pressure
 
     def mass(self) -> tuple[float, np.ndarray]:
-        per = self.part.thickness * self.mesh.area
-        strain = (self.part.pressure - self.case.properties.pressure) / (self.density * self.speed**2)
-        return float(np.sum(per)) * self.density * (1.0 + strain), per
+        per, fluid = self.part.thickness * self.mesh.area, self.case.properties
+        density = self.density
+        if self.linear:
+            density *= 1.0 + (self.part.pressure - fluid.pressure) / (self.density * self.speed**2)
+        return float(np.sum(per)) * density, per
+
+    def held(self) -> np.ndarray:
+        return np.zeros(self.n)

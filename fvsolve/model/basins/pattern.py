@@ -12,12 +12,18 @@ REACH = {rec.UPWIND: 1, rec.MUSCL: 2}  # cells either way; fifth order looks at 
 
 def inside(basin) -> tuple[np.ndarray, np.ndarray]:
     """(rates, as many states that they depend on) of all cells on those about them."""
-    near = neighbours(basin).tocoo()
-    many = len(basin.quantities)
-    if many == 0:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    found = kron(np.ones((many, many), dtype=bool), near).tocoo()
+    near, many = neighbours(basin), len(basin.quantities)
+    found = kron(coo_array(np.ones((many, many), dtype=bool)), near).tocoo()
     at = int(basin.row["y"])
+    return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
+
+
+def carried(basin) -> tuple[np.ndarray, np.ndarray]:
+    """The same of amounts that a given velocity carries, each on itself; what is held to bounds looks further."""
+    near, at = neighbours(basin), int(basin.row["carried"])
+    if basin.row["scheme"] == rec.WENO5:
+        near = near @ near
+    found = kron(eye_array(len(basin.scalars), dtype=bool), csr_array(near, dtype=bool)).tocoo()
     return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
 
 

@@ -1,0 +1,71 @@
+"""What must hold of scalars and between them and the rest of a case. Knows names and kinds; knows no network."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts import KINDS, Basin, Chamber, Inflow, Pipe, Reservoir, Tank
+from fvsolve.units import show
+
+Found = Iterator[tuple[tuple, str]]
+
+HOLDERS = {
+    "cylinder": "its chambers carry no scalars yet",
+    "rigid-column": "it has no cells to carry scalars; use a pipe",
+}
+HOLDERS |= dict.fromkeys(("accumulator", "air-valve"), "its contents carry no scalars yet")
+TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure", "depth", "bed",
+         "surface"}  # fmt: skip
+TAKEN |= {name for kinds in KINDS.values() for kind in kinds.values() for name in kind.quantities}
+TAKEN |= set(Pipe.along)
+
+
+def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
+    """Faults of names, of values that parts cannot have, and of what scalars do not go with yet."""
+    for name in scalars:
+        if not re.fullmatch(r"[\w-]+", name):
+            yield ("scalars", name), f"{show(name)} is no name; a name has letters, digits, _ and -"
+        elif name in TAKEN:
+            yield ("scalars", name), f"{show(name)} has a meaning of its own; wanted another name"
+    for group, parts in (("nodes", nodes), ("links", links)):
+        for name, part in parts.items():
+            for scalar, value in getattr(part, "scalars", {}).items():
+                if (said := _wrong(scalar, value, part, scalars)) is not None:
+                    yield (group, name, "scalars", scalar), said
+            if scalars and getattr(part, "physics", "") == "liquid":
+                yield (group, name), "is a basin of liquid, whose waves carry no scalars; wanted a free surface"
+            for patch, one in getattr(part, "patches", {}).items():
+                for scalar in one.scalars:
+                    place = (group, name, "patches", patch, "scalars", scalar)
+                    if scalar not in scalars:
+                        yield place, _unknown(scalar, scalars)
+                    elif part.physics != "transport":
+                        yield place, "comes with what links bring; it goes with a given velocity alone"
+            if scalars and part.kind in HOLDERS:
+                article = "an" if part.kind[0] in "aeiou" else "a"
+                yield (group, name), f"is {article} {part.kind}; {HOLDERS[part.kind]}"
+    if not scalars:
+        return
+    if fluid is not None and fluid.law != "linear":
+        yield ("fluid", "law"), f'{show(fluid.law)} carries no scalars yet; wanted "linear"'
+
+
+def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:
+    """What is wrong with the value of a scalar that a part states."""
+    if scalar not in scalars:
+        return _unknown(scalar, scalars)
+    if isinstance(part, Basin):
+        return None
+    if isinstance(part, (Tank, Chamber)) and not value.constant:
+        return "is what it holds at the start; wanted a number, no schedule"
+    if not isinstance(part, (Pipe, Tank, Chamber, Reservoir, Inflow)):
+        return f"a {part.kind} has none of its own; wanted an inflow, a reservoir, a tank, a chamber or a pipe"
+    return None
+
+
+def _unknown(scalar: str, scalars: dict[str, Any]) -> str:
+    near = did_you_mean(scalar, scalars) or (f"; scalars are {listing(scalars)}" if scalars else "")
+    return f"no scalar named {show(scalar)}{near}" + ("" if scalars else f"; declare it as [scalars.{scalar}]")

@@ -1,0 +1,231 @@
+"""Scalars at nodes: what arrives is mixed by mass, at once. Knows ends of links; knows no cells but those at ends.
+
+A place has one value. What stores has that of its contents, what a given pressure or flow brings in has a given one,
+and elsewhere it is the mean of all that flows in. A pipe's end also exchanges g (c_cell - value), g = 2 D m / dx.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.records import (
+    CHAMBER,
+    FIXED,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PROFILE,
+    I_SCALARS,
+    I_SCRATCH,
+    I_SETTINGS,
+    I_VALVES,
+    JUNCTION,
+    MINMOD,
+    PATCH,
+    RATE,
+    TANK,
+    UPWIND,
+    VAN_LEER,
+)
+from fvsolve.kernels.schedules import schedule_value
+
+ROUNDS = 200  # beyond one a node: flow that runs in a circle without volume is mixed by iteration
+DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it has no value of its own, and gets no quicker [m]
+
+
+@njit
+def limited(limiter, a, b):
+    """The limited mean of two differences."""
+    if limiter == MINMOD:
+        return slope_minmod(a, b)
+    return slope_van_leer(a, b) if limiter == VAN_LEER else slope_monotonized_central(a, b)
+
+
+@njit(forceinline=True)
+def end_flow(out, tables, p, right):
+    """Mass flow of pipe p at its `from` (0) or `to` (1) end, along it [kg/s]."""
+    at = tables[I_LAYOUT][0]["ends"] + 4 * p + 2 * right
+    return tables[I_PIPES][p]["flow"] + (out[at] - out[at + 1])
+
+
+@njit(forceinline=True)
+def cell_mass(y, tables, p, i):
+    """Mass per length in cell i of pipe p [kg/m]."""
+    pipe = tables[I_PIPES][p]
+    waves = y[pipe["y"] + i] + y[pipe["y"] + pipe["cells"] + i]
+    return tables[I_PROFILE][pipe["center"] + i] + waves * (1.0 / pipe["speed"])
+
+
+@njit(forceinline=True)
+def cell_value(y, tables, q, p, i):
+    """Value of scalar q in cell i of pipe p."""
+    return y[tables[I_SCALARS][q]["y"] + tables[I_PIPES][p]["cell"] + i] / cell_mass(y, tables, p, i)
+
+
+@njit(forceinline=True)
+def end_cell(tables, p, right, k):
+    """Number of the k-th cell from an end of pipe p, the last one again where there are fewer."""
+    n = tables[I_PIPES][p]["cells"]
+    k = min(k, n - 1)
+    return n - 1 - k if right == 1 else k
+
+
+@njit(forceinline=True)
+def bounded(value, scalar):
+    """The value, within what can be."""
+    return min(max(value, scalar["least"]), scalar["greatest"])
+
+
+@njit
+def leaving_values(y, out, tables, q):
+    """Value with which water leaves each pipe by each end: along a limited slope, never beyond what can be."""
+    st, scalar, at = tables[I_SETTINGS][0], tables[I_SCALARS][q], tables[I_LAYOUT][0]["edge"]
+    pipes, limiter = tables[I_PIPES], st["limiter"]
+    for p in range(pipes.size):
+        for right in range(2):
+            a = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            value = a
+            if st["scheme"] != UPWIND:
+                b = cell_value(y, tables, q, p, end_cell(tables, p, right, 1))
+                c = cell_value(y, tables, q, p, end_cell(tables, p, right, 2))
+                near, far = a - b, b - c if pipes[p]["cells"] > 2 else a - b
+                slope = limited(limiter, near, far)
+                if slope != 0.0:
+                    value = bounded(a + 0.5 * slope, scalar)
+            out[at + 2 * (q * pipes.size + p) + right] = value
+
+
+@njit(forceinline=True)
+def end_conductance(y, tables, q, p, right):
+    """g = 2 D m / dx of an end of pipe p [kg/s]."""
+    scalar, pipe = tables[I_SCALARS][q], tables[I_PIPES][p]
+    if scalar["diffusivity"] == 0.0:
+        return 0.0
+    return 2.0 * scalar["diffusivity"] * cell_mass(y, tables, p, end_cell(tables, p, right, 0)) / pipe["dx"]
+
+
+@njit
+def arrivals(y, out, tables, q, amount, weight, beside, count):
+    """What pipes bring to every node, and with what weight; sum and number of the values beside it."""
+    pipes, edge = tables[I_PIPES], tables[I_LAYOUT][0]["edge"]
+    for i in range(amount.size):
+        amount[i] = weight[i] = beside[i] = count[i] = 0.0
+    for p in range(pipes.size):
+        for right in range(2):
+            node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
+            flow = end_flow(out, tables, p, right) * (1.0 if right == 1 else -1.0)
+            cell = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            g = end_conductance(y, tables, q, p, right)
+            amount[node] += g * cell
+            weight[node] += g
+            beside[node] += cell
+            count[node] += 1.0
+            if flow > 0.0:
+                amount[node] += flow * out[edge + 2 * (q * pipes.size + p) + right]
+                weight[node] += flow
+
+
+@njit(forceinline=True)
+def given_value(t, tables, q, i):
+    """Value of what flows in from node i."""
+    scalar = tables[I_SCALARS][q]
+    place = tables[I_INTEGERS][scalar["places"] + i]
+    return schedule_value(tables, place, t) if place >= 0 else scalar["initial"]
+
+
+@njit(forceinline=True)
+def stored_value(y, tables, q, i):
+    """Value of the contents of node i; of an empty tank, what flows in where nothing is said."""
+    node, scalar = tables[I_NODES][i], tables[I_SCALARS][q]
+    mass = node["mass"] + y[node["y"]]
+    if mass <= DAMP * node["density"] * node["area"]:
+        return scalar["initial"]
+    return bounded(y[tables[I_INTEGERS][scalar["places"] + i]] / mass, scalar)
+
+
+@njit
+def start_values(t, y, out, tables, q, amount, weight, beside, count):
+    """Values of all places as far as they do not hang on other nodes."""
+    nodes, layout = tables[I_NODES], tables[I_LAYOUT][0]
+    at = layout["value"] + q * nodes.size
+    for i in range(nodes.size):
+        kind = nodes[i]["kind"]
+        if kind == FIXED:
+            out[at + i] = given_value(t, tables, q, i)
+        elif kind == TANK or kind == CHAMBER:
+            out[at + i] = stored_value(y, tables, q, i)
+        elif kind != PATCH:  # whose basin has set it
+            supply = out[layout["supply"] + i]
+            if supply > 0.0:
+                amount[i] += supply * given_value(t, tables, q, i)
+                weight[i] += supply
+            out[at + i] = beside[i] / count[i] if count[i] > 0.0 else tables[I_SCALARS][q]["initial"]
+
+
+@njit
+def mix(t, y, out, tables, q):
+    """Value of scalar q at every node; nodes without volume in the order of the flow, until nothing changes."""
+    nodes, valves, layout, scratch = tables[I_NODES], tables[I_VALVES], tables[I_LAYOUT][0], tables[I_SCRATCH]
+    n, at = nodes.size, layout["value"] + q * nodes.size
+    amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
+    arrivals(y, out, tables, q, amount, weight, total, share)
+    start_values(t, y, out, tables, q, amount, weight, total, share)
+    for _ in range(n + ROUNDS):
+        for i in range(n):
+            total[i], share[i] = amount[i], weight[i]
+        for k in range(valves.size):
+            flow = out[layout["valve"] + k]
+            giver, taker = valves[k]["from_node"], valves[k]["to_node"]
+            if flow < 0.0:
+                giver, taker = taker, giver
+            total[taker] += abs(flow) * out[at + giver]
+            share[taker] += abs(flow)
+        changed = False
+        for i in range(n):
+            if nodes[i]["kind"] == JUNCTION and share[i] > 0.0:
+                value = total[i] / share[i]
+                changed = changed or value != out[at + i]
+                out[at + i] = value
+        if not changed or valves.size == 0:
+            break
+    for i in range(n):
+        if nodes[i]["kind"] == TANK or nodes[i]["kind"] == CHAMBER:
+            mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], SHALLOW * nodes[i]["density"] * nodes[i]["area"])
+            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables[I_SCALARS][q]["decay"])
+
+
+@njit
+def exchange(t, y, dydt, out, tables, q):
+    """Amounts of scalar q through the ends of pipes and into nodes, rates of what stores, and the ledger."""
+    nodes, pipes, valves, layout = tables[I_NODES], tables[I_PIPES], tables[I_VALVES], tables[I_LAYOUT][0]
+    scalar, n = tables[I_SCALARS][q], nodes.size
+    value, brought, gain = layout["value"] + q * n, layout["brought"] + q * n, layout["gain"] + q * (n + 1)
+    for i in range(n):
+        out[brought + i] = 0.0
+    for p in range(pipes.size):
+        for right in range(2):
+            sign, at = (1.0 if right == 1 else -1.0), 2 * (q * pipes.size + p) + right
+            node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
+            flow = end_flow(out, tables, p, right)
+            cell = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
+            through = flow * (out[layout["edge"] + at] if sign * flow > 0.0 else out[value + node])
+            through += sign * end_conductance(y, tables, q, p, right) * (cell - out[value + node])
+            out[layout["carried"] + at] = through
+            out[brought + node] += sign * through
+    for k in range(valves.size):
+        i, j, flow = valves[k]["from_node"], valves[k]["to_node"], out[layout["valve"] + k]
+        amount = flow * (out[value + i] if flow > 0.0 else out[value + j])
+        out[brought + i] -= amount
+        out[brought + j] += amount
+    for i in range(n):
+        kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
+        if kind == FIXED:
+            out[gain + i] = -out[brought + i]
+        elif kind == JUNCTION and supply > 0.0:
+            out[gain + i] = supply * given_value(t, tables, q, i)
+        else:
+            out[gain + i] = supply * out[value + i]
+        if (kind == TANK or kind == CHAMBER) and dydt.size > 0:
+            at = tables[I_INTEGERS][scalar["places"] + i]
+            fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
+            dydt[at] = out[brought + i] + out[gain + i] - fades
+            out[gain + n] -= fades

@@ -1,0 +1,133 @@
+"""Sides of cells of any mesh: how their arrays lie, slopes by least squares, and their limiter. Knows no physics.
+
+A cell has `slots` sides, three or four. Cells stand in blocks of BLOCK, the last one filled up. Every cell gathers what
+lies beyond its sides and settles its own rates; both cells of a face find the same flux to the bit, so nothing is lost.
+What a cell has not (a triangle among quadrilaterals) is a side of no length to itself.
+
+What is found of cells and their sides on the way lives in a ring of the last `ring` blocks, so that it stays in a near
+cache: cell i of block j at (j BLOCK + i) modulo ring BLOCK, its side k at ((4 j + k) BLOCK + i) modulo 4 ring BLOCK.
+Block j is settled once the sides of blocks before need[j] are known, and these once the cells before need[] of theirs.
+Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler sees that they are apart.
+
+integers : int64[:]  slots, cells, faces, boundary faces, ring; by block, side and row of BLOCK: places of cell and side
+           beyond (on the boundary its own); need[blocks]; of the boundary in order of sides: side not taken modulo,
+           number; by block and side: face (~f where its normal points inwards)
+floats : float64[:]  by block, side and row of BLOCK: outward normal, length / area, from centre to the side's middle,
+         weights of its difference in the gradient; of the boundary in order of sides: outward normal; of faces: length;
+         by block, side and row again: 1 / area, 1 / distance to the cell beyond along the normal, the normal less that
+         distance's direction
+"""
+
+from fvsolve.jit import njit
+
+CELL, SIDE, INDICES = 0, 1, 2
+NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
+SHARE, GAP, LEAN_X, LEAN_Y, DISTANCES = range(5)
+HEAD = 5
+BLOCK = 128  # cells whose geometry and neighbours stay in the nearest cache
+TINY = 1e-300
+HUGE = 1e300
+ALMOST = 1.0 - 1e-15
+
+_WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEASURES * BLOCK
+
+
+@njit
+def blocks(integers):
+    """How many blocks the cells fill."""
+    return (integers[1] + BLOCK - 1) // BLOCK
+
+
+@njit
+def edges_before(edges, first, side):
+    """The first of the boundary's sides, from `first` on, that is not before `side`."""
+    while first < edges.size and edges[first] < side:
+        first += 1
+    return first
+
+
+@njit
+def place(side, ring):
+    """Where the ring has the cell of a side of the boundary."""
+    return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
+
+
+@njit
+def gather(values, where, out):
+    """out[i] = values[where[i]]."""
+    for i in range(BLOCK):
+        out[i] = values[where[i]]
+
+
+@njit(forceinline=True)
+def kept(most, least, top, bottom):
+    """Share of a slope that rises to `top` and falls to `bottom`, where neighbours allow `most` and `least`.
+
+    y - 4/27 y^3 of the smaller ratio up to y = 3/2, beyond it 1 (Michalak and Ollivier-Gooch 2008); a rounding less,
+    so that no value at a side falls below the least or above the greatest around.
+    """
+    rises = most * bottom > least * top  # most / top < least / bottom
+    y = (most if rises else -least) / ((top if rises else -bottom) + TINY)
+    y = y if y < 1.5 else 1.5
+    return y * (ALMOST - (4.0 / 27.0) * y * y)
+
+
+@njit
+def sides_of_three(p, most_rise, beyond, geo, out):
+    """Limited values at three sides of a block of cells, from those beyond."""
+    for i in range(BLOCK):
+        here = p[i]
+        a, b, c = beyond[i] - here, beyond[BLOCK + i] - here, beyond[2 * BLOCK + i] - here
+        gx = geo[_WX + i] * a + geo[_SIDE + _WX + i] * b + geo[2 * _SIDE + _WX + i] * c
+        gy = geo[_WY + i] * a + geo[_SIDE + _WY + i] * b + geo[2 * _SIDE + _WY + i] * c
+        r = gx * geo[_DX + i] + gy * geo[_DY + i]
+        s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
+        t = -(r + s)  # the middles of a triangle's sides have its centre
+        most, least = min(max(max(a, b), max(c, 0.0)), most_rise[i]), min(min(a, b), min(c, 0.0))
+        keep = kept(most, least, max(max(r, s), max(t, 0.0)), min(min(r, s), min(t, 0.0)))
+        out[i], out[BLOCK + i], out[2 * BLOCK + i] = here + keep * r, here + keep * s, here + keep * t
+
+
+@njit
+def sides_of_four(p, most_rise, beyond, geo, out):
+    """The same at four sides; opposite ones of a rectangle first, so that mirrored cells find mirrored sums."""
+    for i in range(BLOCK):
+        here = p[i]
+        a, b = beyond[i] - here, beyond[BLOCK + i] - here
+        c, d = beyond[2 * BLOCK + i] - here, beyond[3 * BLOCK + i] - here
+        gx = (geo[_WX + i] * a + geo[2 * _SIDE + _WX + i] * c) + (
+            geo[_SIDE + _WX + i] * b + geo[3 * _SIDE + _WX + i] * d
+        )
+        gy = (geo[_WY + i] * a + geo[2 * _SIDE + _WY + i] * c) + (
+            geo[_SIDE + _WY + i] * b + geo[3 * _SIDE + _WY + i] * d
+        )
+        r = gx * geo[_DX + i] + gy * geo[_DY + i]
+        s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
+        t = gx * geo[2 * _SIDE + _DX + i] + gy * geo[2 * _SIDE + _DY + i]
+        u = gx * geo[3 * _SIDE + _DX + i] + gy * geo[3 * _SIDE + _DY + i]
+        most = min(max(max(a, b), max(max(c, d), 0.0)), most_rise[i])
+        least = min(min(a, b), min(min(c, d), 0.0))
+        top, bottom = max(max(r, s), max(max(t, u), 0.0)), min(min(r, s), min(min(t, u), 0.0))
+        keep = kept(most, least, top, bottom)
+        out[i], out[BLOCK + i] = here + keep * r, here + keep * s
+        out[2 * BLOCK + i], out[3 * BLOCK + i] = here + keep * t, here + keep * u
+
+
+@njit
+def put_sides(j, floats, integers, values, most_rise, shown, edges, scratch, sides):
+    """Limited values of block j at its sides.
+
+    values : float64[ring BLOCK]; most_rise : float64[BLOCK]; scratch : float64[4 BLOCK]; sides : float64[4 ring BLOCK]
+    shown : float64[:]  what the boundary shows at its sides `edges`, int64[:], of this block
+    """
+    slots, ring = integers[0], integers[4]
+    for k in range(slots):
+        gather(values, integers[HEAD + ((j * slots + k) * INDICES + CELL) * BLOCK :], scratch[k * BLOCK :])
+    for q in range(edges.size):
+        scratch[edges[q] % (4 * BLOCK)] = shown[q]
+    at = (j % ring) * BLOCK
+    p, geo, out = values[at:], floats[j * slots * MEASURES * BLOCK :], sides[4 * at :]
+    if slots == 3:
+        sides_of_three(p, most_rise, scratch, geo, out)
+    else:
+        sides_of_four(p, most_rise, scratch, geo, out)

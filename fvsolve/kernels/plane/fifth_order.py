@@ -1,0 +1,181 @@
+"""Fifth order over a grid, as what upwind rates lack of it. Knows rows of cells and faces; knows no depth.
+
+Linear (upwind5) or WENO-Z values (Borges et al. 2008), written in differences, so that what is uniform stays so. The
+mean of a product over a face is the product of means, and 1/12 and 1/180 of the products of the first and second
+Legendre coefficients along it. What passes a face beyond the upwind flux is an excess, that `bound` may cut.
+"""
+
+from fvsolve.jit import inner, njit
+from fvsolve.kernels.records import WENO5
+
+SMALL = 1e-30  # against a division by zero between squares of differences
+GHOSTS = 3
+NARROW = 5  # cells below which values beyond a side are those of its last cells
+
+
+@njit
+def beyond(known, o, a, b, c, d, e):
+    """Means of the two cells beyond a side, from the polynomial of degree 4 that fits those inside, a the nearest.
+
+    Where it is known, o at the side takes the place of e.
+    """
+    if known:
+        first = 5.0 * o - 77.0 / 12.0 * a + 43.0 / 12.0 * b - 17.0 / 12.0 * c + 0.25 * d
+        return first, 25.0 * o - 505.0 / 12.0 * a + 335.0 / 12.0 * b - 145.0 / 12.0 * c + 2.25 * d
+    return 5.0 * a - 10.0 * b + 10.0 * c - 5.0 * d + e, 15.0 * a - 40.0 * b + 45.0 * c - 24.0 * d + 5.0 * e
+
+
+@njit
+def lean_linear(p, q, r, s):
+    """The value after a cell less its own, from the differences between it and two cells on either side."""
+    return (24.0 * r + 11.0 * q - 2.0 * p - 3.0 * s) / 60.0
+
+
+@njit
+def lean_weno(p, q, r, s):
+    """The same by WENO-Z, all weights over one divisor."""
+    b0 = 13.0 / 12.0 * (q - p) ** 2 + 0.25 * (3.0 * q - p) ** 2 + SMALL
+    b1 = 13.0 / 12.0 * (r - q) ** 2 + 0.25 * (r + q) ** 2 + SMALL
+    b2 = 13.0 / 12.0 * (s - r) ** 2 + 0.25 * (s - 3.0 * r) ** 2 + SMALL
+    t, b0, b1, b2 = (b0 - b2) ** 2, b0 * b0, b1 * b1, b2 * b2
+    w0, w1, w2 = 0.1 * (b0 + t) * (b1 * b2), 0.6 * (b1 + t) * (b0 * b2), 0.3 * (b2 + t) * (b0 * b1)
+    return (w0 * (5.0 * q - 2.0 * p) + w1 * (q + 2.0 * r) + w2 * (4.0 * r - s)) / (6.0 * (w0 + w1 + w2))
+
+
+@njit
+def excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
+    """Values q at faces between c and d, and how much more than the upwind value's flow passes there."""
+    if scheme == WENO5:
+        for i in range(q.size):
+            forward = factor * flow[i] > 0.0
+            p, s = b[i] - a[i], g[i] - e[i]
+            m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
+            lean = lean_weno(p if forward else s, m if forward else n, r, n if forward else m)
+            q[i] = c[i] + lean if forward else d[i] - lean
+            excess[i] = flow[i] * (lean if forward else -lean)
+    else:
+        for i in range(q.size):
+            forward = factor * flow[i] > 0.0
+            p, s = b[i] - a[i], g[i] - e[i]
+            m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
+            lean = lean_linear(p if forward else s, m if forward else n, r, n if forward else m)
+            q[i] = c[i] + lean if forward else d[i] - lean
+            excess[i] = flow[i] * (lean if forward else -lean)
+
+
+@njit
+def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
+    """Values in v, float64[ny + 6, nx + 6] in one line, with what lies beyond the sides."""
+    wide = nx + 2 * GHOSTS
+    for j in range(ny):
+        to, fx = v[(j + GHOSTS) * wide :], flow_x[j * (nx + 1) :]
+        inner, row = to[GHOSTS:], c[j * nx :]
+        for i in range(nx):
+            inner[i] = row[i]
+        to[2], to[1] = ghosts(nx, factor * fx[0] > 0.0, outside[j], to, GHOSTS, 1)
+        to[nx + 3], to[nx + 4] = ghosts(nx, factor * fx[nx] < 0.0, outside[ny + j], to, nx + 2, -1)
+        to[0], to[nx + 5] = to[1], to[nx + 4]
+    south, north, last = outside[2 * ny :], outside[2 * ny + nx :], ny * nx
+    for i in range(nx):
+        at, end = GHOSTS * wide + GHOSTS + i, (ny + 2) * wide + GHOSTS + i
+        low, lower = ghosts(ny, factor * flow_y[i] > 0.0, south[i], v, at, wide)
+        high, higher = ghosts(ny, factor * flow_y[last + i] < 0.0, north[i], v, end, -wide)
+        v[at - wide], v[at - 2 * wide], v[at - 3 * wide] = low, lower, lower
+        v[end + wide], v[end + 2 * wide], v[end + 3 * wide] = high, higher, higher
+
+
+@njit
+def ghosts(n, known, o, v, at, step):
+    """Both values of `beyond` for the cells v[at], v[at + step], ... inward."""
+    if n < NARROW:
+        return (o, o) if known else (v[at], v[at])
+    return beyond(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
+
+
+@inner
+def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
+    """Add what a mean of products has more than the product of means, from five faces in line along the side."""
+    for i in range(excess.size):
+        f1 = (82.0 * (fd[i] - fb[i]) - 11.0 * (fe[i] - fa[i])) / 120.0
+        q1 = (82.0 * (qd[i] - qb[i]) - 11.0 * (qe[i] - qa[i])) / 120.0
+        f2 = 0.5 * ((fb[i] + fd[i]) - 2.0 * fc[i])
+        q2 = 0.5 * ((qb[i] + qd[i]) - 2.0 * qc[i])
+        excess[i] += f1 * q1 / 12.0 + f2 * q2 / 180.0
+
+
+@njit
+def extend(v, wide, rows):
+    """Fill the two rows before and after rows 2 .. of v by extrapolation."""
+    first, last = 2 * wide, (rows + 1) * wide
+    for i in range(wide):
+        v[wide + i], v[i] = ghosts(rows, False, 0.0, v, first + i, wide)
+        v[last + wide + i], v[last + 2 * wide + i] = ghosts(rows, False, 0.0, v, last + i, -wide)
+
+
+@njit
+def pad_line(v, n, to):
+    """Fill to, float64[n + 4], with v and two values beyond either end."""
+    middle = to[2:]
+    for i in range(n):
+        middle[i] = v[i]
+    to[1], to[0] = ghosts(n, False, 0.0, to, 2, 1)
+    to[n + 2], to[n + 3] = ghosts(n, False, 0.0, to, n + 1, -1)
+
+
+@njit
+def grid_excesses_work(nx, ny):
+    """Floats that `grid_excesses` works in."""
+    return (nx + 6) * (ny + 6) + 2 * (nx + 1) * (ny + 4) + nx * (ny + 1) + 2 * (nx + 4)
+
+
+@njit
+def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, ay):
+    """What passes the faces beyond the flux of upwind, in ax as flow_x and ay as flow_y."""
+    wide, m = nx + 2 * GHOSTS, nx + 1
+    mx, my = m * (ny + 4), nx * (ny + 1)
+    v, rest = work[: wide * (ny + 6)], work[wide * (ny + 6) :]
+    fx, qx, rest = rest[:mx], rest[mx : 2 * mx], rest[2 * mx :]
+    qy, f, q = rest[:my], rest[my : my + nx + 4], rest[my + nx + 4 :]
+    pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v)
+    for j in range(ny):
+        p, qj, a = v[(j + GHOSTS) * wide :], qx[(j + 2) * m : (j + 3) * m], ax[j * m : (j + 1) * m]
+        fj, flow = fx[(j + 2) * m :], flow_x[j * m :]
+        for i in range(m):
+            fj[i] = flow[i]
+        excesses(scheme, factor, flow, p, p[1:], p[2:], p[3:], p[4:], p[5:], qj, a)
+        west, east = factor * flow[0], factor * flow[nx]
+        if west >= 0.0:
+            qj[0], a[0] = outside[j] if west > 0.0 else p[GHOSTS], 0.0
+        if east <= 0.0:
+            qj[nx], a[nx] = outside[ny + j] if east < 0.0 else p[nx + 2], 0.0
+    for j in range(ny + 1):
+        p, qj, a = v[j * wide + GHOSTS :], qy[j * nx : (j + 1) * nx], ay[j * nx : (j + 1) * nx]
+        fy, b, d, e = flow_y[j * nx :], p[wide:], p[3 * wide :], p[4 * wide :]
+        excesses(scheme, factor, fy, p, b, p[2 * wide :], d, e, p[5 * wide :], qj, a)
+        if j == 0 or j == ny:
+            side, turn = (outside[2 * ny :], 1.0) if j == 0 else (outside[2 * ny + nx :], -1.0)
+            own = d if j == 0 else p[2 * wide :]
+            for i in range(nx):
+                come = turn * factor * fy[i]
+                if come >= 0.0:
+                    qj[i], a[i] = side[i] if come > 0.0 else own[i], 0.0
+    extend(fx, m, ny)
+    extend(qx, m, ny)
+    for j in range(ny):
+        r, o = fx[j * m :], qx[j * m :]
+        fb, fc, fd, fe, qb, qc = r[m:], r[2 * m :], r[3 * m :], r[4 * m :], o[m:], o[2 * m :]
+        add_products(r, fb, fc, fd, fe, o, qb, qc, o[3 * m :], o[4 * m :], ax[j * m : (j + 1) * m])
+    for j in range(ny + 1):
+        pad_line(flow_y[j * nx :], nx, f)
+        pad_line(qy[j * nx :], nx, q)
+        add_products(f, f[1:], f[2:], f[3:], f[4:], q, q[1:], q[2:], q[3:], q[4:], ay[j * nx : (j + 1) * nx])
+
+
+@njit
+def settle_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
+    """Add to the rates of all cells what their faces' excesses bring."""
+    for j in range(ny):
+        scale, to = factor * ky[j], rate[j * nx : (j + 1) * nx]
+        aw, ae, south, north = ax[j * (nx + 1) :], ax[j * (nx + 1) + 1 :], ay[j * nx :], ay[(j + 1) * nx :]
+        for i in range(nx):
+            to[i] += (scale * kx[i]) * ((aw[i] - ae[i]) + (south[i] - north[i]))

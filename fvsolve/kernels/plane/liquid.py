@@ -1,0 +1,233 @@
+"""Pressure waves of a liquid on a grid, law `linear`. Knows rows of cells and sides; knows no patch and no network.
+
+r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], mass-flow densities m [kg/(m2 s)], pressure c^2 r.
+Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are carried by their own sides, which is Godunov's
+flux; the system is linear, so that one direction after the other has the full order of the scheme. A row of cells is
+read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
+"""
+
+from fvsolve.jit import inner, njit
+from fvsolve.kernels.ends import entering_cells, leaving_cells
+from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.reconstruction import value_muscl, value_weno5
+from fvsolve.kernels.records import LINEAR, MINMOD, MUSCL, UPWIND, VAN_LEER, WENO5
+
+RING = 8  # rows of waves that are kept: six that a row of faces looks at, and room for all three beyond a side
+BEYOND = 3  # cells beyond a side
+EDGE = 5  # cells that a side looks at
+NEAR = BEYOND + EDGE
+SPARE = 2 * NEAR + 2 * EDGE + BEYOND  # floats that a side works in
+
+
+@njit
+def value_upwind5(a, b, c, d, e):
+    """Linear fifth-order value at the face after c."""
+    return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) * (1.0 / 60.0)
+
+
+@njit
+def faces(scheme, limiter, small, a, b, c, d, e, f):
+    """Values at faces after cells c, from two cells before and two behind; one loop a scheme and limiter."""
+    if scheme == UPWIND:
+        for i in range(f.size):
+            f[i] = c[i]
+    elif scheme == LINEAR:
+        for i in range(f.size):
+            f[i] = value_upwind5(a[i], b[i], c[i], d[i], e[i])
+    elif scheme == WENO5:
+        for i in range(f.size):
+            f[i] = value_weno5(a[i], b[i], c[i], d[i], e[i], small)
+    elif limiter == MINMOD:
+        for i in range(f.size):
+            f[i] = c[i] + 0.5 * slope_minmod(c[i] - b[i], d[i] - c[i])
+    elif limiter == VAN_LEER:
+        for i in range(f.size):
+            f[i] = c[i] + 0.5 * slope_van_leer(c[i] - b[i], d[i] - c[i])
+    else:
+        for i in range(f.size):
+            f[i] = c[i] + 0.5 * slope_monotonized_central(c[i] - b[i], d[i] - c[i])
+
+
+@njit
+def bears(scheme, n, sides):
+    """The scheme that a direction of n cells bears: open sides want five for the fifth order."""
+    return MUSCL if sides > 0 and n < EDGE and (scheme == LINEAR or scheme == WENO5) else scheme
+
+
+@njit
+def fold(j, n):
+    """Cell seen at j between mirrors at 0 and n."""
+    q = j % (2 * n)
+    return q if q < n else 2 * n - 1 - q
+
+
+@njit
+def image(j, n):
+    """Whether that cell is seen the wrong way round."""
+    return j % (2 * n) >= n
+
+
+@inner
+def mirror(n, forward, backward):
+    """Fill three values beyond either end of [3 : n + 3] of two waves: each becomes the other."""
+    for k in range(BEYOND):
+        forward[2 - k], backward[2 - k] = backward[3 + k], forward[3 + k]
+        forward[n + 3 + k], backward[n + 3 + k] = backward[n + 2 - k], forward[n + 2 - k]
+
+
+@njit
+def close_side(scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
+    """Three values beyond a side of n cells, at `first`, `first + step`, ..., which sends `reflect` of a wave back.
+
+    At 1 and -1 they are the mirror's; else the wave that leaves goes on as a polynomial, and the one that enters has
+    its own value at the side for a datum, as at the ends of pipes.
+    """
+    near_in, near_out, ghosts = spare[:EDGE], spare[EDGE : 2 * EDGE], spare[2 * EDGE : 2 * EDGE + BEYOND]
+    for k in range(EDGE):
+        at = first + step * min(k, n - 1)
+        near_in[k], near_out[k] = entering[at], leaving[at]
+    if abs(reflect) == 1.0 and n >= BEYOND:
+        for k in range(BEYOND):
+            at = first - step * (k + 1)
+            entering[at], leaving[at] = reflect * near_out[k], reflect * near_in[k]
+        return
+    degree = 0 if scheme == UPWIND else 4
+    a, b, c = near_out[2], near_out[1], near_out[0]
+    leaving_cells(near_out, n, scheme, degree, limiter, small, ghosts)
+    for k in range(BEYOND):
+        leaving[first - step * (k + 1)] = ghosts[k]
+    datum = c
+    if scheme == LINEAR:
+        datum = value_upwind5(a, b, c, ghosts[0], ghosts[1])
+    elif scheme == WENO5:
+        datum = value_weno5(a, b, c, ghosts[0], ghosts[1], small)
+    elif scheme == MUSCL:
+        datum = value_muscl(limiter, b, c, ghosts[0])
+    entering_cells(near_in, n, scheme, degree, reflect * datum, small, ghosts)
+    for k in range(BEYOND):
+        entering[first - step * (k + 1)] = ghosts[k]
+
+
+@njit
+def close_row(scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
+    """Close the southern or northern side of n rows of waves, in slots of a ring; `first` is the row next to it."""
+    near_in, near_out, rest = spare[:NEAR], spare[NEAR : 2 * NEAR], spare[2 * NEAR :]
+    wide = reflect.size
+    for i in range(wide):
+        for k in range(min(n, EDGE)):
+            at = ((first + step * k) % RING) * wide + i
+            near_in[BEYOND + k], near_out[BEYOND + k] = entering[at], leaving[at]
+        close_side(scheme, limiter, small, reflect[i], n, near_in, near_out, BEYOND, 1, rest)
+        for k in range(BEYOND):
+            at = ((first - step * (k + 1)) % RING) * wide + i
+            entering[at], leaving[at] = near_in[BEYOND - 1 - k], near_out[BEYOND - 1 - k]
+
+
+@inner
+def send_back(reflect, leaving, entering):
+    """What enters at a side's faces is what leaves there, times `reflect`."""
+    for i in range(entering.size):
+        entering[i] = reflect[i] * leaving[i]
+
+
+@inner
+def put_waves(half, r, m, forward, backward):
+    """Both waves of a row of cells; half : c / 2."""
+    for i in range(r.size):
+        a, b = half * r[i], 0.5 * m[i]
+        forward[i], backward[i] = a + b, a - b
+
+
+@inner
+def settle_row(c, k, forward, backward, rate_r, rate_m, rate_t):
+    """Rates of a row of cells from faces i and i + 1."""
+    f, b = forward[1:], backward[1:]
+    for i in range(rate_r.size):
+        rate_r[i] = k[i] * ((forward[i] - backward[i]) - (f[i] - b[i]))
+        rate_m[i] = c * k[i] * ((forward[i] + backward[i]) - (f[i] + b[i]))
+        rate_t[i] = 0.0
+
+
+@inner
+def settle_column(c, k, f0, b0, f1, b1, rate_r, rate_m):
+    """The same, added, of a row of cells between two rows of faces."""
+    ck = c * k
+    for i in range(rate_r.size):
+        rate_r[i] += k * ((f0[i] - b0[i]) - (f1[i] - b1[i]))
+        rate_m[i] += ck * ((f0[i] + b0[i]) - (f1[i] + b1[i]))
+
+
+@njit
+def steepest(kx, ky):
+    """Greatest sum of 1/width and 1/height over the cells [1/m]."""
+    x, y = 0.0, 0.0
+    for i in range(kx.size):
+        x = max(x, kx[i])
+    for j in range(ky.size):
+        y = max(y, ky[j])
+    return x + y
+
+
+@njit
+def work_size(nx, ny):
+    """Floats that `grid_rates` works in."""
+    return (2 * RING + 4) * nx + 2 * (nx + 2 * BEYOND) + 2 * (nx + 1) + SPARE
+
+
+@njit
+def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, work, rate_r, rate_x, rate_y):
+    """Rates of all cells; returns the greatest c (kx + ky) [1/s].
+
+    c : wave speed [m/s]; small : a flow density too small to mean anything, squared [kg2/(m4 s2)]
+    kx, ky : float64[nx], float64[ny]  1/width of columns, 1/height of rows [1/m]
+    reflect : float64[2 (nx + ny)]  share of a wave that a side sends back: west, east, south, north; empty: walls
+    work : float64[work_size(nx, ny)]
+    """
+    wide, f = nx + 2 * BEYOND, nx + 1
+    up, down, work = work[: RING * nx], work[RING * nx : 2 * RING * nx], work[2 * RING * nx :]
+    between, work = work[: 4 * nx], work[4 * nx :]
+    east, west, work = work[:wide], work[wide : 2 * wide], work[2 * wide :]
+    fe, fw, spare = work[:f], work[f : 2 * f], work[2 * f :]
+    sides, half, rows = reflect.size, 0.5 * c, 0
+    along, across = bears(scheme, nx, sides), bears(scheme, ny, sides)
+    for j in range(ny + 1):  # faces between rows j - 1 and j
+        while rows < min(max(j + BEYOND, EDGE), ny):
+            a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
+            put_waves(half, r[a:z], my[a:z], up[at : at + nx], down[at : at + nx])
+            put_waves(half, r[a:z], mx[a:z], east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
+            mirror(nx, east, west)
+            if sides > 0:
+                close_side(along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
+                close_side(along, limiter, small, reflect[ny + rows], nx, west, east, nx + BEYOND - 1, -1, spare)
+            faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
+            faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
+            if sides > 0:
+                fe[0], fw[nx] = reflect[rows] * fw[0], reflect[ny + rows] * fe[nx]
+            settle_row(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            rows += 1
+        for side in range(2):  # rows beyond the southern and the northern side
+            if (side == 0 and j > 0) or (side == 1 and j != max(ny - BEYOND + 1, 0)):
+                continue
+            for k in range(BEYOND):
+                row = ny + k if side == 1 else -1 - k
+                a, at = fold(row, ny) * nx, (row % RING) * nx
+                one, other = (down, up) if image(row, ny) else (up, down)
+                put_waves(half, r[a : a + nx], my[a : a + nx], one[at : at + nx], other[at : at + nx])
+            if sides > 0 and side == 0:
+                close_row(across, limiter, small, reflect[2 * ny : 2 * ny + nx], ny, up, down, 0, 1, spare)
+            elif sides > 0:
+                close_row(across, limiter, small, reflect[2 * ny + nx :], ny, down, up, ny - 1, -1, spare)
+        now, before = 2 * nx * (j % 2), 2 * nx * (1 - j % 2)
+        fu, fd = between[now : now + nx], between[now + nx : now + 2 * nx]
+        a, b, d = ((j - 3) % RING) * nx, ((j - 2) % RING) * nx, ((j - 1) % RING) * nx
+        e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
+        faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], fu)
+        faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], fd)
+        if sides > 0 and j == 0:
+            send_back(reflect[2 * ny : 2 * ny + nx], fd, fu)
+        elif sides > 0 and j == ny:
+            send_back(reflect[2 * ny + nx :], fu, fd)
+        if j > 0:
+            a, z = (j - 1) * nx, j * nx
+            settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])
+    return c * steepest(kx, ky)

@@ -1,0 +1,131 @@
+"""Values carried over a grid, to second order or first. Knows rows of cells and faces; knows no depth.
+
+With the flow F through a face [m2/s], its value q and the cell's own value c, a cell's rate is kx ky times the sum of
+F (q - c) that comes in, less c times the divergence of F: what is uniform changes by its value times the divergence,
+to the bit. An upwind cell's slope comes from the difference across the face and the one behind it.
+"""
+
+from fvsolve.jit import inner, njit
+from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.records import MINMOD, UPWIND, VAN_LEER
+
+
+@njit
+def value(slope, forward, b, c, d, e):
+    """The value between cells c and d, from c where the flow is forward; b and e lie beyond them."""
+    half = 0.5 * slope(c - b if forward else e - d, d - c)
+    return c + half if forward else d - half
+
+
+@njit
+def settled(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
+    """The rate of a cell from flows and values of its four faces."""
+    x = fw * (qw - own) - fe * (qe - own)
+    y = fs * (qs - own) - fn * (qn - own)
+    return scale * ((x + y) - own * ((fe - fw) + (fn - fs)))
+
+
+@inner
+def along(scheme, limiter, factor, flow, b, c, d, e, q):
+    """Values q at faces between c and d, from the side that factor times flow comes from."""
+    if scheme == UPWIND:
+        for i in range(q.size):
+            low, high = c[i], d[i]  # read before it is known which: a choice, not a branch
+            q[i] = low if factor * flow[i] > 0.0 else high
+    elif limiter == MINMOD:
+        for i in range(q.size):
+            q[i] = value(slope_minmod, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
+    elif limiter == VAN_LEER:
+        for i in range(q.size):
+            q[i] = value(slope_van_leer, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
+    else:
+        for i in range(q.size):
+            q[i] = value(slope_monotonized_central, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
+
+
+@njit
+def one_value(scheme, limiter, forward, b, c, d, e):
+    """The value at one face."""
+    if scheme == UPWIND:
+        return c if forward else d
+    if limiter == MINMOD:
+        return value(slope_minmod, forward, b, c, d, e)
+    if limiter == VAN_LEER:
+        return value(slope_van_leer, forward, b, c, d, e)
+    return value(slope_monotonized_central, forward, b, c, d, e)
+
+
+@inner
+def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
+    """Values q at the nx + 1 faces of a row of cells, the first of c; west and east are values outside.
+
+    The loop runs on into the next row, where there is one, so that it is whole vectors.
+    """
+    if nx > 3:
+        along(scheme, limiter, factor, flow[2:], c, c[1:], c[2:], c[3:], q[2 : min(c.size, nx + 3) - 1])
+    before = west if factor * flow[0] > 0.0 else c[0]
+    after = east if factor * flow[nx] < 0.0 else c[nx - 1]
+    q[0], q[nx] = before, after
+    if nx > 1:
+        q[1] = one_value(scheme, limiter, factor * flow[1] > 0.0, before, c[0], c[1], c[2] if nx > 2 else after)
+    if nx > 2:
+        forward = factor * flow[nx - 1] > 0.0
+        q[nx - 1] = one_value(scheme, limiter, forward, c[nx - 3], c[nx - 2], c[nx - 1], after)
+
+
+@inner
+def across(scheme, limiter, factor, scale, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
+    """Values qn at the northern faces of a row of cells c, and its rates; scale is factor times ky."""
+    fe, qe = fx[1:], qx[1:]
+    if scheme == UPWIND:
+        for i in range(rate.size):
+            low, high = c[i], d[i]
+            q = low if factor * fn[i] > 0.0 else high
+            qn[i] = q
+            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+    elif limiter == MINMOD:
+        for i in range(rate.size):
+            q = value(slope_minmod, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
+            qn[i] = q
+            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+    elif limiter == VAN_LEER:
+        for i in range(rate.size):
+            q = value(slope_van_leer, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
+            qn[i] = q
+            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+    else:
+        for i in range(rate.size):
+            q = value(slope_monotonized_central, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
+            qn[i] = q
+            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+
+
+@njit
+def second_order_work(nx, ny):
+    """Floats that `second_order_rates` works in."""
+    return 6 * nx + 4
+
+
+@njit
+def second_order_rates(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, work, rate):
+    """Rates of cells of values c by upwind or muscl; arguments as of `grid_advection`."""
+    below, above, rows, rest = work[:nx], work[nx : 2 * nx], work[2 * nx : 4 * nx], work[4 * nx :]
+    last = (ny - 1) * nx
+    for i in range(nx):
+        below[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
+        above[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
+        rows[i] = below[i]
+    for j in range(-1, ny):  # values along a row are had a row ahead: they are in memory when they are read
+        if j < ny - 1:
+            k = j + 1
+            fx, qx = flow_x[k * (nx + 1) :], rest[(k % 2) * (nx + 2) :]
+            row_values(scheme, limiter, nx, factor, fx, c[k * nx :], outside[k], outside[ny + k], qx)
+        if j >= 0:
+            a, z = j * nx, (j + 1) * nx
+            b = c[a - nx : a] if j > 0 else below
+            d = c[z : z + nx] if j < ny - 1 else above
+            e = c[z + nx : z + 2 * nx] if j < ny - 2 else above
+            fx, qx = flow_x[j * (nx + 1) :], rest[(j % 2) * (nx + 2) :]
+            qs, qn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx :]
+            fs, fn = flow_y[a:], flow_y[z:]
+            across(scheme, limiter, factor, factor * ky[j], b, c[a:], d, e, fx, qx, fs, qs, fn, kx, qn, rate[a:z])

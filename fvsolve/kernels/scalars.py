@@ -1,0 +1,188 @@
+"""Scalars in pipes, carried by the very flow that the mass equation uses. Knows cells and ends; mixes no node.
+
+State of a cell: amount per length s = m c, m the mass per length, s_t + (M c - D m c_x)_x = -decay (s - m ambient).
+Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves: so a uniform c
+stays uniform.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, limited, mix
+from fvsolve.kernels.records import (
+    I_FLOATS,
+    I_LAYOUT,
+    I_NODES,
+    I_PIPES,
+    I_PROBES,
+    I_PROFILE,
+    I_SCALARS,
+    I_SCRATCH,
+    I_SETTINGS,
+    MINMOD,
+    NODE_SCALAR,
+    PIPE_SCALAR,
+    RATE,
+    UPWIND,
+    VAN_LEER,
+)
+
+
+@njit
+def masses(base, slowness, r, l, m):
+    """m[i], mass per length of cells [kg/m]: the profile's, and (r + l) / speed."""
+    for i in range(m.size):
+        m[i] = base[i] + slowness * (r[i] + l[i])
+
+
+@njit
+def face_flows(first, last, slowness, dr, dl, flow):
+    """Mass flow at all faces [kg/s], from that at the `from` end on; slowness = dx / speed."""
+    flow[0] = first
+    for i in range(dr.size - 1):
+        flow[i + 1] = flow[i] - slowness * (dr[i] + dl[i])
+    flow[dr.size] = last
+
+
+@njit
+def values(s, m, c):
+    """c = s / m."""
+    for i in range(c.size):
+        c[i] = s[i] / m[i]
+
+
+@njit
+def inner_slopes(limiter, c, d):
+    """Limited differences across all cells but those at the ends."""
+    n = c.size - 2
+    here, next, slope = c[1:], c[2:], d[1:]
+    if limiter == MINMOD:
+        for i in range(n):
+            slope[i] = slope_minmod(here[i] - c[i], next[i] - here[i])
+    elif limiter == VAN_LEER:
+        for i in range(n):
+            slope[i] = slope_van_leer(here[i] - c[i], next[i] - here[i])
+    else:
+        for i in range(n):
+            slope[i] = slope_monotonized_central(here[i] - c[i], next[i] - here[i])
+
+
+@njit
+def inner_fluxes(conductance, c, d, m, flow, f):
+    """f[i] through the face after cell i: the value on the side that the flow comes from, less D m c_x.
+
+    conductance : D / (2 dx), times the sum of both masses [kg/s]
+    """
+    next, bend, mass, through = c[1:], d[1:], m[1:], flow[1:]
+    for i in range(c.size - 1):
+        high, low = c[i] + 0.5 * d[i], next[i] - 0.5 * bend[i]
+        carried = through[i] * (high if through[i] > 0.0 else low)
+        f[i] = carried - conductance * (m[i] + mass[i]) * (next[i] - c[i])
+
+
+@njit
+def amount_rates(k, first, last, decay, ambient, s, m, f, ds):
+    """ds from fluxes f between cells and those at both ends; returns the sum of what decays."""
+    n, lost = s.size, 0.0
+    before = first
+    for i in range(n):
+        after = f[i] if i < n - 1 else last
+        fades = decay * (s[i] - ambient * m[i])
+        ds[i] = k * (before - after) - fades
+        lost += fades
+        before = after
+    return lost
+
+
+@njit
+def greatest_velocity(m, flow):
+    """Greatest |M| / m of faces and the lightest cell [m/s]."""
+    least, most = m[0], abs(flow[m.size])
+    for i in range(m.size):
+        least, most = min(least, m[i]), max(most, abs(flow[i]))
+    return most / least
+
+
+@njit(forceinline=True)
+def carry_in_pipe(y, dydt, out, tables, p):
+    """Rates of all scalars in pipe p; what decays goes to the ledger, the greatest rate to out[RATE]."""
+    st, layout, pipe, scratch = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES][p], tables[I_SCRATCH]
+    n, o, dx = pipe["cells"], pipe["y"], pipe["dx"]
+    base, r, l = tables[I_PROFILE][pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
+    m, flow, c, d, f = (
+        scratch[:n], scratch[n : 2 * n + 1], scratch[2 * n + 1 : 3 * n + 1], scratch[3 * n + 1 : 4 * n + 1],
+        scratch[4 * n + 1 : 5 * n + 1],
+    )  # fmt: skip
+    masses(base, 1.0 / pipe["speed"], r, l, m)
+    first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
+    face_flows(first, last, dx / pipe["speed"], dydt[o : o + n], dydt[o + n : o + 2 * n], flow)
+    quick = greatest_velocity(m, flow) / dx
+    nodes, limiter = tables[I_NODES].size, st["limiter"]
+    for q in range(tables[I_SCALARS].size):
+        scalar = tables[I_SCALARS][q]
+        at, ends = scalar["y"] + pipe["cell"], 2 * (q * tables[I_PIPES].size + p)
+        s, ds = y[at : at + n], dydt[at : at + n]
+        values(s, m, c)
+        for i in range(n):
+            d[i] = 0.0
+        if st["scheme"] != UPWIND:
+            inner_slopes(limiter, c, d)
+            for right in range(2):
+                near, beside = (n - 1, n - 2) if right == 1 else (0, 1)
+                sign = 1.0 if right == 1 else -1.0
+                if sign * (last if right == 1 else first) > 0.0:  # leaves: as far as its value at the end says
+                    d[near] = 2.0 * sign * (out[layout["edge"] + ends + right] - c[near])
+                elif n > 1:
+                    node = pipe["to_node"] if right == 1 else pipe["from_node"]
+                    datum = out[layout["value"] + q * nodes + node]
+                    d[near] = sign * limited(limiter, 2.0 * (datum - c[near]), c[near] - c[beside])
+        inner_fluxes(0.5 * scalar["diffusivity"] / dx, c, d, m, flow, f)
+        lost = amount_rates(
+            1.0 / dx, out[layout["carried"] + ends], out[layout["carried"] + ends + 1], scalar["decay"],
+            scalar["ambient"], s, m, f, ds,
+        )  # fmt: skip
+        out[layout["gain"] + q * (nodes + 1) + nodes] -= dx * lost
+        rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * scalar["decay"]
+        out[RATE] = max(out[RATE], rate)
+
+
+@njit
+def carry_scalars(t, y, dydt, out, handle):
+    """Values at all nodes, what links bring there, and rates of all amounts, where rates are asked for."""
+    tables = open_tables(handle)
+    gain, nodes = tables[I_LAYOUT][0]["gain"], tables[I_NODES].size
+    for q in range(tables[I_SCALARS].size):
+        out[gain + q * (nodes + 1) + nodes] = 0.0
+        leaving_values(y, out, tables, q)
+        mix(t, y, out, tables, q)
+        exchange(t, y, dydt, out, tables, q)
+    if dydt.size > 0:
+        for p in range(tables[I_PIPES].size):
+            carry_in_pipe(y, dydt, out, tables, p)
+
+
+@njit
+def observe_scalars(t, y, out, handle, values):
+    """values[k] of every probe of a scalar: at a node, at a pipe's end, or between the centres of two cells."""
+    tables = open_tables(handle)
+    layout, pipes, nodes = tables[I_LAYOUT][0], tables[I_PIPES], tables[I_NODES].size
+    for k in range(tables[I_PROBES].size):
+        probe = tables[I_PROBES][k]
+        q, i = probe["scalar"], probe["index"]
+        if probe["kind"] == NODE_SCALAR:
+            values[k] = out[layout["value"] + q * nodes + i]
+        elif probe["kind"] == PIPE_SCALAR and probe["side"] != 0:
+            right = 1 if probe["side"] > 0 else 0
+            if probe["side"] * end_flow(out, tables, i, right) < 0.0:
+                node = pipes[i]["to_node"] if right == 1 else pipes[i]["from_node"]
+                values[k] = out[layout["value"] + q * nodes + node]
+            else:
+                values[k] = out[layout["edge"] + 2 * (q * pipes.size + i) + right]
+        elif probe["kind"] == PIPE_SCALAR:
+            values[k] = 0.0
+            for j in range(probe["count"]):
+                c = probe["cell"] + j
+                w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
+                m = tables[I_PROFILE][pipes[i]["center"] + c] + w / pipes[i]["speed"]
+                s = y[tables[I_SCALARS][q]["y"] + pipes[i]["cell"] + c]
+                values[k] += tables[I_FLOATS][probe["weights"] + j] * s / m

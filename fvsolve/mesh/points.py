@@ -1,0 +1,91 @@
+"""Where points lie in a plane mesh, and how they are read off its cells. Knows geometry; knows no field."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.mesh.mesh import Mesh
+
+NEAR = 1e-9  # of the mesh's extent: what lies so near its outline is inside
+CANDIDATES = 16  # cells by the distance of their centres that are tried before all are
+SUM_FIRST = 1e4  # how much more the sum of the weights counts than their point, where it lies beyond all centres
+INWARD = 1e-3  # of the way from the outline to the centre of its cell
+
+
+class Points:
+    """Finds points in a mesh."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        from scipy.spatial import cKDTree
+
+        self.mesh, self.near = mesh, NEAR * float(np.ptp(mesh.points, axis=0).max())
+        self.tree = cKDTree(mesh.centre)
+        order = np.argsort(mesh.cells, axis=None, kind="stable")
+        first = np.searchsorted(mesh.cells.ravel()[order], np.arange(len(mesh.points) + 1))
+        self.around, self.first = order // 4, first  # cells at a point: around[first[p] : first[p + 1]]
+
+    def cell(self, x: float, y: float) -> int:
+        """The number of the cell that a point lies in, on an edge the lowest; -1 outside and in holes."""
+        n = len(self.mesh.cells)
+        nearest = np.sort(self.tree.query((x, y), min(CANDIDATES, n))[1].ravel())
+        for cells in (nearest, np.arange(n)):
+            inside = self._inside(cells, x, y)
+            if inside.any():
+                return int(cells[np.argmax(inside)])
+        return -1
+
+    def _inside(self, cells: np.ndarray, x: float, y: float) -> np.ndarray:
+        corners = self.mesh.cells[cells]
+        corners = np.where(corners < 0, corners[:, :1], corners)  # a triangle's fourth side has no length
+        a = self.mesh.points[corners]
+        along = np.roll(a, -1, axis=1) - a
+        left = along[..., 0] * (y - a[..., 1]) - along[..., 1] * (x - a[..., 0])
+        return (left >= -self.near * np.hypot(along[..., 0], along[..., 1])).all(axis=1)
+
+    def nearest(self, x: float, y: float) -> tuple[float, float]:
+        """The point inside that is next to one outside."""
+        mesh = self.mesh
+        outer = slice(mesh.inner, None)
+        a, b = (mesh.points[mesh.ends[outer, k]] for k in (0, 1))
+        along, point = b - a, np.array([x, y])
+        share = np.clip(((point - a) * along).sum(1) / (along * along).sum(1), 0.0, 1.0)
+        foot = a + share[:, None] * along
+        k = int(np.argmin(np.hypot(*(foot - point).T)))
+        found = foot[k] + INWARD * (mesh.centre[mesh.left[outer][k]] - foot[k])
+        return float(found[0]), float(found[1])
+
+    def reading(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+        """Cells int64[k] and their weights float64[k], none negative, sum 1, that give a field at a point inside.
+
+        Bilinear between centres on full grids; else of the cells that share a corner with the point's own. Exact for
+        linear fields, but beyond the outermost centres, where the nearest place between centres is read.
+        """
+        grid = self.mesh.grid
+        if grid is not None and len(self.mesh.cells) == grid.nx * grid.ny:
+            (i, p), (j, q) = (_between(lines, value) for lines, value in ((grid.x, x), (grid.y, y)))
+            cells = (j[:, None] * grid.nx + i).ravel()
+            weights = np.outer(q, p).ravel()
+        else:
+            cells, weights = self._of_neighbours(self.cell(x, y), x, y)
+        kept = weights > 0.0
+        return cells[kept], weights[kept] / weights[kept].sum()
+
+    def _of_neighbours(self, cell: int, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.optimize import nnls
+
+        corners = self.mesh.cells[cell]
+        beside = np.concatenate([self.around[self.first[p] : self.first[p + 1]] for p in corners if p >= 0])
+        cells = np.array([cell, *sorted(set(beside.tolist()) - {cell})])  # its own first, which is kept where it can be
+        away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
+        weights, _ = nnls(np.vstack([np.full(cells.size, SUM_FIRST), away.T]), np.array([SUM_FIRST, 0.0, 0.0]))
+        return cells, weights
+
+
+def _between(lines: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
+    """Columns int64[2] whose centres a value lies between, and their weights; beyond the outermost its own alone."""
+    centres = 0.5 * (lines[1:] + lines[:-1])
+    k = int(np.clip(np.searchsorted(centres, value) - 1, 0, max(centres.size - 2, 0)))
+    after = min(k + 1, centres.size - 1)
+    wide = centres[after] - centres[k]
+    share = float(np.clip((value - centres[k]) / wide, 0.0, 1.0)) if wide > 0.0 else 0.0
+    return np.array([k, after]), np.array([1.0 - share, share])

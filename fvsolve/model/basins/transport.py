@@ -1,0 +1,68 @@
+"""Scalars carried by a given velocity. Knows flows through faces; knows no network."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import CaseError
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.plane.advection import grid_fastest
+from fvsolve.model.basins.basin import Basin
+from fvsolve.model.velocity import face_flows, grid_flows
+
+
+class Transport(Basin, physics="transport"):
+    """Nothing moves but what is carried; depth 1."""
+
+    def lower(self, scene, row) -> None:
+        given, mesh = self.part.velocity, self.mesh
+        flows = self.flows(scene)
+        row["thickness"], row["density"] = self.part.thickness or 1.0, self.case.properties.density
+        row["kind"], row["period"] = rec.CARRIED_GRID if self.is_grid else rec.CARRIED_FACES, given.period or 0.0
+        if self.is_grid:
+            grid = mesh.grid
+            flow_x, flow_y = grid_flows(mesh, flows)
+            row["flows"] = scene.to_plane(np.concatenate([flow_x, flow_y]))
+            kx, ky = 1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)
+            row["fastest"] = grid_fastest(
+                grid.nx, grid.ny, kx, ky, flow_x, flow_y, np.zeros(0), np.zeros(max(grid.nx, self.n))
+            )
+        else:
+            row["flows"] = scene.to_plane(flows)
+        inward = -flows[mesh.inner :]
+        if (inward != 0.0).any():
+            first = next(name for name in self.part.patches if flows[mesh.patch(name)].any())
+            row["open"] = scene.node_index[f"{self.name}.{first}"]
+
+    def flows(self, scene) -> np.ndarray:
+        """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
+        given, mesh = self.part.velocity.given, self.mesh
+        if self.part.velocity.way == "u, v":
+            u, v = (given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv")
+            return (u * mesh.normal[:, 0] + v * mesh.normal[:, 1]) * mesh.length
+        if self.part.velocity.way == "stream":
+            given = {"stream": given["stream"].at(*np.ascontiguousarray(mesh.points.T))}
+        try:
+            return face_flows(mesh, given)
+        except (ValueError, TypeError, CaseError) as error:
+            scene.fault(f"nodes.{self.name}.velocity", str(error))
+            scene.check()
+            raise
+
+    def scales(self) -> list[float]:
+        return []
+
+    def start(self) -> np.ndarray:
+        return np.zeros((0, self.n))
+
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        raise NotImplementedError(field)  # there are scalars alone
+
+    def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
+        return {}
+
+    def mass(self) -> tuple[float, np.ndarray]:
+        return 0.0, np.zeros(self.n)
+
+    def held(self) -> np.ndarray:
+        return self.row["density"] * self.row["thickness"] * self.mesh.area

@@ -1,0 +1,150 @@
+"""Scalars lowered to rows of a table: their amounts as states, their values at places, what a run makes of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+STORES = (rec.TANK, rec.CHAMBER)
+
+
+def ledger_rows(case) -> int:
+    """Rows of the stepper's ledger: supply of every node, and of every scalar the same and what decays."""
+    nodes = len(case.places)
+    return nodes + len(case.scalars) * (nodes + 1)
+
+
+def lower_scalars(scene) -> None:
+    """Fill the table of scalars, states for their amounts and schedules for their values."""
+    case, pipes, nodes = scene.case, scene.pipe_table, scene.node_table
+    scene.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
+    for row, (name, scalar) in zip(scene.scalar_table, case.scalars.items(), strict=True):
+        for key in ("diffusivity", "decay", "ambient", "initial"):
+            row[key] = getattr(scalar, key)
+        names = [f"{mesh.name}.{name}[{i}]" for mesh in scene.meshes for i in range(mesh.cells)]
+        row["y"] = scene.states(names, 1.0)
+        row["places"], places = len(scene.integers), []
+        for place, node, kind in zip(case.places, case.places.values(), nodes["kind"], strict=True):
+            given = node.scalars.get(name)
+            if kind in STORES:
+                places.append(scene.states([f"{place}.{name}"], 1.0))
+            else:
+                places.append(-1 if given is None else scene.schedules.add(given))
+        scene.integers += places
+        row["least"], row["greatest"] = bounds(case, name)
+    if len(case.scalars):
+        pipes["center"] = scene.cells + pipes["cell"]
+
+
+def bounds(case, name: str) -> tuple[float, float]:
+    """Least and greatest value of a scalar that there can be, as nothing but what is stated is mixed."""
+    scalar = case.scalars[name]
+    said = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
+    patches = [patch for basin in case.meshes for patch in case.nodes[basin].patches.values()]
+    for part in [*case.places.values(), *case.links.values(), *patches]:
+        given = getattr(part, "scalars", {}).get(name)
+        said += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
+    for basin, mesh in case.meshes.items():
+        if name in case.nodes[basin].scalars:
+            said += case.nodes[basin].scalars[name].at(*np.ascontiguousarray(mesh.centre.T)).tolist()
+    return min(said), max(said)
+
+
+def settle_scalars(scene) -> None:
+    """Masses of the profile per length, and sizes that states are measured against, once the profile is known."""
+    profile, rho = scene.tables[rec.I_PROFILE], scene.fluid.density
+    for k, row in enumerate(scene.pipe_table if len(scene.case.scalars) else ()):
+        strain = (scene.profiles[k] - scene.fluid.pressure) / (rho * row["speed"] ** 2)
+        profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
+    scale = np.array(scene.scale)
+    for row in scene.scalar_table:
+        typical = max(abs(row["least"]), abs(row["greatest"])) or 1.0
+        for pipe in scene.pipe_table:
+            at = row["y"] + pipe["cell"]
+            scale[at : at + pipe["cells"]] = typical * rho * pipe["area"]
+        for node, place in zip(scene.node_table, places_of(scene, row), strict=True):
+            if node["kind"] in STORES:
+                scale[place] = typical * max(node["mass"], scale[node["y"]])
+    scene.scale = scale.tolist()
+
+
+def places_of(scene, row) -> np.ndarray:
+    """Of a scalar at every node, where its amount or its schedule is."""
+    return np.array(scene.integers[row["places"] : row["places"] + len(scene.node_table)], dtype=int)
+
+
+def start_amounts(scene, found: np.ndarray) -> None:
+    """Amounts of all scalars at the start, into the state."""
+    case, profile = scene.case, scene.tables[rec.I_PROFILE]
+    for row, (name, scalar) in zip(scene.scalar_table, case.scalars.items(), strict=True):
+        for pipe, mesh in zip(scene.pipe_table, scene.meshes, strict=True):
+            cells = np.arange(mesh.cells)
+            value = case.links[mesh.name].scalars.get(name, scalar.initial)
+            found[row["y"] + pipe["cell"] + cells] = value * profile[pipe["center"] + cells]
+        for node, part, place in zip(scene.node_table, case.places.values(), places_of(scene, row), strict=True):
+            if node["kind"] in STORES:
+                value = part.scalars[name].first if name in part.scalars else scalar.initial
+                found[place] = value * node["mass"]
+
+
+def amounts(model) -> np.ndarray:
+    """Places of all amounts in the state."""
+    count = model.cells + int(np.isin(model.tables[rec.I_NODES]["kind"], STORES).sum())
+    return np.concatenate(
+        [np.zeros(0, dtype=int), *(row["y"] + np.arange(count) for row in model.tables[rec.I_SCALARS])]
+    )
+
+
+def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
+    """Values of all scalars in the cells of pipe k."""
+    pipe, found = model.tables[rec.I_PIPES][k], {}
+    n, o = int(pipe["cells"]), int(pipe["y"])
+    for row, name in zip(model.tables[rec.I_SCALARS], model.case.scalars, strict=True):
+        base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
+        mass = model.tables[rec.I_PROFILE][base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
+        found[name] = y[at : at + n] / mass
+    return found
+
+
+def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
+    """Values of all scalars at node i, by what the right-hand side wrote beside its rates."""
+    at, nodes = int(model.layout["value"]), len(model.node_names)
+    return {name: float(out[at + q * nodes + i]) for q, name in enumerate(model.case.scalars)}
+
+
+def amount(model, row, y: np.ndarray) -> float:
+    """Amount of a scalar in all pipes and nodes [kg, times its unit]."""
+    pipes, nodes = model.tables[rec.I_PIPES], model.tables[rec.I_NODES]
+    total = 0.0
+    for pipe in pipes:
+        at = int(row["y"] + pipe["cell"])
+        total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
+    q = int(np.flatnonzero(model.tables[rec.I_SCALARS]["places"] == row["places"])[0])
+    total += sum(float(np.sum(basin.held() * basin.amounts(y)[q])) for basin in model.basins)
+    places = model.tables[rec.I_INTEGERS][row["places"] : row["places"] + len(nodes)]
+    return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
+
+
+def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
+    """Of each scalar: stored, come in, gone out, decayed, and the remainder [kg, times its unit]."""
+    found, n = {}, len(model.node_names)
+    for q, (name, row) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
+        own = ledger[n + q * (n + 1) : n + (q + 1) * (n + 1)]
+        initial, final = amount(model, row, model.start), amount(model, row, y)
+        gained = [float(x) for x in own[:n]]
+        remainder = final - initial - float(np.sum(own))
+        moved = max(abs(initial), abs(final), float(np.sum(np.abs(own))))
+        found[name] = {
+            "initial": initial,
+            "final": final,
+            "inflow": sum(x for x in gained if x > 0),
+            "outflow": sum(-x for x in gained if x < 0),
+            "decayed": -float(own[n]),
+            "by_node": {node: x for node, x in zip(model.node_names, gained, strict=True) if x != 0.0},
+            "remainder": remainder,
+            "relative": abs(remainder) / moved if moved > 0.0 else 0.0,
+        }
+    return found

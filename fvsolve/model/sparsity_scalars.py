@@ -1,0 +1,104 @@
+"""Which states the rates of scalars can depend on: beside cells and masses, the flows that carry them. Knows indices.
+
+What decays of each scalar hangs on every cell. Its row of the ledger is left out, or no two states could be moved at
+once: under an implicit method the remainder of that scalar is then what Newton leaves, times decay and step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.scalars import STORES
+from fvsolve.model.sparsity import Pairs, ends_of, every, states
+from fvsolve.steady import union
+
+NEAR = 2  # cells that a limited value at a face reads on each side, and one more at an end
+
+
+class Carriage:
+    """Couplings of one scalar, on top of those of the model that carries it."""
+
+    def __init__(self, couplings, model, q: int) -> None:
+        self.of, self.row = couplings, model.tables[rec.I_SCALARS][q]
+        of, nodes = couplings, len(couplings.nodes)
+        self.ledger = of.size + nodes + q * (nodes + 1)
+        self.places = model.tables[rec.I_INTEGERS][self.row["places"] : self.row["places"] + nodes]
+        self.stores = np.isin(of.nodes["kind"], STORES)
+        self.wide = max(NEAR, of.reach.behind, of.reach.ahead)
+        self.through = [[] for _ in range(nodes)]  # of each node, what sets flows there, and values at ends of pipes
+        for pipe in of.pipes:
+            for right, i in enumerate(ends_of(pipe)):
+                self.through[i] += [of.sets[i], of.offered(pipe, right), *self.edge(pipe, right)]
+        for valve in of.valves:
+            i, j = ends_of(valve)
+            flow = [of.sets[i], of.sets[j], of.opens(valve)]
+            self.through[i] += flow
+            self.through[j] += flow
+        self.values = self.mixed()
+
+    def own(self, i: int) -> list:
+        """States that set the value of a node which stores."""
+        return [self.places[i], self.of.own(i)] if self.stores[i] else []
+
+    def edge(self, pipe, right: int) -> list[np.ndarray]:
+        """Amounts and waves of the cells at an end of a pipe that its value there is made of."""
+        n = int(pipe["cells"])
+        cells = np.arange(n)[::-1][: NEAR + 1] if right else np.arange(n)[: NEAR + 1]
+        return [self.row["y"] + pipe["cell"] + cells, pipe["y"] + cells, pipe["y"] + n + cells]
+
+    def mixed(self) -> list[np.ndarray]:
+        """Of each node, the states that set its value: its own, or all that flows into its group."""
+        inner, valves = self.of.inner, [ends_of(valve) for valve in self.of.valves]
+        group = union(len(inner), [(i, j) for i, j in valves if inner[i] and inner[j]])
+        enter: list[list] = [[] for _ in group]
+        for i in np.flatnonzero(inner):
+            enter[group[i]] += self.through[i]
+        for i, j in valves:
+            enter[group[i]] += self.own(j)
+            enter[group[j]] += self.own(i)
+        joined = [states(*some) for some in enter]
+        return [joined[group[i]] if inner[i] else states(*self.own(i)) for i in range(len(group))]
+
+    def pairs(self) -> Iterator[Pairs]:
+        """All couplings but those of a state with itself."""
+        brought = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
+        for valve in self.of.valves:
+            i, j = ends_of(valve)
+            brought[i].append(self.values[j])
+            brought[j].append(self.values[i])
+        for i, felt in enumerate(brought):
+            yield every(states(*([self.places[i]] if self.stores[i] else []), self.ledger + i), states(*felt))
+        for pipe in self.of.pipes:
+            yield from self.inside(pipe)
+            for right, i in enumerate(ends_of(pipe)):
+                yield every(self.edge(pipe, right)[0], states(self.values[i]))
+                yield every(self.close(pipe, right), self.read(pipe, right, i))
+
+    def inside(self, pipe) -> Iterator[Pairs]:
+        """Cells on their neighbours: amounts, masses, and the flows between them."""
+        n = int(pipe["cells"])
+        cells, at = np.arange(n), self.row["y"] + pipe["cell"]
+        for offset in range(-self.wide, self.wide + 1):
+            here = cells[(cells + offset >= 0) & (cells + offset < n)]
+            for first in (pipe["y"], pipe["y"] + n, *([at] if abs(offset) <= NEAR else [])):
+                yield at + here, first + here + offset
+
+    def close(self, pipe, right: int) -> np.ndarray:
+        """Cells whose flows the end of a pipe takes part in."""
+        cells = self.row["y"] + pipe["cell"] + np.arange(pipe["cells"])
+        return (cells[::-1] if right else cells)[: self.wide]
+
+    def read(self, pipe, right: int, i: int) -> np.ndarray:
+        """What these flows are made of beside the cells next to them."""
+        enters, leaves = self.of.sides(pipe, right)
+        reach = self.of.reach
+        return states(self.of.sets[i], self.of.offered(pipe, right), enters[: reach.entering], leaves[: reach.leaving])
+
+
+def scalar_pairs(couplings, model) -> Iterator[Pairs]:
+    """Couplings of all scalars of a model."""
+    for q in range(len(model.tables[rec.I_SCALARS])):
+        yield from Carriage(couplings, model, q).pairs()

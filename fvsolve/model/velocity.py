@@ -1,0 +1,168 @@
+"""Flows through the faces of a mesh from velocities: by name, from stream functions, from files. Knows no scalars."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import Fault, MeshError, did_you_mean, listing
+from fvsolve.mesh import Mesh
+
+EXACT_BITS = 50  # of a stream function that are kept, so that sums of its differences are exact
+
+
+def constant(x, y, u, v):
+    """The same everywhere; u, v [m/s]."""
+    return u * y - v * x
+
+
+def rotation(x, y, centre, angular_velocity):
+    """A solid body's, anticlockwise about centre [m]; angular_velocity [rad/s]."""
+    return -0.5 * angular_velocity * ((x - centre[0]) ** 2 + (y - centre[1]) ** 2)
+
+
+def swirl(x, y, speed=1.0, origin=(0.0, 0.0), size=1.0):
+    """LeVeque's (1996): psi = speed size / pi sin^2(pi x / size) sin^2(pi y / size); speed [m/s], size [m]."""
+    x, y = np.pi * (x - origin[0]) / size, np.pi * (y - origin[1]) / size
+    return speed * size / np.pi * np.sin(x) ** 2 * np.sin(y) ** 2
+
+
+def shear(x, y, rate, y0=0.0, u=0.0):
+    """Along x, u + rate (y - y0); rate [1/s], u [m/s]."""
+    return u * y + 0.5 * rate * (y - y0) ** 2
+
+
+def parabolic(x, y, speed, south, north):
+    """Along a channel between two walls at y = south, north [m]; speed [m/s] is the mean."""
+    s = (y - south) / (north - south)
+    return speed * (north - south) * s * s * (3.0 - 2.0 * s)
+
+
+def cellular(x, y, speed, width, height, origin=(0.0, 0.0)):
+    """Vortices of width by height [m] that turn against their neighbours, anticlockwise first; speed [m/s] along x."""
+    s = np.sin(np.pi * (x - origin[0]) / width) * np.sin(np.pi * (y - origin[1]) / height)
+    return speed * height / np.pi * s
+
+
+# Stream functions psi(x, y, parameters) [m2/s] with u = psi_y, v = -psi_x: a new one is a function and its name here.
+EXPRESSIONS: dict[str, Callable[..., np.ndarray]] = {
+    function.__name__: function for function in (constant, rotation, swirl, shear, parabolic, cellular)
+}
+
+
+def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
+    """float64[f]: flow through every face per depth, along its normal [m2/s].
+
+    velocity : one of {"expression": name, its parameters}, {"stream": float64[p] at the corners [m2/s]},
+    {"file": CSV with a header x, y, u, v or x, y, psi, interpolated linearly}; all but those of u and v have no
+    divergence in any cell, to the bit
+    Raises ValueError for an expression, MeshError for a file.
+    """
+    kinds = {"expression": _by_name, "stream": _by_corners, "file": _by_file}
+    given = [kind for kind in kinds if kind in velocity]
+    if len(given) != 1:
+        raise ValueError(f"velocity has {listing(velocity) or 'nothing'}; wanted one of {listing(kinds)}")
+    return kinds[given[0]](mesh, **velocity)
+
+
+def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(float64[ny (nx + 1)] east, float64[(ny + 1) nx] north): the flows of a rectangle's faces, row by row.
+
+    Raises ValueError for a mesh that is no full rectangle.
+    """
+    grid = mesh.grid
+    if grid is None or (grid.index < 0).any():
+        raise ValueError("the mesh is no full rectangle; wanted one without holes")
+    j, i = np.divmod(mesh.left, grid.nx)
+    flow_x, flow_y = np.zeros(grid.ny * (grid.nx + 1)), np.zeros((grid.ny + 1) * grid.nx)
+    for to, part, first, step in ((flow_x, 0, j * (grid.nx + 1) + i, 1), (flow_y, 1, j * grid.nx + i, grid.nx)):
+        ahead, behind = mesh.normal[:, part] > 0.5, mesh.normal[:, part] < -0.5
+        to[first[ahead] + step] = flows[ahead]
+        to[first[behind]] = -flows[behind]
+    return flow_x, flow_y
+
+
+def _by_name(mesh: Mesh, expression: str, **parameters) -> np.ndarray:
+    if expression not in EXPRESSIONS:
+        close = did_you_mean(str(expression), EXPRESSIONS)
+        raise ValueError(f'"{expression}" is no velocity{close}; there are {listing(EXPRESSIONS)}')
+    function = EXPRESSIONS[expression]
+    known = dict(list(inspect.signature(function).parameters.items())[2:])
+    for name in parameters:
+        if name not in known:
+            close = did_you_mean(name, known)
+            raise ValueError(f'velocity "{expression}" has no {name}{close}; it takes {listing(known)}')
+    missing = [name for name, p in known.items() if p.default is p.empty and name not in parameters]
+    if missing:
+        raise ValueError(f'velocity "{expression}" wants {listing(missing)} as well')
+    return _by_corners(mesh, function(mesh.points[:, 0], mesh.points[:, 1], **parameters))
+
+
+def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
+    """Differences of a stream function along faces, first rounded so that they are exact."""
+    stream = np.asarray(stream, float)
+    if stream.shape != (len(mesh.points),):
+        raise ValueError(f"stream has shape {stream.shape}; wanted a value for each of {len(mesh.points)} corners")
+    if not np.isfinite(stream).all():
+        x, y = mesh.points[np.flatnonzero(~np.isfinite(stream))[0]]
+        raise ValueError(f"the stream function is not finite at ({x:.6g}, {y:.6g}) m")
+    unit = 2.0 ** (np.frexp(np.abs(stream).max())[1] - EXACT_BITS)
+    psi = np.round(stream / unit) * unit
+    return psi[mesh.ends[:, 1]] - psi[mesh.ends[:, 0]]
+
+
+def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
+    columns = _columns(Path(file))
+    places = np.stack([columns["x"], columns["y"]], axis=1)
+    if "psi" in columns:
+        return _by_corners(mesh, _interpolated(file, places, columns["psi"], mesh.points))
+    velocity = np.stack([columns["u"], columns["v"]], axis=1)
+    found = _interpolated(file, places, velocity, mesh.middle)
+    return np.sum(found * mesh.normal, axis=1) * mesh.length
+
+
+def _columns(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a CSV file by name."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise MeshError([Fault("", f"cannot be read: {error}")], str(path)) from error
+    names = [name.strip() for name in lines[0].split(",")] if lines else []
+    if set(names) not in ({"x", "y", "u", "v"}, {"x", "y", "psi"}):
+        text = f"its header is {', '.join(names) or 'empty'}; wanted x, y, u, v or x, y, psi"
+        raise MeshError([Fault("", text, 1)], str(path))
+    rows = []
+    for number, line in enumerate(lines[1:], 2):
+        if not line.strip():
+            continue
+        try:
+            row = [float(value) for value in line.split(",")]
+        except ValueError:
+            row = []
+        if len(row) != len(names) or not np.isfinite(row).all():
+            text = f'"{line}"; wanted {len(names)} numbers, {", ".join(names)}'
+            raise MeshError([Fault("", text, number)], str(path))
+        rows.append(row)
+    if len(rows) < 3:
+        raise MeshError([Fault("", f"it has {len(rows)} points; wanted at least three, around the mesh")], str(path))
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import QhullError
+
+    try:
+        found = LinearNDInterpolator(places, values)(wanted)
+    except QhullError as error:
+        raise MeshError([Fault("", "its points lie on one line; wanted them around the mesh")], str(file)) from error
+    outside = np.isnan(found).reshape(len(wanted), -1).any(axis=1)
+    if outside.any():
+        (x, y), (low, high) = wanted[outside][0], (places.min(axis=0), places.max(axis=0))
+        text = f"its points do not reach around {outside.sum()} of {len(wanted)} places of the mesh, the first "
+        text += f"({x:.6g}, {y:.6g}) m; they span ({low[0]:.6g}, {low[1]:.6g}) to ({high[0]:.6g}, {high[1]:.6g}) m"
+        raise MeshError([Fault("", text)], str(file))
+    return found

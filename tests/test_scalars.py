@@ -1,0 +1,326 @@
+"""Scalars in the network: shifted, split, mixed, spread, decayed and stored as closed forms say, and booked."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import meshio
+import numpy as np
+import pytest
+from pytest import approx
+from scipy.special import erfc
+from truth.orders import observed_order
+from truth.scenes import (
+    AMBIENT,
+    RHO,
+    area,
+    chamber,
+    junction,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    smooth_ramp,
+    smooth_step,
+    step,
+    tank,
+    valve,
+)
+
+import fvsolve
+from fvsolve.errors import CaseError
+
+MUSCL = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
+SPEED, BORE, SLOW = 1.0, 0.1, 20.0  # of the flow [m/s], of pipes [m], of waves [m/s], so that steps are few
+FLOW = SPEED * area(BORE)
+
+
+def inflow(flow, **dye) -> dict:
+    return {"type": "inflow", "flow": flow, **({"scalars": dye} if dye else {})}
+
+
+def given(**dye) -> dict:
+    """A reservoir at the pressure at which pipes have their stated area."""
+    return reservoir(AMBIENT, **({"scalars": dye} if dye else {}))
+
+
+def line(start, end, length=10.0, cells=100, **more) -> dict:
+    return pipe(start, end, length, BORE, SLOW, cells, **more)
+
+
+def case_of(nodes, links, end, numerics=None, probes=(), **dye) -> dict:
+    return scene(nodes, links, end, {**MUSCL, **(numerics or {})}, probes, end / 50, scalars={"dye": dye})
+
+
+def at_end(case: dict) -> tuple:
+    """(model, fields of the last state)."""
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
+    return model, model.frame(state.y, model.evaluate(state.t, state.y)[1])
+
+
+def through(cells: int, **numerics) -> float:
+    """L1 error of a smooth front that has come through two pipes and the junction between them."""
+    nodes = {"lake": given(dye=smooth_ramp(0.5, 5.0, 0.0, 1.0)), "mid": junction(), "tap": junction(FLOW)}
+    links = {"a": line("lake", "mid", 5.0, cells), "b": line("mid", "tap", 5.0, cells)}
+    _, found = at_end(case_of(nodes, links, 7.5, numerics))
+    fine, error = 20, 0.0
+    for k, name in enumerate("ab"):
+        x = 5.0 * k + (np.arange(cells * fine) + 0.5) * 5.0 / (cells * fine)
+        exact = np.array([smooth_step(7.5 - one / SPEED, 0.5, 5.0) for one in x])
+        error += np.abs(found[name]["dye"] - exact.reshape(cells, fine).mean(axis=1)).mean()
+    return error
+
+
+@pytest.mark.parametrize("scheme, order", [("upwind", 1.0), ("muscl", 2.0), ("weno5", 2.0)])
+def test_a_smooth_front_moves_at_the_speed_of_the_flow_and_through_a_junction(scheme, order):
+    many = (40, 80, 160)
+    errors = [through(cells, scheme=scheme) for cells in many]
+    assert errors[-1] < {1.0: 0.02, 2.0: 2e-4}[order]
+    assert -observed_order(errors, many) == approx(order, abs=0.2)
+
+
+@pytest.mark.parametrize("limiter", ["minmod", "van-leer", "monotonized-central"])
+def test_a_sharp_plug_stays_between_what_was_given(limiter):
+    plug = {"time": [0.0, 1.0, 3.0], "value": [0.2, 0.9, 0.2], "kind": "step"}
+    nodes = {"lake": given(dye=plug), "mid": junction(), "tap": junction(FLOW)}
+    links = {"a": line("lake", "mid", 5.0, 50), "b": line("mid", "tap", 5.0, 50)}
+    probes = ["mid.dye", "tap.dye", "a.dye@0.5", "b.dye@0.5"]
+    case = case_of(nodes, links, 12.0, {"limiter": limiter}, probes, initial=0.2)
+    result = fvsolve.run(case)
+    for probe in probes:
+        low, _, high, _ = result.extremes[probe]
+        assert 0.2 - 1e-12 < low and high < 0.9 + 1e-12
+    assert result.extremes["tap.dye"].greatest > 0.85  # and it does arrive
+
+
+def test_a_plug_splits_by_mass():
+    plug = {"time": [0.0, 1.0, 3.0], "value": [0.0, 2.0, 0.0], "kind": "step"}
+    nodes = {"lake": given(dye=plug), "fork": junction(), "few": junction(0.3 * FLOW), "many": junction(0.7 * FLOW)}
+    links = {
+        "trunk": line("lake", "fork", 2.0, 20),
+        "left": line("fork", "few", 1.0, 20),
+        "right": line("many", "fork", 3.0, 20),  # drawn against its flow
+    }
+    book = fvsolve.run(case_of(nodes, links, 40.0)).ledger["dye"]
+    assert book["by_node"]["lake"] == approx(2.0 * 2.0 * RHO * FLOW, rel=1e-12)
+    assert -book["by_node"]["few"] / book["by_node"]["lake"] == approx(0.3, rel=1e-9)
+    assert -book["by_node"]["many"] / book["by_node"]["lake"] == approx(0.7, rel=1e-9)
+    assert book["relative"] < 1e-12
+
+
+def test_streams_mix_by_mass():
+    nodes = {"hot": inflow(0.25 * FLOW, dye=60.0), "cold": inflow(0.75 * FLOW, dye=20.0), "join": junction()}
+    links = {"a": line("hot", "join", 1.0, 10), "b": line("cold", "join", 1.0, 10), "c": line("join", "sea", 1.0, 10)}
+    case = case_of({**nodes, "sea": given()}, links, 30.0, probes=["join.dye", "c.dye@1", "sea.dye"], initial=20.0)
+    result = fvsolve.run(case)
+    assert result["join.dye"][-1] == approx(30.0, rel=1e-12)
+    assert result["c.dye@1"][-1] == approx(30.0, rel=1e-9)
+    assert result["sea.dye"][-1] == 20.0  # what would come back from it
+
+
+def test_nodes_without_volume_pass_on_at_once_in_the_order_of_the_flow():
+    """Written down against the flow, with a stream that joins half way."""
+    nodes = {"lake": reservoir(AMBIENT + 3e4, scalars={"dye": 1.0}), "d": junction(), "c": junction(),
+             "b": inflow(0.5 * FLOW, dye=3.0), "sea": given()}  # fmt: skip
+    links = {"v4": valve("d", "sea", 0.01), "v3": valve("c", "d", 0.01), "v2": valve("d", "b", 0.01),
+             "v1": valve("lake", "c", 0.01)}  # fmt: skip
+    links["v2"] = valve("b", "c", 0.01)
+    numerics = {"courant": None, "method": "dormand-prince", "rtol": 1e-8}
+    case = case_of(nodes, links, 1.0, numerics, ["c.dye", "d.dye", "v1.flow", "v4.flow"])
+    case["numerics"].pop("courant")
+    result = fvsolve.run(case)
+    q = result["v1.flow"][-1]
+    mixed = (1.0 * q + 3.0 * 0.5 * FLOW) / (q + 0.5 * FLOW)
+    assert result["c.dye"][0] == approx(mixed, rel=1e-9) and result["d.dye"][0] == approx(mixed, rel=1e-9)
+
+
+def ogata_banks(x, t, d):
+    """Inlet held at 1 from t = 0 on, semi-infinite (Ogata and Banks 1961)."""
+    width = 2.0 * math.sqrt(d * t)
+    back = np.exp(SPEED * x / d) * erfc((x + SPEED * t) / width)
+    return 0.5 * (erfc((x - SPEED * t) / width) + back)
+
+
+def test_diffusion_behind_a_held_inlet_is_that_of_ogata_and_banks():
+    errors = []
+    for cells in (50, 100, 200):
+        nodes = {"lake": given(dye=1.0), "tap": junction(FLOW)}
+        _, found = at_end(case_of(nodes, {"a": line("lake", "tap", 10.0, cells)}, 4.0, diffusivity=0.25))
+        x = (np.arange(cells) + 0.5) * 10.0 / cells
+        errors.append(np.abs(found["a"]["dye"] - ogata_banks(x, 4.0, 0.25)).mean())
+    assert errors[-1] < 2e-4
+    assert -observed_order(errors, (50, 100, 200)) == approx(2.0, abs=0.25)
+
+
+def test_diffusion_alone_through_a_junction_is_a_straight_line():
+    """No flow: between two given values, in the end, a line across both pipes, whose cells differ."""
+    nodes = {"left": given(dye=1.0), "mid": junction(), "right": given(dye=0.0)}
+    links = {"a": line("left", "mid", 1.0, 5), "b": line("mid", "right", 1.0, 20)}
+    _, found = at_end(case_of(nodes, links, 60.0, diffusivity=0.2))
+    assert found["a"]["dye"] == approx(1.0 - 0.5 * (np.arange(5) + 0.5) / 5, abs=1e-10)
+    assert found["b"]["dye"] == approx(0.5 - 0.5 * (np.arange(20) + 0.5) / 20, abs=1e-10)
+
+
+def test_what_stands_decays_exponentially_towards_ambient():
+    nodes = {"left": given(), "stop": junction(), "box": chamber(0.5, AMBIENT, scalars={"dye": 80.0})}
+    links = {"a": line("left", "stop", 1.0, 10), "shut": valve("stop", "box", 0.01, opening=0.0)}
+    numerics = {"method": "rk4"}
+    model, found = at_end(case_of(nodes, links, 10.0, numerics, initial=50.0, decay=0.2, ambient=20.0))
+    assert found["a"]["dye"] == approx(20.0 + 30.0 * math.exp(-2.0), rel=1e-9)
+    assert found["nodes"]["box"]["dye"] == approx(20.0 + 60.0 * math.exp(-2.0), rel=1e-9)
+
+
+def test_decay_on_the_way_is_that_of_the_time_it_takes():
+    """A pipe that loses heat: c(x) = ambient + (c0 - ambient) exp(-decay x / v)."""
+    nodes = {"lake": given(dye=60.0), "tap": junction(FLOW)}
+    errors = []
+    for cells in (50, 100):
+        links = {"a": line("lake", "tap", 10.0, cells)}
+        _, found = at_end(case_of(nodes, links, 30.0, initial=60.0, decay=0.1, ambient=10.0))
+        errors.append(abs(found["nodes"]["tap"]["dye"] - (10.0 + 50.0 * math.exp(-1.0))))
+    assert errors[1] < 2e-3 and errors[0] / errors[1] > 3.0
+
+
+def test_a_stirred_chamber_follows_what_comes_in():
+    """c' = q / V (c_in - c), without a pipe."""
+    nodes = {"feed": inflow(1e-3, dye=4.0), "box": chamber(0.02, scalars={"dye": 1.0}), "sea": given()}
+    links = {"in": valve("feed", "box", 1e-3), "out": valve("box", "sea", 1e-3)}
+    case = case_of(nodes, links, 60.0, {"method": "dormand-prince"}, ["box.dye", "box.pressure"])
+    case["numerics"] = {key: x for key, x in case["numerics"].items() if key != "courant"} | {"rtol": 1e-9}
+    result = fvsolve.run(case)
+    held = 0.02 * (1.0 + (result["box.pressure"] - AMBIENT) / 2.2e9)
+    assert result["box.dye"] == approx(4.0 - 3.0 * np.exp(-1e-3 * result.t / held), rel=1e-7)
+    assert result.ledger["dye"]["relative"] < 1e-12
+
+
+def test_a_tank_that_fills_holds_the_mean_of_what_came_and_spills_what_it_holds():
+    nodes = {"feed": inflow(0.01, dye=2.0), "pool": tank(0.5, 1.0, scalars={"dye": 1.0}, height=1.4)}
+    case = case_of(nodes, {"in": line("feed", "pool", 1.0, 10, scalars={"dye": 2.0})}, 30.0, {"method": "rk4"},
+                   ["pool.dye", "pool.level"])  # fmt: skip
+    result = fvsolve.run(case)
+    filling = result["pool.level"] < 1.4 - 1e-9
+    filled = 0.5 * result["pool.level"]
+    mean = (0.5 * 1.0 + (filled - 0.5) * 2.0) / filled
+    assert filling.sum() > 20 and result["pool.dye"][filling] == approx(mean[filling], rel=1e-9)
+    late = result.t > 20.5  # full from 20 s on: stirred
+    since = result.t[late] - 20.0
+    full = (0.5 + 0.2 * 2.0) / 0.7
+    assert result["pool.dye"][late] == approx(2.0 - (2.0 - full) * np.exp(-0.01 / 0.7 * since), rel=1e-3)
+    assert result.ledger["dye"]["by_node"]["pool"] < 0.0 and result.ledger["dye"]["relative"] < 1e-12
+
+
+HAMMER = {"lake": reservoir(5e5), "mid": junction(), "gate": junction(), "box": chamber(0.05), "sea": reservoir(1e5)}
+
+
+def hammer(scheme: str, friction: dict, **dye) -> dict:
+    links = {
+        "a": pipe("lake", "mid", 60.0, 0.1, 1000.0, 30, friction=friction),
+        "b": pipe("gate", "mid", 40.0, 0.1, 1200.0, 17, friction=friction),
+        "side": pipe("mid", "box", 10.0, 0.05, 1000.0, 4, friction=friction),
+        "v": valve("gate", "sea", 0.003, opening=ramp(0.05, 0.1, 1.0, 0.0)),
+    }
+    case = case_of(HAMMER, links, 1.5, {"scheme": scheme, "method": "ssp-rk3"}, ["gate.dye", "gate.pressure"], **dye)
+    return case
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5", "upwind5", "central"])
+@pytest.mark.parametrize("model", ["quasi-steady", "unsteady"])
+def test_a_uniform_value_stays_uniform_through_water_hammer(scheme, model):
+    """The masses of cells swing by 5e-4 and flows turn; what is carried follows them to round-off."""
+    case = copy.deepcopy(hammer(scheme, {"model": model, "roughness": 1e-4}, initial=0.0))  # far from its bounds
+    case["scalars"]["other"] = {"initial": 0.0}
+    for part in (
+        *(case["nodes"][name] for name in ("lake", "box")),
+        *(case["links"][name] for name in ("a", "b", "side")),
+    ):
+        part["scalars"] = {"dye": 0.7}
+    case["nodes"]["sea"]["scalars"] = {"dye": 2.0}
+    found = at_end(case)[1]
+    for name in ("a", "b", "side"):
+        assert np.abs(found[name]["dye"] / 0.7 - 1.0).max() < 1e-12
+        assert not found[name]["other"].any()
+    assert found["nodes"]["box"]["dye"] == approx(0.7, rel=1e-13)
+
+
+def test_flow_that_turns_brings_back_what_went_and_the_book_closes():
+    case = hammer("muscl", {"model": "none"}, initial=0.0, diffusivity=0.01, decay=0.3, ambient=0.1)
+    case["nodes"] = {**HAMMER, "lake": reservoir(ramp(0.3, 0.2, 5e5, 1e5), scalars={"dye": ramp(0.0, 0.3, 1.0, 2.0)}),
+                     "sea": reservoir(ramp(0.3, 0.2, 1e5, 5e5), scalars={"dye": 3.0})}  # fmt: skip
+    case["links"]["v"]["opening"], case["numerics"]["end"] = 1.0, 8.0
+    result = fvsolve.run(case)
+    book = result.ledger["dye"]
+    assert result["gate.dye"][-1] == approx(3.0, rel=1e-4) and result["gate.dye"][1] < 1.0
+    assert book["decayed"] != 0.0 and book["by_node"]["sea"] > 0.0
+    assert book["relative"] < 1e-12
+
+
+def test_a_pipe_told_from_its_other_end_carries_the_same():
+    def told(back: bool) -> np.ndarray:
+        ends = ("tap", "lake") if back else ("lake", "tap")
+        nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(ramp(2.0, 2.0, FLOW, -0.5 * FLOW))}
+        found = at_end(case_of(nodes, {"a": line(*ends, 4.0, 40)}, 6.0, diffusivity=1e-3))[1]["a"]["dye"]
+        return found[::-1] if back else found
+
+    assert told(False).max() > 0.5
+    assert told(True) == approx(told(False), abs=1e-12)
+
+
+def test_where_nothing_flows_values_are_defined():
+    nodes = {"lake": given(), "mid": junction(), "stop": junction(), "lone": junction(), "sea": given()}
+    links = {"a": line("lake", "mid", 1.0, 4, scalars={"dye": 1.0}),
+             "b": line("mid", "stop", 1.0, 4, scalars={"dye": 2.0}),
+             "v": valve("stop", "lone", 0.01), "w": valve("lone", "sea", 0.01, opening=0.0)}  # fmt: skip
+    found = at_end(case_of(nodes, links, 1.0, initial=7.0))[1]
+    assert found["nodes"]["mid"]["dye"] == 1.5 and found["nodes"]["stop"]["dye"] == 2.0
+    assert found["nodes"]["lone"]["dye"] == 7.0
+    assert np.array_equal(found["a"]["dye"], np.ones(4)) and np.array_equal(found["b"]["dye"], np.full(4, 2.0))
+
+
+def test_results_name_it_and_a_resumed_run_is_the_unbroken_one(tmp_path):
+    nodes = {"lake": given(dye=step(1.0, 0.0, 1.0)), "tap": junction(FLOW)}
+    case = case_of(nodes, {"a": line("lake", "tap", 4.0, 40)}, 4.0, unit="mg/l")
+    case["output"]["fields"] = 4
+    result = fvsolve.run(case, out=tmp_path / "run")
+    header = (tmp_path / "run" / "history.csv").read_text().splitlines()[0]
+    assert "tap.dye [mg/l]" in header.split(",")
+    frame = meshio.read(tmp_path / "run" / "fields" / "000004.vtu")
+    assert frame.cell_data["dye"][0].max() == approx(1.0, abs=1e-3)
+    assert result.ledger["dye"]["inflow"] == approx(3.0 * RHO * FLOW, rel=1e-12)
+    again = fvsolve.run(tmp_path / "run" / "case.toml")
+    assert np.array_equal(again["tap.dye"], result["tap.dye"])
+
+
+FAULTS = [
+    (("scalars", "pressure"), {}, '"pressure" has a meaning of its own'),
+    (("nodes", "lake", "scalars"), {"dya": 1.0}, 'no scalar named "dya"; did you mean "dye"?'),
+    (("nodes", "tap", "scalars"), {"dye": 1.0}, "a junction has none of its own"),
+    (("nodes", "pool", "scalars"), {"dye": {"time": [0, 1], "value": [0, 1]}}, "no schedule"),
+    (("links", "a", "scalars"), {"dye": "much"}, '"much" is no number'),
+    (
+        ("links", "a"),
+        {"type": "rigid-column", "from": "lake", "to": "tap", "length": 10.0, "diameter": BORE},
+        "links.a: is a rigid-column; it has no cells to carry scalars; use a pipe",
+    ),
+    (("nodes", "pool"), {"type": "accumulator", "volume": 1.0, "precharge": 5e4}, "its contents carry no scalars yet"),
+    (("scalars", "dye", "decay"), -1.0, "out of range"),
+    (("scalars", "dye", "diffusivity"), "3 m", "a diffusivity"),
+    (("fluid", "law"), "log", '"log" carries no scalars yet'),
+    (("output", "probes"), ["lake.dye", "a.dye@0.5", "a.dye"], 'say where, for example "a.dye@0.5"'),
+    (("output", "probes"), ["v.dye"], "v is a valve"),
+]
+
+
+@pytest.mark.parametrize("keys, value, said", FAULTS, ids=[".".join(keys) for keys, *_ in FAULTS])
+def test_what_cannot_be_is_refused(keys, value, said):
+    nodes = {"lake": given(dye=1.0), "tap": junction(), "pool": tank(1.0, 0.1)}
+    case = case_of(nodes, {"a": line("lake", "tap"), "v": valve("tap", "pool", 1e-3)}, 1.0)
+    fvsolve.load(case)
+    table = case = copy.deepcopy(case)
+    for key in keys[:-1]:
+        table = table[key]
+    table[keys[-1]] = value
+    with pytest.raises(CaseError) as caught:
+        fvsolve.load(case)
+    assert said in str(caught.value)
