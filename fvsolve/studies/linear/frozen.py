@@ -109,7 +109,7 @@ def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
 
 
 def has_limiter(model) -> bool:
-    """Whether a limited scheme is at work; in basins all that is not `upwind`, or `upwind5` of a liquid on a grid."""
+    """Whether a limited scheme is at work; in basins all that is not `upwind`, or `upwind5` on a grid."""
     scheme = model.case.numerics.scheme
     if any(limited(basin, scheme) for basin in model.basins):
         return True
@@ -118,5 +118,4 @@ def has_limiter(model) -> bool:
 
 def limited(basin, scheme: str) -> bool:
     """Whether a basin limits its slopes under a scheme."""
-    straight = basin.is_grid and basin.part.physics != "free-surface"
-    return scheme != "upwind" and not (scheme == "upwind5" and straight)
+    return scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid)
