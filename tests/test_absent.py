@@ -20,7 +20,8 @@ MEMORY = {"memory"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating", "cavitating_nodes", "riemann"}
 JOBS = ("before", "core", "after", "observe", "record", "events")
-ALL = PIPES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
+SCALARS = {"scalars", "mixing"}
+ALL = SCALARS | PIPES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
 def compiled_with(*functions) -> set[str]:
@@ -85,6 +86,8 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"leap"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
     assert found & ALL == {"newton", "dirk", "differences", "linear_dense"}
+    dyed = line() | {"scalars": {"dye": {}}}
+    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"leap"} | SCALARS
     log = line() | {"fluid": {"name": "Water", "law": "log"}}
     assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"leap"}
     wet = {**WATER, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pytest import approx
 from scipy.special import erfc
+from test_sparsity import random_state, stray
 from truth.orders import observed_order
 from truth.scenes import (
     AMBIENT,
@@ -290,6 +291,36 @@ def test_results_name_it_and_a_resumed_run_is_the_unbroken_one(tmp_path):
     assert result.ledger["dye"]["inflow"] == approx(3.0 * RHO * FLOW, rel=1e-12)
     again = fvsolve.run(tmp_path / "run" / "case.toml")
     assert np.array_equal(again["tap.dye"], result["tap.dye"])
+
+
+def test_implicit_steps_carry_it_to_the_same_place_and_close_the_book():
+    """A front that turns in a branched scene, by steps that the waves do not hold; losses booked state by state."""
+    case = hammer("upwind", {"model": "quasi-steady", "roughness": 1e-4}, initial=0.2, decay=0.1, diffusivity=0.01)
+    case["nodes"] = {**HAMMER, "lake": reservoir(5e5, scalars={"dye": 1.0})}
+    ends = []
+    for numerics in ({"method": "ssp-rk3", "courant": 0.5}, {"method": "radau-iia-5", "rtol": 1e-8},
+                     {"method": "rodas-5p", "rtol": 1e-7}, {"method": "auto", "rtol": 1e-7}):  # fmt: skip
+        case["numerics"] = {"end": 0.6, "scheme": "upwind", **numerics}
+        result = fvsolve.run(case)
+        assert result.ledger["dye"]["relative"] < 1e-12 and result.ledger["dye"]["decayed"] > 0.0
+        ends.append(result["gate.dye"][-1])
+    assert ends[1:] == approx([ends[0]] * 3, rel=1e-5)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5", "upwind5", "central"])
+def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
+    for law in ({"model": "none"}, {"model": "unsteady", "roughness": 1e-4}):
+        case = hammer(scheme, law, initial=0.7, decay=0.1, diffusivity=0.1)
+        model, rng = fvsolve.build(fvsolve.load(case)), np.random.default_rng(1)
+        assert max(stray(model, t, random_state(model, rng)) for t in (0.0, 0.1, 0.2)) < 1e-9
+
+
+def test_a_controller_sets_what_flows_in_also_beyond_what_the_case_says():
+    nodes = {"lake": given(dye=1.0), "tap": junction(FLOW)}
+    model = fvsolve.build(fvsolve.load(case_of(nodes, {"a": line("lake", "tap", 1.0, 20)}, 9.0)))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), 3.0)
+    state = fvsolve.advance(model, state, 8.0, {"lake.dye": 5.0})
+    assert model.frame(state.y, model.evaluate(state.t, state.y)[1])["a"]["dye"] == approx(5.0, rel=1e-6)
 
 
 FAULTS = [

@@ -14,7 +14,6 @@ from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 import fvsolve
 from fvsolve.jit import njit
 from fvsolve.kernels import records as rec
-from fvsolve.model.scalars import ledger_rows
 from fvsolve.model.sparsity import sparsity
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.signatures import function_types
@@ -26,12 +25,10 @@ TIMES = (0.0, 0.7, 2.3, 3.5)  # of random networks: valves open, half shut, all 
 
 
 def rates(model, t: float, y: np.ndarray) -> np.ndarray:
-    """dydt and the ledger, but what decays : float64[n + ledger]."""
+    """dydt and the ledger : float64[n + ledger]."""
     dydt, out = model.evaluate(t, y)
-    at, nodes = model.layout["supply"], len(model.node_names)
-    booked = out[at : at + ledger_rows(model.case)].copy()
-    booked[2 * nodes :: nodes + 1] = 0.0  # hangs on every cell
-    return np.concatenate((dydt, booked))
+    at = model.layout["supply"]
+    return np.concatenate((dydt, out[at : at + model.ledgers]))
 
 
 def random_model(seed: int, scheme: str, law: str):

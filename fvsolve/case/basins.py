@@ -150,9 +150,11 @@ def misfits(
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     method = METHODS.get(numerics.method or "")
     implicit = numerics.method == AUTO or (method is not None and not method.explicit)
-    if scalars and implicit and any(basin.physics == "free-surface" for basin in found.values()):
-        what = f"{show(numerics.method)} is implicit; scalars in a free surface are stepped by explicit methods"
-        yield ("numerics", "method"), f"{what}, such as ssp-rk2"
+    if implicit and any(_explicit(basin, meshes.get(name), scalars) for name, basin in found.items()):
+        what = (
+            f"{show(numerics.method)} is implicit; scalars in basins are stepped by explicit methods, such as ssp-rk2"
+        )
+        yield ("numerics", "method"), f"{what}, unless they neither decay nor pass the boundary of a given velocity"
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)
@@ -191,3 +193,10 @@ def misfits(
                     shape.at(x, y)
             except ValueError as error:
                 yield (*key, *below), str(error)
+
+
+def _explicit(basin: Basin, mesh: Mesh | None, scalars: dict) -> bool:
+    """Whether scalars in a basin want an explicit method."""
+    closed = mesh is not None and not patch_names(mesh)
+    still = basin.physics == "transport" and closed and not any(scalar.decay for scalar in scalars.values())
+    return bool(scalars) and not still

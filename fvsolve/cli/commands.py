@@ -140,7 +140,7 @@ def compare(
 def view(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     time: Annotated[str | None, typer.Option(metavar="T", help='"1.2 s"; the last frame by default')] = None,
-    field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, ...")] = None,
+    field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, a scalar, ...")] = None,
     contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="lines of equal values")] = 0,
     animate: Annotated[Path | None, typer.Option(metavar="FILE", help="all frames, as .gif or .mp4")] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/FIELD.png")] = None,

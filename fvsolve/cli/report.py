@@ -18,6 +18,11 @@ PIPE = {
     "to_head": "head at to [m]",
 }
 
+BASIN = {
+    "physics": "physics", "cells": "cells", "path": "kernels over", "area": "area [m2]", "depth": "depth [m]",
+    "wave_speed": "wave speed [m/s]", "memory": "memory [B]",
+}  # fmt: skip
+PATCH = {"faces": "faces", "length": "length [m]", "area": "cells behind [m2]", "reflects": "waves reflected"}
 EVENTS_SHOWN = 12
 
 
@@ -60,7 +65,7 @@ def exit_code(one) -> int:
 
 
 def checks(case, found: dict) -> None:
-    """Nodes and pipes at the start, the step and its cost, what will move."""
+    """Nodes, pipes and basins at the start, the step and its cost, what will move."""
     console = _console()
     _line(console, case.title or case.name, "bold")
     rows = [[name, *map(_number, one.values())] for name, one in found["nodes"].items()]
@@ -73,6 +78,18 @@ def checks(case, found: dict) -> None:
     rows = [[name, *(_number(one[key]) for key in PIPE)] for name, one in found["pipes"].items()]
     if rows:
         _table(["pipe", *PIPE.values()], rows, console)
+        _line(console, "")
+    rows = [[name, *(_number(one.get(key)) for key in BASIN)] for name, one in found["basins"].items()]
+    if rows:
+        _table(["basin", *BASIN.values()], rows, console)
+        _line(console, "")
+    rows = [
+        [f"{name}.{patch}", *(_number(faces[key]) for key in PATCH)]
+        for name, one in found["basins"].items()
+        for patch, faces in one["patches"].items()
+    ]
+    if rows:
+        _table(["patch", *PATCH.values()], rows, console)
         _line(console, "")
     for name, one in found["pipes"].items():
         if "unsteady" in one:
@@ -159,4 +176,6 @@ def _cost(said: dict) -> str:
 
 
 def _number(value) -> str:
+    if isinstance(value, list):  # a range
+        return " to ".join(dict.fromkeys(map(_number, value)))
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

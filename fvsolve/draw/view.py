@@ -94,7 +94,7 @@ def draw(frames: Frames, field: str, out: str, contours: int) -> None:
         pictures = []
         for frame in frames:
             scene.show(plotter, *frame)
-            pictures.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(128))
+            pictures.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(255))
         pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=FRAME, loop=0)
 
 
@@ -102,20 +102,22 @@ class Scene:
     """What frames have in common: the range of their field, its unit, how far they reach and how they are seen."""
 
     def __init__(self, frames: Frames, field: str, contours: int) -> None:
-        self.field, self.contours = field, contours
+        self.field, self.contours, self.seen = field, contours, False
         self.unit, known, lows, highs, boxes = "", {}, [], [], []
         for _, files in frames:
             for file in files:
                 mesh = read(file, field)
                 known |= dict.fromkeys(name for name in mesh.cell_data if name != "pipe")
                 if field in mesh.cell_data:
-                    self.unit = unit_of(mesh, field)
-                    lows.append(float(mesh[field].min()))
-                    highs.append(float(mesh[field].max()))
+                    self.unit, values = unit_of(mesh, field), mesh[field]
+                    if "depth" in mesh.cell_data and field != "bed":
+                        values = values[mesh["depth"] > WET]  # which are all that is drawn
+                    lows.append(float(values.min(initial=math.inf)))
+                    highs.append(float(values.max(initial=-math.inf)))
                 boxes.append(box(mesh))
         if not lows:
             sys.exit(f"no field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
-        self.limits = span(min(lows), max(highs))
+        self.limits = span(min(lows), max(highs)) if min(lows) <= max(highs) else (0.0, 1.0)  # all dry
         self.box = [(min if k % 2 == 0 else max)(one[k] for one in boxes) for k in range(6)]
         self.water = any("depth" in read(file, field).cell_data for file in frames[0][1])
         wide, tall = max(self.box[1] - self.box[0], self.box[3] - self.box[2]), self.box[5] - self.box[4]
@@ -124,6 +126,7 @@ class Scene:
     def show(self, plotter: Any, caption: str, files: list) -> None:
         """Put a frame on the stage."""
         plotter.clear_actors()
+        plotter.scalar_bars.clear()
         for file in files:
             mesh = read(file, self.field)
             if "depth" in mesh.cell_data:
@@ -134,7 +137,9 @@ class Scene:
         if self.rise != 1.0:
             caption += f"; heights drawn {self.rise:.3g} times"
         plotter.add_text(caption, font_size=12, color=INK, position="upper_left")
-        _look(plotter, [*self.box[:4], self.rise * self.box[4], self.rise * self.box[5]], self.water)
+        if not self.seen:  # a camera that is set twice forgets its zoom
+            _look(plotter, [*self.box[:4], self.rise * self.box[4], self.rise * self.box[5]], self.water)
+            self.seen = True
 
     def basin(self, plotter: Any, mesh: Any) -> None:
         """The bed of a basin and the water over it."""
@@ -235,9 +240,11 @@ def tube(mesh: Any) -> Any:
 
 def raised(mesh: Any, rise: float) -> Any:
     """The wet cells of a basin at the surface of their water."""
-    found = mesh.cell_data_to_point_data(pass_cell_data=True)
-    found.points[:, 2] = rise * found.point_data["surface"]
-    return found.threshold(WET, scalars="depth", preference="cell")
+    wet = mesh.threshold(WET, scalars="depth", preference="cell")
+    if wet.n_cells:  # of these alone: the bed of a dry bank is no surface
+        wet = wet.cell_data_to_point_data(pass_cell_data=True)
+        wet.points[:, 2] = rise * wet.point_data["surface"]
+    return wet
 
 
 def sides(water: Any, rise: float) -> Any:
@@ -267,7 +274,7 @@ def _look(plotter: Any, bounds: list[float], aslant: bool = False) -> None:
     else:
         plotter.view_isometric()
     plotter.reset_camera(bounds=bounds)
-    plotter.camera.zoom(1.1)
+    plotter.camera.zoom(1.35 if aslant else 1.1)
     lift(plotter.camera)
 
 

@@ -193,12 +193,22 @@ def mix(t, y, out, tables, q):
             out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables[I_SCALARS][q]["decay"])
 
 
+@njit(forceinline=True)
+def lose(out, tables, q, k, lost):
+    """Book what decays of scalar q, `lost` [kg/s] of its k-th state or states."""
+    scalar, at = tables[I_SCALARS][q], tables[I_LAYOUT][0]["loss"] + tables[I_SCALARS][q]["loss"]
+    if scalar["losses"] == 1:
+        out[at] -= lost
+    elif scalar["losses"] > 1:
+        out[at + k] = -lost
+
+
 @njit
 def exchange(t, y, dydt, out, tables, q):
     """Amounts of scalar q through the ends of pipes and into nodes, rates of what stores, and the ledger."""
     nodes, pipes, valves, layout = tables[I_NODES], tables[I_PIPES], tables[I_VALVES], tables[I_LAYOUT][0]
     scalar, n = tables[I_SCALARS][q], nodes.size
-    value, brought, gain = layout["value"] + q * n, layout["brought"] + q * n, layout["gain"] + q * (n + 1)
+    value, brought, gain = layout["value"] + q * n, layout["brought"] + q * n, layout["gain"] + q * n
     for i in range(n):
         out[brought + i] = 0.0
     for p in range(pipes.size):
@@ -228,4 +238,4 @@ def exchange(t, y, dydt, out, tables, q):
             at = tables[I_INTEGERS][scalar["places"] + i]
             fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
             dydt[at] = out[brought + i] + out[gain + i] - fades
-            out[gain + n] -= fades
+            lose(out, tables, q, at - scalar["y"], fades)

@@ -282,7 +282,8 @@ LAYOUT = np.dtype(
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
         ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
         ("drive", "i8"),  # relative speeds of pumps now, one a valve
-        ("gain", "i8"),  # amounts of each scalar that enter by nodes, then what decays, behind `supply` in the ledger
+        ("gain", "i8"),  # behind `supply` in the ledger: amounts of each scalar that enter by nodes [kg/s]
+        ("loss", "i8"),  # and, negative, what decays of it
         ("value", "i8"),  # of each scalar at all nodes
         ("edge", "i8"),  # values that the water of pipes has at both ends
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
@@ -315,8 +316,8 @@ POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8
 NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
 
-SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, ACOUSTIC_FACES, LIQUID_GRID, LIQUID_FACES = 0, 1, 2, 3, 4, 5
-CARRIED_GRID, CARRIED_FACES = 6, 7  # kinds of basins: physics, law of the liquid, grid or loop over faces
+SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, LIQUID_GRID, LIQUID_FACES, CARRIED_GRID, CARRIED_FACES = range(7)
+# kinds of basins: physics, and of a liquid on grids law linear or log; grids or meshes of any cells
 
 BASIN = np.dtype(
     [
@@ -376,6 +377,8 @@ SCALAR = np.dtype(
         ("diffusivity", "f8"),
         ("decay", "f8"),  # [1/s]
         ("ambient", "f8"),  # what it decays to
+        ("loss", "i8"),  # first of its rows in the ledger of what decays, and how many: none without decay, one, or
+        ("losses", "i8"),  # one a state, where steps are implicit: their Jacobian wants rows that hang on few states
         ("initial", "f8"),  # what flows in where nothing else is said
         ("least", "f8"),  # bounds of all values that there can be
         ("greatest", "f8"),

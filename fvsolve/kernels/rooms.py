@@ -8,9 +8,10 @@ from importlib import import_module
 
 from fvsolve.kernels.devices.loops import loops_of
 from fvsolve.kernels.records import (
-    ACOUSTIC_FACES,
     ACOUSTIC_GRID,
+    CARRIED_FACES,
     CARRIED_GRID,
+    LIQUID_FACES,
     LIQUID_GRID,
     SHALLOW_FACES,
     SHALLOW_GRID,
@@ -81,16 +82,17 @@ ROOMS = {
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
-GRIDS = (SHALLOW_GRID, CARRIED_GRID)
-CARRIED = {  # scalars in basins, on grids and on other meshes
-    True: Room(after="plane.carried: carried_rates"), False: Room(after="plane.carried_faces: carried_rates"),
+GRIDS, MESHES = (SHALLOW_GRID, CARRIED_GRID), (SHALLOW_FACES, CARRIED_FACES)
+CARRIED = {  # scalars in basins: on grids by second and fifth order, on other meshes
+    "grids": Room(after="plane.carried: carry_on_grids"), "fifth": Room(after="plane.carried: carry_by_fifth"),
+    "meshes": Room(after="plane.carried_faces: carry_on_meshes"), "all": Room(after="plane.carried: settle_amounts"),
 }  # fmt: skip
 BASINS = {  # kind of basin
     SHALLOW_GRID: Room(after="plane.rooms: shallow_grids"),
     SHALLOW_FACES: Room(after="plane.rooms: shallow_meshes"),
     ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
-    ACOUSTIC_FACES: Room(after="plane.rooms: acoustic_meshes"),
     LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
+    LIQUID_FACES: Room(after="plane.rooms: liquid_meshes"),
 }
 ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 
@@ -100,6 +102,7 @@ class Scene:
     """What decides which functions a scene is made of.
 
     law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are
+    fifth : order of what carries scalars on grids
     """
 
     law: str
@@ -112,6 +115,7 @@ class Scene:
     kinds: tuple[int, ...] = ()
     basins: tuple[int, ...] = ()
     scalars: bool = False
+    fifth: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -136,8 +140,17 @@ class Scene:
         if self.scalars:  # carried by the flow that rates of waves now have
             yield ROOMS["values"] if self.basins else Room()
             yield ROOMS["scalars"]
-            yield from (CARRIED[grid] for grid in (True, False) if any((kind in GRIDS) == grid for kind in self.basins))
+            yield from self.carried()
         yield ALWAYS
+
+    def carried(self) -> Iterator[Room]:
+        """Rooms of scalars in basins."""
+        if any(kind in GRIDS for kind in self.basins):
+            yield CARRIED["fifth" if self.fifth else "grids"]
+        if any(kind in MESHES for kind in self.basins):
+            yield CARRIED["meshes"]
+        if self.basins:
+            yield CARRIED["all"]
 
     def functions(self, *jobs: str) -> list:
         """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""

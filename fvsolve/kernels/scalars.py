@@ -8,7 +8,7 @@ stays uniform.
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, limited, mix
+from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, limited, lose, mix
 from fvsolve.kernels.records import (
     I_FLOATS,
     I_LAYOUT,
@@ -69,11 +69,11 @@ def inner_slopes(limiter, c, d):
 
 @njit
 def inner_fluxes(conductance, c, d, m, flow, f):
-    """f[i] through the face after cell i: the value on the side that the flow comes from, less D m c_x.
+    """f[i + 1] through the face after cell i: the value on the side that the flow comes from, less D m c_x.
 
     conductance : D / (2 dx), times the sum of both masses [kg/s]
     """
-    next, bend, mass, through = c[1:], d[1:], m[1:], flow[1:]
+    next, bend, mass, through, f = c[1:], d[1:], m[1:], flow[1:], f[1:]
     for i in range(c.size - 1):
         high, low = c[i] + 0.5 * d[i], next[i] - 0.5 * bend[i]
         carried = through[i] * (high if through[i] > 0.0 else low)
@@ -81,16 +81,21 @@ def inner_fluxes(conductance, c, d, m, flow, f):
 
 
 @njit
-def amount_rates(k, first, last, decay, ambient, s, m, f, ds):
-    """ds from fluxes f between cells and those at both ends; returns the sum of what decays."""
-    n, lost = s.size, 0.0
-    before = first
-    for i in range(n):
-        after = f[i] if i < n - 1 else last
+def amount_rates(k, f, ds):
+    """ds from the fluxes f through all faces."""
+    after = f[1:]
+    for i in range(ds.size):
+        ds[i] = k * (f[i] - after[i])
+
+
+@njit
+def fade(decay, ambient, s, m, ds):
+    """Take what decays off ds; returns its sum."""
+    lost = 0.0
+    for i in range(s.size):
         fades = decay * (s[i] - ambient * m[i])
-        ds[i] = k * (before - after) - fades
+        ds[i] -= fades
         lost += fades
-        before = after
     return lost
 
 
@@ -111,7 +116,7 @@ def carry_in_pipe(y, dydt, out, tables, p):
     base, r, l = tables[I_PROFILE][pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
     m, flow, c, d, f = (
         scratch[:n], scratch[n : 2 * n + 1], scratch[2 * n + 1 : 3 * n + 1], scratch[3 * n + 1 : 4 * n + 1],
-        scratch[4 * n + 1 : 5 * n + 1],
+        scratch[4 * n + 1 : 5 * n + 2],
     )  # fmt: skip
     masses(base, 1.0 / pipe["speed"], r, l, m)
     first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
@@ -137,11 +142,14 @@ def carry_in_pipe(y, dydt, out, tables, p):
                     datum = out[layout["value"] + q * nodes + node]
                     d[near] = sign * limited(limiter, 2.0 * (datum - c[near]), c[near] - c[beside])
         inner_fluxes(0.5 * scalar["diffusivity"] / dx, c, d, m, flow, f)
-        lost = amount_rates(
-            1.0 / dx, out[layout["carried"] + ends], out[layout["carried"] + ends + 1], scalar["decay"],
-            scalar["ambient"], s, m, f, ds,
-        )  # fmt: skip
-        out[layout["gain"] + q * (nodes + 1) + nodes] -= dx * lost
+        f[0], f[n] = out[layout["carried"] + ends], out[layout["carried"] + ends + 1]
+        amount_rates(1.0 / dx, f, ds)
+        lost = fade(scalar["decay"], scalar["ambient"], s, m, ds) if scalar["losses"] > 0 else 0.0
+        if scalar["losses"] > 1:
+            for i in range(n):
+                lose(out, tables, q, pipe["cell"] + i, dx * scalar["decay"] * (s[i] - scalar["ambient"] * m[i]))
+        else:
+            lose(out, tables, q, 0, dx * lost)
         rate = quick + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * scalar["decay"]
         out[RATE] = max(out[RATE], rate)
 
@@ -150,9 +158,10 @@ def carry_in_pipe(y, dydt, out, tables, p):
 def carry_scalars(t, y, dydt, out, handle):
     """Values at all nodes, what links bring there, and rates of all amounts, where rates are asked for."""
     tables = open_tables(handle)
-    gain, nodes = tables[I_LAYOUT][0]["gain"], tables[I_NODES].size
+    loss = tables[I_LAYOUT][0]["loss"]
     for q in range(tables[I_SCALARS].size):
-        out[gain + q * (nodes + 1) + nodes] = 0.0
+        if tables[I_SCALARS][q]["losses"] > 0:
+            out[loss + tables[I_SCALARS][q]["loss"]] = 0.0
         leaving_values(y, out, tables, q)
         mix(t, y, out, tables, q)
         exchange(t, y, dydt, out, tables, q)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 ALONE, CROWDED = -1, -2  # mates that are none: nobody beyond the edge; more than one, or one on the same side
 
@@ -38,9 +38,17 @@ class Edges:
 
     def pieces(self, cells: int) -> np.ndarray:
         """int64[cells]: to which piece a cell belongs, where flow passes through faces only."""
+        return connected_components(self.graph(cells), directed=False)[1].astype(np.int64)
+
+    def order(self, cells: int) -> np.ndarray:
+        """int64[cells]: the cells so that neighbours stand close (reverse Cuthill and McKee)."""
+        graph = self.graph(cells)
+        return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
+
+    def graph(self, cells: int) -> coo_array:
+        """int8[cells, cells]: 1 where two cells share a face, the lower number first."""
         pair = self.cell[self.inner], self.cell[self.mate[self.inner]]
-        graph = coo_array((np.ones(self.inner.size, np.int8), pair), shape=(cells, cells))
-        return connected_components(graph, directed=False)[1].astype(np.int64)
+        return coo_array((np.ones(self.inner.size, np.int8), pair), shape=(cells, cells))
 
 
 def edges_of(cells: np.ndarray, points: int) -> Edges:

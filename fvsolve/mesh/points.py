@@ -8,6 +8,8 @@ from fvsolve.mesh.mesh import Mesh
 
 NEAR = 1e-9  # of the mesh's extent: what lies so near its outline is inside
 CANDIDATES = 16  # cells by the distance of their centres that are tried before all are
+RINGS = 2  # of neighbours that are tried
+EXACT = 1e-9  # of a cell's size: how far off weights may be that are right
 SUM_FIRST = 1e4  # how much more the sum of the weights counts than their point, where it lies beyond all centres
 INWARD = 1e-3  # of the way from the outline to the centre of its cell
 
@@ -57,8 +59,8 @@ class Points:
     def reading(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         """Cells int64[k] and their weights float64[k], none negative, sum 1, that give a field at a point inside.
 
-        Bilinear between centres on full grids; else of the cells that share a corner with the point's own. Exact for
-        linear fields, but beyond the outermost centres, where the nearest place between centres is read.
+        Bilinear between centres on full grids; else of the cells that share a corner with the point's own, or with
+        those. Exact for linear fields, but beyond the outermost centres, where the nearest place between them is read.
         """
         grid = self.mesh.grid
         if grid is not None and len(self.mesh.cells) == grid.nx * grid.ny:
@@ -73,12 +75,16 @@ class Points:
     def _of_neighbours(self, cell: int, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         from scipy.optimize import nnls
 
-        corners = self.mesh.cells[cell]
-        beside = np.concatenate([self.around[self.first[p] : self.first[p + 1]] for p in corners if p >= 0])
-        cells = np.array([cell, *sorted(set(beside.tolist()) - {cell})])  # its own first, which is kept where it can be
-        away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
-        weights, _ = nnls(np.vstack([np.full(cells.size, SUM_FIRST), away.T]), np.array([SUM_FIRST, 0.0, 0.0]))
-        return cells, weights
+        cells, found = [cell], []
+        for _ in range(RINGS):
+            cells += sorted({int(one) for c in cells for p in self.mesh.cells[c] if p >= 0
+                             for one in self.around[self.first[p] : self.first[p + 1]]} - set(cells))  # fmt: skip
+            away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
+            weights, missed = nnls(np.vstack([np.full(len(cells), SUM_FIRST), away.T]), np.array([SUM_FIRST, 0.0, 0.0]))
+            found.append((np.array(cells), weights))
+            if missed < EXACT:
+                return found[-1]
+        return found[0]
 
 
 def _between(lines: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:

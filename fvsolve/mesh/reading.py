@@ -22,7 +22,8 @@ LARGE, SMALL = 1e4, 1e-3  # extents that speak for another unit [m]
 def read(path: str | Path, unit: str = "m") -> Mesh:
     """The plane mesh of a file that meshio reads, its coordinates in `unit`.
 
-    Triangles and quadrilaterals are cells, physical groups of lines are patches.
+    Triangles and quadrilaterals are cells, numbered anew so that neighbours lie close; physical groups of lines are
+    patches.
     Raises MeshError with all faults that can be told apart.
     """
     path = Path(path)
@@ -54,6 +55,9 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     if faults:
         raise MeshError(faults, path.name)
     notes += _notes(draft, factor, patch, bool(content.groups))
+    cells = cells[edges.order(len(cells))]
+    draft, edges = Draft(draft.points, cells, unit), edges_of(cells, len(draft.points))
+    patch = grouped(draft, edges, lines, content.groups)[2]
     patch = np.where(patch < 0, len(names) - 1, patch)
     return assemble(factor * draft.points, cells, edges, names, patch, notes=notes)
 

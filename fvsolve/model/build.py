@@ -332,7 +332,8 @@ class Scene:
         layout = np.zeros(1, rec.LAYOUT)
         at = rec.OUT_HEAD
         for name, size in (
-            ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("gain", carried + many),
+            ("pressure", len(self.node_table)), ("supply", len(self.node_table)), ("gain", carried),
+            ("loss", sum(self.scalar_table["losses"])),
             ("net", len(self.node_table)),
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
             ("stiffness", self.moving), ("swept", self.moving),

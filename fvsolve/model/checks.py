@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.case.basins import behind, patch_names
 from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
@@ -22,7 +23,7 @@ STIFF = 3.0  # times as many steps as waves ask for: from there on an implicit m
 
 
 def checks(model) -> dict[str, Any]:
-    """Pipes, nodes, the step and what sets it, the number of steps and the expected run time; SI."""
+    """Pipes, basins, nodes, the step and what sets it, the number of steps and the expected run time; SI."""
     rho, viscosity = model.case.properties.density, model.case.properties.viscosity
     nodes = {
         name: {"elevation": row["elevation"].item(), "pressure": row["pressure"].item(),
@@ -55,9 +56,28 @@ def checks(model) -> dict[str, Any]:
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     return {
-        "nodes": nodes, "bodies": bodies, "pipes": pipes, "states": model.y_size, "cells": model.cells, "step": step,
+        "nodes": nodes, "bodies": bodies, "pipes": pipes,
+        "basins": {one.name: basin_facts(one) for one in model.basins},
+        "states": model.y_size, "cells": model.all_cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
         "moving": model.steady["moving"], "warnings": model.warnings,
+    }  # fmt: skip
+
+
+def basin_facts(basin) -> dict[str, Any]:
+    """Mesh, waves at the start and patches of a basin; lengths of faces, areas of the cells behind them."""
+    mesh, patches = basin.mesh, {}
+    for name in patch_names(mesh):
+        faces, part = mesh.patch(name), basin.part.patches.get(name)
+        patches[name] = {
+            "faces": faces.stop - faces.start, "length": float(mesh.length[faces].sum()),
+            "area": float(mesh.area[behind(mesh, name)].sum()),
+            "reflects": 1.0 if part is None else basin.reflection(part),
+        }  # fmt: skip
+    return {
+        "physics": basin.part.physics, "cells": basin.n, "path": "grid" if basin.is_grid else "faces",
+        "area": float(mesh.area.sum()), "least_width": float(np.sqrt(mesh.area.min())),
+        **{key: list(found) for key, found in basin.ranges().items()}, "memory": basin.memory, "patches": patches,
     }  # fmt: skip
 
 
@@ -110,7 +130,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
-    part = f"{quick_parts(model)}, quicker than every pipe cell"
+    part = quick_parts(model) + (", quicker than every pipe cell" if len(own) else "")
     if len(own) and rate > STIFF * own.max():
         part += f', {rate / own.max():.3g} times; rtol with method = "rodas-5p" does not follow it'
     return numerics.courant / rate, part

@@ -6,8 +6,6 @@ The layout is that of `fvsolve.kernels.plane.faces`, where the words are explain
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from fvsolve.kernels.plane import faces
 from fvsolve.mesh import Mesh
@@ -19,7 +17,7 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Cells of meshes from files are placed so that neighbours lie close in memory: place i holds the mesh's cell
     order[i]. Faces keep their numbers.
     """
-    order = cell_order(mesh)
+    order = np.arange(len(mesh.area))
     place = np.argsort(order)
     n, f, inner = len(order), len(mesh.left), mesh.inner
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
@@ -58,15 +56,6 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _by_block(table: np.ndarray) -> np.ndarray:
     """Rows over slots as they lie in memory."""
     return table.reshape(len(table), -1, faces.BLOCK).swapaxes(0, 1).ravel()
-
-
-def cell_order(mesh: Mesh) -> np.ndarray:
-    """int64[n] cells by reverse Cuthill and McKee; rectangles stand in order already."""
-    if mesh.grid is not None:
-        return np.arange(len(mesh.area))
-    pair = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
-    graph = coo_array((np.ones(mesh.inner, np.int8), pair), shape=2 * (len(mesh.area),))
-    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
 
 
 def _turn(mesh: Mesh, face: np.ndarray) -> np.ndarray:

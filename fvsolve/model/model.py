@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins.basin import FIFTH
 from fvsolve.model.scalars import node_values, pipe_values
 
 if TYPE_CHECKING:
@@ -79,9 +80,19 @@ class Model:
         return len(self.state_names)
 
     @property
+    def ledgers(self) -> int:
+        """Rows of the stepper's ledger: supply of every node, and of scalars what enters there and what decays."""
+        return int(self.layout["net"] - self.layout["supply"])
+
+    @property
     def cells(self) -> int:
         """Number of cells of all pipes."""
         return sum(pipe.cells for pipe in self.pipes)
+
+    @property
+    def all_cells(self) -> int:
+        """Number of cells of all pipes and basins."""
+        return self.cells + sum(basin.n for basin in self.basins)
 
     @property
     def wave_rates(self) -> np.ndarray:
@@ -117,7 +128,7 @@ class Model:
         there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
         basins = tuple(int(kind) for kind in np.unique(self.tables[rec.I_BASINS]["kind"]))
         scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins,
-                      many[rec.I_SCALARS])  # fmt: skip
+                      many[rec.I_SCALARS], self.case.numerics.scheme in FIFTH)  # fmt: skip
         return functions(scene)
 
     @property

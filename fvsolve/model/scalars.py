@@ -7,14 +7,9 @@ from typing import Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.steppers.methods import METHODS
 
 STORES = (rec.TANK, rec.CHAMBER)
-
-
-def ledger_rows(case) -> int:
-    """Rows of the stepper's ledger: supply of every node, and of every scalar the same and what decays."""
-    nodes = len(case.places)
-    return nodes + len(case.scalars) * (nodes + 1)
 
 
 def lower_scalars(scene) -> None:
@@ -35,8 +30,16 @@ def lower_scalars(scene) -> None:
                 places.append(-1 if given is None else scene.schedules.add(given))
         scene.integers += places
         row["least"], row["greatest"] = bounds(case, name)
+        if scalar.decay > 0.0:
+            row["loss"] = sum(scene.scalar_table["losses"])
+            row["losses"] = 1 if explicit(case.numerics.method) else scene.size - row["y"]
     if len(case.scalars):
         pipes["center"] = scene.cells + pipes["cell"]
+
+
+def explicit(method: str) -> bool:
+    """Whether no step of a method solves equations."""
+    return method in METHODS and METHODS[method].explicit
 
 
 def bounds(case, name: str) -> tuple[float, float]:
@@ -132,17 +135,18 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
     """Of each scalar: stored, come in, gone out, decayed, and the remainder [kg, times its unit]."""
     found, n = {}, len(model.node_names)
     for q, (name, row) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
-        own = ledger[n + q * (n + 1) : n + (q + 1) * (n + 1)]
+        own, lost = ledger[n + q * n : n + (q + 1) * n], ledger[n * (1 + len(model.case.scalars)) + row["loss"] :]
+        decayed = -float(np.sum(lost[: row["losses"]]))
         initial, final = amount(model, row, model.start), amount(model, row, y)
-        gained = [float(x) for x in own[:n]]
-        remainder = final - initial - float(np.sum(own))
-        moved = max(abs(initial), abs(final), float(np.sum(np.abs(own))))
+        gained = [float(x) for x in own]
+        remainder = final - initial - (float(np.sum(own)) - decayed)
+        moved = max(abs(initial), abs(final), float(np.sum(np.abs(own))) + abs(decayed))
         found[name] = {
             "initial": initial,
             "final": final,
             "inflow": sum(x for x in gained if x > 0),
             "outflow": sum(-x for x in gained if x < 0),
-            "decayed": -float(own[n]),
+            "decayed": decayed,
             "by_node": {node: x for node, x in zip(model.node_names, gained, strict=True) if x != 0.0},
             "remainder": remainder,
             "relative": abs(remainder) / moved if moved > 0.0 else 0.0,

@@ -17,7 +17,6 @@ from scipy.sparse import coo_array, csc_array
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import pattern
-from fvsolve.model.scalars import ledger_rows
 from fvsolve.steady import union
 
 Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depend on
@@ -31,7 +30,7 @@ def sparsity(model) -> csc_array:
     pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
     return csc_array(
-        coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + ledger_rows(model.case), n)), dtype=bool
+        coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + model.ledgers, n)), dtype=bool
     )
 
 

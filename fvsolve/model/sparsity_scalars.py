@@ -1,8 +1,4 @@
-"""Which states the rates of scalars can depend on: beside cells and masses, the flows that carry them. Knows indices.
-
-What decays of each scalar hangs on every cell. Its row of the ledger is left out, or no two states could be moved at
-once: under an implicit method the remainder of that scalar is then what Newton leaves, times decay and step.
-"""
+"""Which states rates of scalars can depend on: beside cells and masses, the flows that carry them. Knows indices."""
 
 from __future__ import annotations
 
@@ -24,7 +20,8 @@ class Carriage:
     def __init__(self, couplings, model, q: int) -> None:
         self.of, self.row = couplings, model.tables[rec.I_SCALARS][q]
         of, nodes = couplings, len(couplings.nodes)
-        self.ledger = of.size + nodes + q * (nodes + 1)
+        self.ledger = of.size + nodes * (1 + q)
+        self.loss = of.size + nodes * (1 + len(model.tables[rec.I_SCALARS])) + self.row["loss"]
         self.places = model.tables[rec.I_INTEGERS][self.row["places"] : self.row["places"] + nodes]
         self.stores = np.isin(of.nodes["kind"], STORES)
         self.wide = max(NEAR, of.reach.behind, of.reach.ahead)
@@ -71,11 +68,25 @@ class Carriage:
             brought[j].append(self.values[i])
         for i, felt in enumerate(brought):
             yield every(states(*([self.places[i]] if self.stores[i] else []), self.ledger + i), states(*felt))
+        if self.row["losses"] > 0:
+            yield from self.lost()
         for pipe in self.of.pipes:
             yield from self.inside(pipe)
             for right, i in enumerate(ends_of(pipe)):
                 yield every(self.edge(pipe, right)[0], states(self.values[i]))
                 yield every(self.close(pipe, right), self.read(pipe, right, i))
+
+    def lost(self) -> Iterator[Pairs]:
+        """What decays, on the amounts and masses that it decays from: one row for all, or one a state."""
+        rows = self.loss + np.arange(self.row["losses"])
+        pick = (lambda k: rows[k]) if rows.size > 1 else (lambda k: np.repeat(rows, np.size(k)))
+        for pipe in self.of.pipes:
+            cells = np.arange(pipe["cells"])
+            for first in (self.row["y"] + pipe["cell"], pipe["y"], pipe["y"] + pipe["cells"]):
+                yield pick(pipe["cell"] + cells), first + cells
+        for i in np.flatnonzero(self.stores):
+            felt = states(*self.own(i))
+            yield every(np.atleast_1d(pick(self.places[i] - self.row["y"])), felt)
 
     def inside(self, pipe) -> Iterator[Pairs]:
         """Cells on their neighbours: amounts, masses, and the flows between them."""

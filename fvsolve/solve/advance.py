@@ -61,6 +61,7 @@ class Input(NamedTuple):
     offset: float = 0.0
     node: int = -1  # of a reservoir
     other: int = -1  # of a spool, the schedule of its edges below zero
+    scalar: int = -1  # whose value flows in
 
 
 def hold(model: Model, inputs: dict[str, float]) -> Model:
@@ -69,6 +70,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         return model
     tables = list(model.tables)
     schedules, pieces, nodes = tables[rec.I_SCHEDULES].copy(), tables[rec.I_PIECES], tables[rec.I_NODES].copy()
+    scalars = tables[rec.I_SCALARS].copy()
     known = input_schedules(model)
     linear = model.case.fluid.law == "linear"
     rows = []
@@ -89,7 +91,10 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         for schedule, part in parts:
             schedules[schedule] = (len(pieces) + len(rows), 1)
             rows.append([-np.inf, 0.0, 0.0, part, 0.0, 0.0, 0.0])
-    tables[rec.I_SCHEDULES], tables[rec.I_NODES] = schedules, nodes
+        if one.scalar >= 0:  # which no value may leave
+            bounds = scalars[one.scalar]
+            bounds["least"], bounds["greatest"] = min(bounds["least"], found), max(bounds["greatest"], found)
+    tables[rec.I_SCHEDULES], tables[rec.I_NODES], tables[rec.I_SCALARS] = schedules, nodes, scalars
     tables[rec.I_PIECES] = np.vstack([pieces, rows])
     return replace(model, tables=tuple(tables))
 
@@ -133,6 +138,7 @@ WANTED = {
     "speed": "a relative speed of at least 0",
     "set pressure": "an absolute pressure [Pa]",
     "position": "a number from -1 to 1",
+    "value": "a finite number",
     "force": "a finite number [N]",
     "torque": "a finite number [N m]",
 }
@@ -153,6 +159,11 @@ def input_schedules(model: Model) -> dict[str, Input]:
             found[f"{name}.demand"] = Input("flow", index, rho)
         elif node.kind == "inflow":
             found[f"{name}.flow"] = Input("flow", index, -rho)
+        if node.kind in ("reservoir", "inflow"):
+            for q, (scalar, one) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
+                place = int(model.tables[rec.I_INTEGERS][one["places"] + i])
+                if place >= 0:
+                    found[f"{name}.{scalar}"] = Input("value", place, scalar=q)
     for name, row in zip(model.valve_names, model.tables[rec.I_VALVES], strict=True):
         if row["schedule"] < 0:
             continue

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
-from fvsolve.model.scalars import amounts, ledger_rows
+from fvsolve.model.scalars import amounts
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.stepper import Stepper, arguments
@@ -34,7 +34,7 @@ class Loop:
         self.rhs, self.observe, self.record, self.events = arguments((call.rhs, call.observe, call.record, call.events))
         leaps = leap_allowed(model, method)
         (self.leap,) = arguments((leap_function(leaps),))
-        ledgers, structure = ledger_rows(model.case), structure or (lambda: model.structure)
+        ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
         sums = [
             *model.tables[rec.I_NODES]["y"],

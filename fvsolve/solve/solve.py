@@ -309,7 +309,7 @@ class Run:
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         summary = Summary(
             reason, reason == "finished", loop.t, find_marks(model), ledgers, find_extremes(model),
-            find_envelope(model), loop.stepper.counts(), self.methods(), model.cells, self.seconds, self.setup,
+            find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.setup,
             [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), self.waves.warnings(),
         )  # fmt: skip
         self.sink.end(summary)

@@ -1,15 +1,15 @@
 """Scalars carried over a grid of rectangles by given flows. Knows amounts and depths; not what makes the flows.
 
 s_t + div(F c) = 0 for amounts s = depth c per area. Rates of a uniform c are c times the divergence of F, to the bit.
-In flows without divergence, Euler steps up to these Courant numbers (those of `grid_fastest`) keep every value between
-those around it: upwind 1, muscl 1/2 (minmod 2/3); weno5 keeps all between `least` and `most` up to 1/2, upwind5 does
-not. SSP methods do as Euler within their coefficient.
+In flows without divergence, Euler steps up to these Courant numbers (with the rate of `grid_fastest`) keep every value
+between those around it: upwind 1, muscl 1/2 and beside an inlet 1/3, with minmod 2/3 and 1/2. Up to 1/2 weno5 keeps all
+between `least` and `most`; upwind5 promises nothing. SSP methods do as Euler within their coefficient.
 
 The ring of a grid is its boundary faces, west (ny), east (ny), south (nx), north (nx).
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.bounds import bound
+from fvsolve.kernels.plane.bounds import bound, bound_work
 from fvsolve.kernels.plane.fifth_order import grid_excesses, grid_excesses_work, settle_excesses
 from fvsolve.kernels.plane.second_order import second_order_rates, second_order_work
 from fvsolve.kernels.records import MUSCL, UPWIND, WENO5
@@ -53,7 +53,7 @@ def advection_work(scheme, nx, ny):
     """Floats that rates of a scheme are worked out in."""
     if scheme == UPWIND or scheme == MUSCL:
         return nx * ny + second_order_work(nx, ny)
-    both = max(grid_excesses_work(nx, ny), 2 * nx * ny, second_order_work(nx, ny))
+    both = max(grid_excesses_work(nx, ny), bound_work(nx, ny), second_order_work(nx, ny))
     return nx * ny + (nx + 1) * ny + nx * (ny + 1) + both
 
 

@@ -1,10 +1,11 @@
 """Scalars carried by given flows through the faces of any mesh, and diffusing. Knows not what makes the flows.
 
 s_t + div(F c) = div(D depth grad c) for amounts s = depth c per area. Rates of a uniform c are c times the divergence
-of F, to the bit. In flows without divergence Euler steps up to Courant number 1 (`upwind`) and 1/2 (`muscl`) keep every
-value between those around it. Diffusion goes from cell to cell, and what the line between their centres leans away from
-the normal by the mean of their gradients: second order on meshes that refine smoothly, bounds not kept where they lean.
-Nothing diffuses through walls and where the flow leaves; where it enters, the value outside holds at the face.
+of F, to the bit. In flows without divergence Euler steps up to Courant number 1 (`upwind`) and 1/3 (`minmod`) keep all
+values between their least and greatest; other limiters do so nearly, and have second order on any mesh. Diffusion goes
+from cell to cell, and what the line between their centres leans away from the normal by the mean of their gradients:
+second order, bounds not kept where cells lean. Nothing diffuses through walls and where the flow leaves; where it
+enters, the value outside holds at the face.
 """
 
 from fvsolve.jit import njit
@@ -30,6 +31,7 @@ from fvsolve.kernels.plane.faces import (
     gather,
     place,
     put_sides,
+    width,
 )
 from fvsolve.kernels.records import UPWIND
 
@@ -124,10 +126,10 @@ def work_size(integers):
 
 
 @njit
-def advection_rates(scheme, diffusivity, factor, floats, integers, flow, depth, outside, s, work, rate):
+def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow, depth, outside, s, work, rate):
     """Rates of the amounts `s`; returns the greatest share of a cell that leaves it, diffusing too [1/s].
 
-    scheme : UPWIND or MUSCL; diffusivity [m2/s], 0 for none; factor : on all flows, of either sign
+    scheme, limiter : UPWIND, or MUSCL as in `faces.width`; diffusivity : [m2/s], 0 for none; factor : on all flows
     flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty where s is the
     value; outside : float64[b]  values that come in with the flow; work : float64[work_size(integers)]
     """
@@ -144,12 +146,8 @@ def advection_rates(scheme, diffusivity, factor, floats, integers, flow, depth, 
     free = w[_FREE:]
     for i in range(BLOCK):
         w[_TOP + i], free[i] = 0.0, HUGE
-    known, sided, wall, edge = (
-        0,
-        0,
-        0,
-        0,
-    )  # blocks whose cells, whose sides are known; the boundary so far in both loops
+    wide_by = width(limiter)
+    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:
             while known < need[sided]:
@@ -164,7 +162,7 @@ def advection_rates(scheme, diffusivity, factor, floats, integers, flow, depth, 
                 shown[q] = outside[number[q]] if enters else value
                 shown[b + q] = 2.0 * shown[q] - value
             if limited:
-                put_sides(sided, floats, integers, c, free, bounds, here, w, cs)
+                put_sides(sided, floats, integers, c, wide_by, free, bounds, here, w, cs)
             if spreads:
                 put_gradients(sided, floats, integers, c, ends, here, w, gx, gy)
             sided += 1

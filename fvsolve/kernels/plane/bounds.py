@@ -1,65 +1,72 @@
-"""Excess fluxes cut so that an Euler step keeps values within bounds (Zalesak 1979). Knows cells and faces of a grid.
+"""Excess fluxes cut so that a step of Euler keeps values within bounds (Zalesak 1979). Knows cells and faces of a grid.
 
-What upwind leaves is within the bounds; of what its excesses would add, each cell takes no more than there is room for.
+What upwind leaves is within the bounds; of what excesses would add, each cell takes no more than there is room for.
 """
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 
 
 @njit
 def share(room, need):
-    """How much of a need there is room for, at most all of it."""
-    part = max(room, 0.0) / need if need > 0.0 else 1.0
-    return part if part < 1.0 else 1.0
+    """The share of a need that there is room for, at most all of it."""
+    room = room if room > 0.0 else 0.0
+    return room / need if need > room else 1.0
 
 
 @njit
-def put_shares(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step, s, rate, ax, ay, up, down):
-    """For every cell the shares of its rises and falls by excesses that a step of Euler leaves room for."""
-    for j in range(ny):
-        for i in range(nx):
-            k, w, n = j * nx + i, j * (nx + 1) + i, (j + 1) * nx + i
-            scale = step * factor * kx[i] * ky[j]
-            depth_then = (depth[k] if depth.size > 0 else 1.0) - scale * (
-                (flow_x[w + 1] - flow_x[w]) + (flow_y[n] - flow_y[k])
-            )
-            then = s[k] + step * rate[k]
-            a, b, c, d = scale * ax[w], -scale * ax[w + 1], scale * ay[k], -scale * ay[n]
-            rise = (max(a, 0.0) + max(b, 0.0)) + (max(c, 0.0) + max(d, 0.0))
-            fall = (max(-a, 0.0) + max(-b, 0.0)) + (max(-c, 0.0) + max(-d, 0.0))
-            up[k] = share(most * depth_then - then, rise)
-            down[k] = share(then - least * depth_then, fall)
+def rise(a, b, c, d):
+    """The sum of those that are positive."""
+    a, b = a if a > 0.0 else 0.0, b if b > 0.0 else 0.0
+    c, d = c if c > 0.0 else 0.0, d if d > 0.0 else 0.0
+    return (a + b) + (c + d)
+
+
+@inner
+def row_shares(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate, aw, ae, south, north, up, down):
+    """Shares of the rises and falls of a row of cells, by what comes in through its faces, that a step has room for."""
+    for i in range(s.size):
+        scale = step * (factor * (kx[i] * ky))
+        then = s[i] + step * rate[i]
+        deep = (depth[i] if depth.size > 0 else 1.0) - scale * ((fe[i] - fw[i]) + (fn[i] - fs[i]))
+        a, b, c, d = scale * aw[i], -scale * ae[i], scale * south[i], -scale * north[i]
+        up[i] = share(most * deep - then, rise(a, b, c, d))
+        down[i] = share(then - least * deep, rise(-a, -b, -c, -d))
+
+
+@inner
+def cut(factor, up, down, up_then, down_then, excess):
+    """Cut the excesses between cells and those that come then to the share that both of a face allow."""
+    for i in range(excess.size):
+        forth = down[i] if down[i] < up_then[i] else up_then[i]
+        back = up[i] if up[i] < down_then[i] else down_then[i]
+        excess[i] *= forth if factor * excess[i] > 0.0 else back
 
 
 @njit
-def cut(forward, before_up, before_down, after_up, after_down):
-    """The share of an excess that the cells before and after its face allow."""
-    return min(before_down, after_up) if forward else min(before_up, after_down)
+def bound_work(nx, ny):
+    """Floats that `bound` works in."""
+    return 2 * (nx + 2) * (ny + 2)
 
 
 @njit
 def bound(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step, s, rate, ax, ay, work):
-    """Cut the excesses ax, ay so that s + step times the rates with them lies between least and most.
+    """Cut the excesses ax, ay so that s + step times the rates with them lies between least and most times the depth.
 
-    rate : float64[n]  of upwind; work : float64[2 n]
+    rate : float64[n]  of upwind; work : float64[bound_work(nx, ny)]
     """
-    up, down = work[: nx * ny], work[nx * ny : 2 * nx * ny]
-    put_shares(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step, s, rate, ax, ay, up, down)
+    wide = nx + 2
+    up, down = work[: wide * (ny + 2)], work[wide * (ny + 2) : 2 * wide * (ny + 2)]
+    for i in range(up.size):
+        up[i], down[i] = 1.0, 1.0  # as stays beyond the boundary
     for j in range(ny):
-        for i in range(nx + 1):
-            e, f = j * nx + min(i, nx - 1), j * (nx + 1) + i
-            w = j * nx + max(i - 1, 0)
-            ax[f] *= cut(
-                factor * ax[f] > 0.0,
-                up[w] if i > 0 else 1.0, down[w] if i > 0 else 1.0,
-                up[e] if i < nx else 1.0, down[e] if i < nx else 1.0,
-            )  # fmt: skip
+        a, z, w, to = j * nx, (j + 1) * nx, j * (nx + 1), (j + 1) * wide + 1
+        row_shares(
+            step, factor, kx, ky[j], flow_x[w:], flow_x[w + 1 :], flow_y[a:], flow_y[z:], depth[a:], least, most,
+            s[a:z], rate[a:], ax[w:], ax[w + 1 :], ay[a:], ay[z:], up[to:], down[to:],
+        )  # fmt: skip
+    for j in range(ny):
+        at = (j + 1) * wide
+        cut(factor, up[at:], down[at:], up[at + 1 :], down[at + 1 :], ax[j * (nx + 1) : (j + 1) * (nx + 1)])
     for j in range(ny + 1):
-        for i in range(nx):
-            n, f = min(j, ny - 1) * nx + i, j * nx + i
-            s_ = max(j - 1, 0) * nx + i
-            ay[f] *= cut(
-                factor * ay[f] > 0.0,
-                up[s_] if j > 0 else 1.0, down[s_] if j > 0 else 1.0,
-                up[n] if j < ny else 1.0, down[n] if j < ny else 1.0,
-            )  # fmt: skip
+        at, to = j * wide + 1, (j + 1) * wide + 1
+        cut(factor, up[at:], down[at:], up[to:], down[to:], ay[j * nx : (j + 1) * nx])

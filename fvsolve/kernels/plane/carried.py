@@ -7,7 +7,8 @@ from math import cos, pi
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane.advection import INFINITE, THIN, grid_advection, grid_fastest
+from fvsolve.kernels.mixing import lose
+from fvsolve.kernels.plane.advection import INFINITE, THIN, grid_advection, grid_advection_fifth, grid_fastest
 from fvsolve.kernels.plane.diffusion import grid_diffusion, scalar_sources
 from fvsolve.kernels.records import (
     CARRIED_GRID,
@@ -25,7 +26,6 @@ from fvsolve.kernels.records import (
     RATE,
     SHALLOW_FACES,
     SHALLOW_GRID,
-    WENO5,
 )
 from fvsolve.kernels.schedules import schedule_value
 
@@ -74,22 +74,23 @@ def observe_values(t, y, out, handle, values):
 
 
 @njit
-def put_outside(t, tables, patch, basin, q, outer):
-    """Fill the values beyond the faces of a patch, the last known ones where nothing is said."""
+def put_outside(t, tables, patch, basin, q):
+    """Fill the values of a scalar beyond the faces of a patch, its initial one where nothing is said."""
     schedule = tables[I_INTEGERS][patch["values"] + q]
     value = tables[I_SCALARS][q]["initial"]
     if schedule >= 0:
         value = schedule_value(tables, schedule, t)
     for m in range(patch["faces"]):
         k = tables[I_INTEGERS][patch["ring"] + m]
-        tables[I_PLANE][basin["outside"] + q * outer + k] = value
-    return value
+        tables[I_PLANE][basin["outside"] + q * basin["outer"] + k] = value
 
 
 @njit
-def ring_flow(plane, basin, k):
-    """Flow inward through face k of a grid's boundary."""
+def flow_in(plane, basin, k):
+    """Flow inward through face k of the boundary."""
     nx, ny, at = basin["nx"], basin["ny"], basin["flows"]
+    if basin["faces"] > 0:  # a mesh of any cells
+        return -plane[at + basin["faces"] - basin["outer"] + k]
     if k < ny:
         return plane[at + k * (nx + 1)]
     if k < 2 * ny:
@@ -99,75 +100,130 @@ def ring_flow(plane, basin, k):
 
 
 @njit
-def carried_rates(t, y, dydt, out, handle):
-    """Rates of all amounts in basins on grids; what open boundaries bring and take and what decays to the ledger."""
+def made_ready(t, tables, b, y):
+    """Depths and values beyond the boundary of a basin, for its scalars; returns the factor on its flows."""
+    plane, basin, patches = tables[I_PLANE], tables[I_BASINS][b], tables[I_PATCHES]
+    n, o, at = basin["n"], basin["y"], basin["plan"]
+    if basin["kind"] <= SHALLOW_FACES:
+        depth, rest, change = plane[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
+        for i in range(n):
+            depth[i] = max(rest[i] + change[i], 0.0)
+    for p in range(patches.size):
+        for q in range(tables[I_SCALARS].size if patches[p]["basin"] == b else 0):
+            put_outside(t, tables, patches[p], basin, q)
+    return cos(pi * t / basin["period"]) if basin["period"] > 0.0 else 1.0
+
+
+@njit
+def deep(basin):
+    """Number of depths that were made ready: none where it is 1."""
+    return basin["n"] if basin["kind"] <= SHALLOW_FACES else 0
+
+
+@njit
+def carry_on_grids(t, y, dydt, out, handle):
+    """Rates of all amounts on grids by upwind and muscl."""
     tables = open_tables(handle)
-    plane, patches, scalars = tables[I_PLANE], tables[I_PATCHES], tables[I_SCALARS]
-    nodes, layout, rho = tables[I_NODES].size, tables[I_LAYOUT][0], tables[I_SETTINGS][0]["rho"]
+    plane = tables[I_PLANE]
     for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
         basin = tables[I_BASINS][b]
-        if basin["carried"] < 0 or (basin["kind"] != SHALLOW_GRID and basin["kind"] != CARRIED_GRID):
+        if basin["kind"] != SHALLOW_GRID and basin["kind"] != CARRIED_GRID:
             continue
-        n, nx, ny, k, f = basin["n"], basin["nx"], basin["ny"], basin["spacing"], basin["flows"]
-        kx, ky, outer = plane[k : k + nx], plane[k + nx : k + nx + ny], basin["outer"]
-        many = ny * (nx + 1)
-        flow_x, flow_y = plane[f : f + many], plane[f + many : f + many + (ny + 1) * nx]
-        depth, work = plane[basin["toil"] : basin["toil"]], plane[basin["toil"] + n :]
-        factor, given = 1.0, basin["kind"] == CARRIED_GRID
+        factor, n = made_ready(t, tables, b, y), basin["n"]
+        depth = plane[basin["toil"] : basin["toil"] + deep(basin)]
+        nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
+        kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
+        flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
+        out[RATE] = max(out[RATE], abs(factor) * basin["fastest"])
+        for q in range(tables[I_SCALARS].size):
+            at, ring = basin["carried"] + q * n, o + q * basin["outer"]
+            grid_advection(
+                basin["scheme"], basin["limiter"], nx, ny, kx, ky, factor, flow_x, flow_y, depth,
+                plane[ring : ring + basin["outer"]], -INFINITE, INFINITE, 1.0, y[at : at + n], work, dydt[at : at + n],
+            )  # fmt: skip
+
+
+@njit
+def carry_by_fifth(t, y, dydt, out, handle):
+    """Rates of all amounts on grids by upwind5 and weno5, which keeps the bounds of what there can be."""
+    tables = open_tables(handle)
+    plane = tables[I_PLANE]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] != SHALLOW_GRID and basin["kind"] != CARRIED_GRID:
+            continue
+        factor, n = made_ready(t, tables, b, y), basin["n"]
+        depth = plane[basin["toil"] : basin["toil"] + deep(basin)]
+        nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
+        kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
+        flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
+        out[RATE] = max(out[RATE], abs(factor) * basin["fastest"])
         fastest = basin["fastest"]
+        if depth.size > 0:
+            fastest = grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work)
+        for q in range(tables[I_SCALARS].size):
+            at, ring, scalar = basin["carried"] + q * n, o + q * basin["outer"], tables[I_SCALARS][q]
+            grid_advection_fifth(
+                basin["scheme"], basin["limiter"], nx, ny, kx, ky, factor, flow_x, flow_y, depth,
+                plane[ring : ring + basin["outer"]], scalar["least"], scalar["greatest"], fastest, y[at : at + n],
+                work, dydt[at : at + n],
+            )  # fmt: skip
+
+
+@njit
+def settle_amounts(t, y, dydt, out, handle):
+    """Add what spreads, decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
+    tables = open_tables(handle)
+    plane, scalars = tables[I_PLANE], tables[I_SCALARS]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        n, grid = basin["n"], basin["kind"] == SHALLOW_GRID or basin["kind"] == CARRIED_GRID
+        per, factor, depth = tables[I_SETTINGS][0]["rho"], 1.0, plane[basin["toil"] : basin["toil"] + deep(basin)]
+        if basin["kind"] > SHALLOW_FACES:
+            per = basin["density"] * basin["thickness"]
         if basin["period"] > 0.0:
             factor = cos(pi * t / basin["period"])
-        per = rho
-        if given:
-            per = basin["density"] * basin["thickness"]
-            out[RATE] = max(out[RATE], abs(factor) * fastest)
-        else:
-            depth = plane[basin["toil"] : basin["toil"] + n]
-            for i in range(n):
-                depth[i] = max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
-            fastest = grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work)
-        for q in range(scalars.size):
-            scalar = scalars[q]
-            o, ring, lies = basin["carried"] + q * n, basin["outside"] + q * outer, layout["gain"] + q * (nodes + 1)
-            s, rate, outside = y[o : o + n], dydt[o : o + n], plane[ring : ring + outer]
-            for p in range(patches.size):
-                if patches[p]["basin"] == b:
-                    put_outside(t, tables, patches[p], basin, q, outer)
-            least = most = INFINITE
-            if basin["scheme"] == WENO5 and scalar["greatest"] > scalar["least"]:
-                least, most = scalar["least"], scalar["greatest"]
-            else:
-                least = -INFINITE
-            grid_advection(
-                basin["scheme"], basin["limiter"], nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most,
-                max(fastest, THIN), s, work, rate,
-            )  # fmt: skip
-            if scalar["diffusivity"] > 0.0:
-                spreads = grid_diffusion(
-                    nx, ny, kx, ky, scalar["diffusivity"], factor, flow_x, flow_y, depth, outside, s, work, rate
+        for q in range(scalars.size if basin["carried"] >= 0 else 0):
+            at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
+            s, rate, outside = y[at : at + n], dydt[at : at + n], plane[ring : ring + basin["outer"]]
+            if grid and scalars[q]["diffusivity"] > 0.0:
+                nx, ny, k, f = basin["nx"], basin["ny"], basin["spacing"], basin["flows"]
+                kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
+                flow_x, flow_y = (
+                    plane[f : f + ny * (nx + 1)],
+                    plane[f + ny * (nx + 1) : f + ny * (nx + 1) + (ny + 1) * nx],
                 )
-                out[RATE] = max(out[RATE], (fastest if given else 0.0) + spreads)
-            if basin["open"] >= 0:
-                book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
-            lost = 0.0
-            if scalar["decay"] > 0.0:
-                area = plane[basin["area"] : basin["area"] + n]
-                for i in range(n):
-                    high = depth[i] if depth.size > 0 else 1.0
-                    lost += area[i] * (s[i] - high * scalar["ambient"])
-                scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
-                out[lies + nodes] -= per * scalar["decay"] * lost
-                out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
-            for p in range(0 if given else patches.size):
-                if patches[p]["basin"] == b:
-                    bring(tables, patches[p], basin, q, y, rate, out)
+                spreads = grid_diffusion(
+                    nx, ny, kx, ky, scalars[q]["diffusivity"], factor, flow_x, flow_y, depth, outside, s, work, rate,
+                )  # fmt: skip
+                out[RATE] = max(out[RATE], abs(factor) * basin["fastest"] + spreads)
+            settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out)
+
+
+@njit
+def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
+    """Add to rates what decays and what links bring; book these, and what passes the boundary."""
+    scalar, patches, n = tables[I_SCALARS][q], tables[I_PATCHES], basin["n"]
+    if basin["open"] >= 0:
+        book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
+    if scalar["decay"] > 0.0:
+        area, lost = tables[I_PLANE][basin["area"] : basin["area"] + n], 0.0
+        for i in range(n):
+            high = depth[i] if depth.size > 0 else 1.0
+            lost += area[i] * (s[i] - high * scalar["ambient"])
+        scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
+        lose(out, tables, q, 0, per * scalar["decay"] * lost)
+        out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
+    for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
+        if patches[p]["basin"] == b:
+            bring(tables, patches[p], basin, q, y, rate, out)
 
 
 @njit
 def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
     """What a given velocity brings in is booked to its patches; what it takes out, all else that cells gain, to one."""
     plane, patches, nodes = tables[I_PLANE], tables[I_PATCHES], tables[I_NODES].size
-    lies, gained = tables[I_LAYOUT][0]["gain"] + q * (nodes + 1), 0.0
+    lies, gained = tables[I_LAYOUT][0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
         gained += plane[basin["area"] + i] * rate[i]
     last, most = basin["open"], 0.0
@@ -177,7 +233,7 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
         into, away = 0.0, 0.0
         for m in range(patches[p]["faces"]):
             k = tables[I_INTEGERS][patches[p]["ring"] + m]
-            flow = factor * ring_flow(plane, basin, k)
+            flow = factor * flow_in(plane, basin, k)
             into += max(flow, 0.0) * outside[k]
             away -= min(flow, 0.0)
         out[lies + patches[p]["node"]] = per * into
@@ -192,7 +248,7 @@ def bring(tables, patch, basin, q, y, rate, out):
     """What the network brings through a patch into the cells behind it; each gives of its own where water leaves."""
     layout, nodes, rho = tables[I_LAYOUT][0], tables[I_NODES].size, tables[I_SETTINGS][0]["rho"]
     node = patch["node"]
-    made_up = out[layout["gain"] + q * (nodes + 1) + node]
+    made_up = out[layout["gain"] + q * nodes + node]
     flow = (out[layout["net"] + node] + out[layout["supply"] + node]) / (rho * patch["area"])  # [m/s] of depth
     brought = (out[layout["brought"] + q * nodes + node] + made_up) / (rho * patch["area"])
     leaves = min(flow, 0.0)

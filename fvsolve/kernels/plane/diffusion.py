@@ -4,7 +4,7 @@ s_t = div(D depth grad c) - decay (s - depth ambient) + source, for amounts s = 
 """
 
 from fvsolve.jit import inner, njit
-from fvsolve.kernels.plane.advection import put_values
+from fvsolve.kernels.plane.advection import THIN, put_values
 
 
 @njit
@@ -25,14 +25,16 @@ def conduct(across, a, b, to):
 
 
 @inner
-def spread(kx, ky, p, wx, south, ws, here, north, wn, rate, top):
-    """Add to the rates of a row; p : its values, with one beyond either end; top : greatest rate by column."""
+def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
+    """Add to the rates of a row; p : its values, with one beyond either end; top : greatest rate by column so far."""
     w, e, ww, we = p, p[2:], wx, wx[1:]
     for i in range(rate.size):
         x = kx[i] * (we[i] * (e[i] - here[i]) - ww[i] * (here[i] - w[i]))
         y = ky * (wn[i] * (north[i] - here[i]) - ws[i] * (here[i] - south[i]))
         rate[i] += x + y
-        top[i] = kx[i] * (ww[i] + we[i]) + ky * (ws[i] + wn[i])
+        quick = kx[i] * (ww[i] + we[i]) + ky * (ws[i] + wn[i])
+        quick = quick / max(depth[i], THIN) if depth.size > 0 else quick
+        top[i] = quick if quick > top[i] else top[i]
 
 
 @njit
@@ -59,7 +61,7 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         deep = depth[i] if depth.size > 0 else 1.0
         come = factor * flow_y[i] > 0.0
         below[i], rows[i] = outside[2 * ny + i], 2.0 * ky[0] * diffusivity * deep if come else 0.0
-        above[i] = outside[2 * ny + nx + i]
+        above[i], top[i] = outside[2 * ny + nx + i], 0.0
     for j in range(ny):
         a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
         h, hn = depth[a:], depth[z:]
@@ -67,9 +69,9 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         for i in range(nx):
             inner_p[i] = row[i]
         p[0], p[nx + 1] = outside[j], outside[ny + j]
-        conduct(diffusivity, h, h[1:], inner_w)
+        conduct(1.0, h, h[1:], inner_w)
         for i in range(nx - 1):
-            inner_w[i] *= between(kx[i], kx[i + 1])
+            inner_w[i] *= diffusivity * between(kx[i], kx[i + 1])
         west, east = (depth[a], depth[z - 1]) if depth.size > 0 else (1.0, 1.0)
         wx[0] = 2.0 * kx[0] * diffusivity * west if factor * flow_x[f] > 0.0 else 0.0
         wx[nx] = 2.0 * kx[nx - 1] * diffusivity * east if factor * flow_x[f + nx] < 0.0 else 0.0
@@ -81,10 +83,45 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
             for i in range(nx):
                 deep = depth[last + i] if depth.size > 0 else 1.0
                 wn[i] = 2.0 * ky[j] * diffusivity * deep if factor * flow_y[z + i] < 0.0 else 0.0
-        spread(kx, ky[j], p, wx, south, ws, row, north, wn, rate[a:z], top)
-        for i in range(nx):
-            most = max(most, top[i] / depth[a + i] if depth.size > 0 and depth[a + i] > 0.0 else top[i])
+        spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
+    for i in range(nx):
+        most = max(most, top[i])
     return most
+
+
+@njit
+def enters(come, excess, slender, diffusivity, outside, depth, s):
+    """What comes in through a face with a flow, and by diffusion; slender : half the cell's width over the face's."""
+    own = s / max(depth, THIN)
+    if come > 0.0:
+        return come * outside + excess + diffusivity * depth / slender * (outside - own)
+    return come * own + excess
+
+
+@njit
+def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, ax, ay, s, ring):
+    """What comes in through every face of the boundary, float64[ring], carried and by diffusion [m2/s times a value].
+
+    ax, ay : the excesses that `grid_advection_fifth` leaves, work[n:] in the order of flow_x and then of flow_y;
+    empty for the others, and gone where the diffusion was given the same work. The sum is that of rates times areas.
+    """
+    m, last = nx + 1, ny * nx
+    for j in range(ny):
+        for side in range(2):
+            turn, face = (factor, j * m) if side == 0 else (-factor, j * m + nx)
+            k, i = (j * nx, 0) if side == 0 else ((j + 1) * nx - 1, nx - 1)
+            h = depth[k] if depth.size > 0 else 1.0
+            more = turn * ax[face] if ax.size > 0 else 0.0
+            at = side * ny + j
+            ring[at] = enters(turn * flow_x[face], more, 0.5 * ky[j] / kx[i], diffusivity, outside[at], h, s[k])
+    for i in range(nx):
+        for side in range(2):
+            turn, face = (factor, i) if side == 0 else (-factor, last + i)
+            k, j = (i, 0) if side == 0 else (last - nx + i, ny - 1)
+            h = depth[k] if depth.size > 0 else 1.0
+            more = turn * ay[face] if ay.size > 0 else 0.0
+            at = 2 * ny + side * nx + i
+            ring[at] = enters(turn * flow_y[face], more, 0.5 * kx[i] / ky[j], diffusivity, outside[at], h, s[k])
 
 
 @njit

@@ -16,7 +16,7 @@ from fvsolve.kernels.plane.patches import mean_deviation
 from fvsolve.kernels.plane.rooms import UNSPLIT
 from fvsolve.kernels.plane.shallow_rows import DEPTH, SURFACE, THIN
 from fvsolve.kernels.records import (
-    ACOUSTIC_FACES,
+    CARRIED_GRID,
     I_BASINS,
     I_INTEGERS,
     I_LAYOUT,
@@ -28,7 +28,6 @@ from fvsolve.kernels.records import (
     RATE,
     SHALLOW_FACES,
 )
-
 
 ROWS = 4  # of `power` a basin
 
@@ -57,7 +56,7 @@ def add_power(t, y, dydt, out, handle, power):
         rows[0] = rows[1] = rows[2] = rows[3] = 0.0
         if basins[b]["kind"] <= SHALLOW_FACES:
             water_power(st, basins[b], tables[I_PLANE], out[RATE] / UNSPLIT, y, dydt, rows)
-        elif basins[b]["kind"] <= ACOUSTIC_FACES:
+        elif basins[b]["kind"] < CARRIED_GRID:
             liquid_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
     for k in range(patches.size):
         patch, node = patches[k], patches[k]["node"]
@@ -89,7 +88,7 @@ def water_power(st, basin, plane, fastest, y, dydt, rows):
 @njit
 def drag_power(st, basin, fastest, depth, square):
     """What the bed takes of water that runs over it, per area [W/m2]; square : of its velocity."""
-    if basin["friction"] == NO_DRAG:
+    if basin["friction"] == NO_DRAG or square == 0.0:
         return 0.0
     rate, wet = 0.125 * basin["roughness"] * sqrt(square) / max(depth, THIN), max(depth, THIN)
     if basin["friction"] == MANNING:
@@ -144,7 +143,7 @@ def add_stored(t, y, dydt, out, handle, stored):
                 share = per_flow(max(depths[i] + d, 0.0))
                 height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
                 total += area[i] * (height + 0.5 * st["rho"] * share * square)
-        elif basin["kind"] <= ACOUSTIC_FACES:
+        elif basin["kind"] < CARRIED_GRID:
             for i in range(n):
                 r, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
                 total += area[i] * (rest * r + 0.5 * (basin["speed"] ** 2 * r * r + square))

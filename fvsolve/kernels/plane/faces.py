@@ -19,6 +19,7 @@ floats : float64[:]  by block, side and row of BLOCK: outward normal, length / a
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.records import MINMOD
 
 CELL, SIDE, INDICES = 0, 1, 2
 NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
@@ -27,7 +28,7 @@ HEAD = 5
 BLOCK = 128  # cells whose geometry and neighbours stay in the nearest cache
 TINY = 1e-300
 HUGE = 1e300
-ALMOST = 1.0 - 1e-15
+WIDE = 2.0  # how far beyond the values around a linear field may go on shaken meshes
 
 _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEASURES * BLOCK
 
@@ -53,28 +54,27 @@ def place(side, ring):
 
 
 @njit
+def width(limiter):
+    """How far values at sides may go beyond the values around: not at all for minmod, else as linear fields want."""
+    return 1.0 if limiter == MINMOD else WIDE
+
+
+@njit
 def gather(values, where, out):
     """out[i] = values[where[i]]."""
     for i in range(BLOCK):
         out[i] = values[where[i]]
 
 
-@njit(forceinline=True)
-def kept(most, least, top, bottom):
-    """Share of a slope that rises to `top` and falls to `bottom`, where neighbours allow `most` and `least`.
-
-    y - 4/27 y^3 of the smaller ratio up to y = 3/2, beyond it 1 (Michalak and Ollivier-Gooch 2008); a rounding less,
-    so that no value at a side falls below the least or above the greatest around.
-    """
-    rises = most * bottom > least * top  # most / top < least / bottom
-    y = (most if rises else -least) / ((top if rises else -bottom) + TINY)
-    y = y if y < 1.5 else 1.5
-    return y * (ALMOST - (4.0 / 27.0) * y * y)
-
-
 @njit
-def sides_of_three(p, most_rise, beyond, geo, out):
-    """Limited values at three sides of a block of cells, from those beyond."""
+def sides_of_three(p, wide, cap, beyond, geo, out):
+    """Limited values at three sides of a block of cells, from those beyond.
+
+    Where cells around rise by `most` and fall by `least`, a side rises by no more than wide most, -2 wide least and
+    `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of the highest and of the lowest cell
+    around differs from it; where wide is 1 none leaves the values around.
+    """
+    back = 2.0 * wide
     for i in range(BLOCK):
         here = p[i]
         a, b, c = beyond[i] - here, beyond[BLOCK + i] - here, beyond[2 * BLOCK + i] - here
@@ -83,14 +83,17 @@ def sides_of_three(p, most_rise, beyond, geo, out):
         r = gx * geo[_DX + i] + gy * geo[_DY + i]
         s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
         t = -(r + s)  # the middles of a triangle's sides have its centre
-        most, least = min(max(max(a, b), max(c, 0.0)), most_rise[i]), min(min(a, b), min(c, 0.0))
-        keep = kept(most, least, max(max(r, s), max(t, 0.0)), min(min(r, s), min(t, 0.0)))
-        out[i], out[BLOCK + i], out[2 * BLOCK + i] = here + keep * r, here + keep * s, here + keep * t
+        most, least = max(max(a, b), max(c, 0.0)), min(min(a, b), min(c, 0.0))
+        low, high = max(max(wide * least, -back * most), -cap[i]), min(min(wide * most, -back * least), cap[i])
+        out[i] = here + min(max(r, low), high)
+        out[BLOCK + i] = here + min(max(s, low), high)
+        out[2 * BLOCK + i] = here + min(max(t, low), high)
 
 
 @njit
-def sides_of_four(p, most_rise, beyond, geo, out):
+def sides_of_four(p, wide, cap, beyond, geo, out):
     """The same at four sides; opposite ones of a rectangle first, so that mirrored cells find mirrored sums."""
+    back = 2.0 * wide
     for i in range(BLOCK):
         here = p[i]
         a, b = beyond[i] - here, beyond[BLOCK + i] - here
@@ -105,19 +108,20 @@ def sides_of_four(p, most_rise, beyond, geo, out):
         s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
         t = gx * geo[2 * _SIDE + _DX + i] + gy * geo[2 * _SIDE + _DY + i]
         u = gx * geo[3 * _SIDE + _DX + i] + gy * geo[3 * _SIDE + _DY + i]
-        most = min(max(max(a, b), max(max(c, d), 0.0)), most_rise[i])
-        least = min(min(a, b), min(min(c, d), 0.0))
-        top, bottom = max(max(r, s), max(max(t, u), 0.0)), min(min(r, s), min(min(t, u), 0.0))
-        keep = kept(most, least, top, bottom)
-        out[i], out[BLOCK + i] = here + keep * r, here + keep * s
-        out[2 * BLOCK + i], out[3 * BLOCK + i] = here + keep * t, here + keep * u
+        most, least = max(max(a, b), max(max(c, d), 0.0)), min(min(a, b), min(min(c, d), 0.0))
+        low, high = max(max(wide * least, -back * most), -cap[i]), min(min(wide * most, -back * least), cap[i])
+        out[i] = here + min(max(r, low), high)
+        out[BLOCK + i] = here + min(max(s, low), high)
+        out[2 * BLOCK + i] = here + min(max(t, low), high)
+        out[3 * BLOCK + i] = here + min(max(u, low), high)
 
 
 @njit
-def put_sides(j, floats, integers, values, most_rise, shown, edges, scratch, sides):
+def put_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sides):
     """Limited values of block j at its sides.
 
-    values : float64[ring BLOCK]; most_rise : float64[BLOCK]; scratch : float64[4 BLOCK]; sides : float64[4 ring BLOCK]
+    values : float64[ring BLOCK]; wide, cap : see `sides_of_three`; scratch : float64[4 BLOCK]
+    sides : float64[4 ring BLOCK]
     shown : float64[:]  what the boundary shows at its sides `edges`, int64[:], of this block
     """
     slots, ring = integers[0], integers[4]
@@ -128,6 +132,6 @@ def put_sides(j, floats, integers, values, most_rise, shown, edges, scratch, sid
     at = (j % ring) * BLOCK
     p, geo, out = values[at:], floats[j * slots * MEASURES * BLOCK :], sides[4 * at :]
     if slots == 3:
-        sides_of_three(p, most_rise, scratch, geo, out)
+        sides_of_three(p, wide, cap, scratch, geo, out)
     else:
-        sides_of_four(p, most_rise, scratch, geo, out)
+        sides_of_four(p, wide, cap, scratch, geo, out)

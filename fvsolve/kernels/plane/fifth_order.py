@@ -19,10 +19,11 @@ def beyond(known, o, a, b, c, d, e):
 
     Where it is known, o at the side takes the place of e.
     """
+    p, q, r, s = a - b, b - c, c - d, d - e
     if known:
-        first = 5.0 * o - 77.0 / 12.0 * a + 43.0 / 12.0 * b - 17.0 / 12.0 * c + 0.25 * d
-        return first, 25.0 * o - 505.0 / 12.0 * a + 335.0 / 12.0 * b - 145.0 / 12.0 * c + 2.25 * d
-    return 5.0 * a - 10.0 * b + 10.0 * c - 5.0 * d + e, 15.0 * a - 40.0 * b + 45.0 * c - 24.0 * d + 5.0 * e
+        one = (60.0 * (o - a) - 29.0 * p + 14.0 * q - 3.0 * r) / 12.0
+        return a + one, a + (300.0 * (o - a) - 217.0 * p + 118.0 * q - 27.0 * r) / 12.0
+    return a + (4.0 * p - 6.0 * q + 4.0 * r - s), a + (14.0 * p - 26.0 * q + 19.0 * r - 5.0 * s)
 
 
 @njit
@@ -175,7 +176,7 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
 def settle_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
     """Add to the rates of all cells what their faces' excesses bring."""
     for j in range(ny):
-        scale, to = factor * ky[j], rate[j * nx : (j + 1) * nx]
+        k, to = ky[j], rate[j * nx : (j + 1) * nx]
         aw, ae, south, north = ax[j * (nx + 1) :], ax[j * (nx + 1) + 1 :], ay[j * nx :], ay[(j + 1) * nx :]
         for i in range(nx):
-            to[i] += (scale * kx[i]) * ((aw[i] - ae[i]) + (south[i] - north[i]))
+            to[i] += (factor * (kx[i] * k)) * ((aw[i] - ae[i]) + (south[i] - north[i]))

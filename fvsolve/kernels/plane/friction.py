@@ -8,7 +8,7 @@ that takes no part of a second in water that moves, and none that the step must 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.shallow_rows import THIN
+from fvsolve.kernels.plane.shallow_rows import THIN, TINY
 from fvsolve.kernels.records import MANNING
 
 
@@ -29,7 +29,7 @@ def add_friction(law, g, coefficient, fastest, depth0, dh, qx, qy, rate_x, rate_
             rate = g * value * value * speed / wet ** (4.0 / 3.0)
         else:
             rate = 0.125 * value * speed / wet
-        rate /= 1.0 + rate / fastest
+        rate *= fastest / (fastest + rate + TINY)
         most = max(most, rate)
         rate_x[i] -= rate * qx[i]
         rate_y[i] -= rate * qy[i]

@@ -1,9 +1,9 @@
 """Pressure waves of a liquid on a grid, law `linear`. Knows rows of cells and sides; knows no patch and no network.
 
-r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], mass-flow densities m [kg/(m2 s)], pressure c^2 r.
-Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are carried by their own sides, which is Godunov's
-flux; the system is linear, so that one direction after the other has the full order of the scheme. A row of cells is
-read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
+r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, and mass-flow densities
+m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are carried by their own sides, which is
+Godunov's flux; the system is linear, so that one direction at a time has the full order of the scheme. A row of cells
+is read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
 """
 
 from fvsolve.jit import inner, njit
@@ -12,6 +12,7 @@ from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, sl
 from fvsolve.kernels.reconstruction import value_muscl, value_weno5
 from fvsolve.kernels.records import LINEAR, MINMOD, MUSCL, UPWIND, VAN_LEER, WENO5
 
+WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
 RING = 8  # rows of waves that are kept: six that a row of faces looks at, and room for all three beyond a side
 BEYOND = 3  # cells beyond a side
 EDGE = 5  # cells that a side looks at
@@ -49,9 +50,21 @@ def faces(scheme, limiter, small, a, b, c, d, e, f):
 
 
 @njit
-def bears(scheme, n, sides):
-    """The scheme that a direction of n cells bears: open sides want five for the fifth order."""
-    return MUSCL if sides > 0 and n < EDGE and (scheme == LINEAR or scheme == WENO5) else scheme
+def bears(scheme, n, one, other):
+    """The scheme that n cells between two kinds of sides bear: but for walls, these want five for the fifth order."""
+    return scheme if (one == WALLS and other == WALLS) or n >= EDGE or scheme == UPWIND else MUSCL
+
+
+@njit
+def side_of(reflect):
+    """WALLS, which every face of a side is; MIRRORS, which send all back, some turned; else OPEN."""
+    kind = WALLS
+    for k in range(reflect.size):
+        if abs(reflect[k]) != 1.0:
+            return OPEN
+        if reflect[k] != 1.0:
+            kind = MIRRORS
+    return kind
 
 
 @njit
@@ -76,17 +89,17 @@ def mirror(n, forward, backward):
 
 
 @njit
-def close_side(scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
+def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
     """Three values beyond a side of n cells, at `first`, `first + step`, ..., which sends `reflect` of a wave back.
 
-    At 1 and -1 they are the mirror's; else the wave that leaves goes on as a polynomial, and the one that enters has
-    its own value at the side for a datum, as at the ends of pipes.
+    On OPEN sides the wave that leaves goes on as a polynomial, and the one that enters has its own value at the side
+    for a datum, as at the ends of pipes. Kinds go by sides: mixed on one, `upwind5` would grow by 1e-4 a cell time.
     """
     near_in, near_out, ghosts = spare[:EDGE], spare[EDGE : 2 * EDGE], spare[2 * EDGE : 2 * EDGE + BEYOND]
     for k in range(EDGE):
         at = first + step * min(k, n - 1)
         near_in[k], near_out[k] = entering[at], leaving[at]
-    if abs(reflect) == 1.0 and n >= BEYOND:
+    if kind == MIRRORS:
         for k in range(BEYOND):
             at = first - step * (k + 1)
             entering[at], leaving[at] = reflect * near_out[k], reflect * near_in[k]
@@ -109,7 +122,7 @@ def close_side(scheme, limiter, small, reflect, n, entering, leaving, first, ste
 
 
 @njit
-def close_row(scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
+def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
     """Close the southern or northern side of n rows of waves, in slots of a ring; `first` is the row next to it."""
     near_in, near_out, rest = spare[:NEAR], spare[NEAR : 2 * NEAR], spare[2 * NEAR :]
     wide = reflect.size
@@ -117,7 +130,7 @@ def close_row(scheme, limiter, small, reflect, n, entering, leaving, first, step
         for k in range(min(n, EDGE)):
             at = ((first + step * k) % RING) * wide + i
             near_in[BEYOND + k], near_out[BEYOND + k] = entering[at], leaving[at]
-        close_side(scheme, limiter, small, reflect[i], n, near_in, near_out, BEYOND, 1, rest)
+        close_side(kind, scheme, limiter, small, reflect[i], n, near_in, near_out, BEYOND, 1, rest)
         for k in range(BEYOND):
             at = ((first - step * (k + 1)) % RING) * wide + i
             entering[at], leaving[at] = near_in[BEYOND - 1 - k], near_out[BEYOND - 1 - k]
@@ -188,21 +201,27 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, wo
     between, work = work[: 4 * nx], work[4 * nx :]
     east, west, work = work[:wide], work[wide : 2 * wide], work[2 * wide :]
     fe, fw, spare = work[:f], work[f : 2 * f], work[2 * f :]
-    sides, half, rows = reflect.size, 0.5 * c, 0
-    along, across = bears(scheme, nx, sides), bears(scheme, ny, sides)
+    half, rows = 0.5 * c, 0
+    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
+    to_w, to_e, to_s, to_n = side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
+    along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
     for j in range(ny + 1):  # faces between rows j - 1 and j
         while rows < min(max(j + BEYOND, EDGE), ny):
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             put_waves(half, r[a:z], my[a:z], up[at : at + nx], down[at : at + nx])
             put_waves(half, r[a:z], mx[a:z], east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
             mirror(nx, east, west)
-            if sides > 0:
-                close_side(along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
-                close_side(along, limiter, small, reflect[ny + rows], nx, west, east, nx + BEYOND - 1, -1, spare)
+            if to_w != WALLS:
+                close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
+            if to_e != WALLS:
+                last = nx + BEYOND - 1
+                close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
             faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
             faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
-            if sides > 0:
-                fe[0], fw[nx] = reflect[rows] * fw[0], reflect[ny + rows] * fe[nx]
+            if to_w != WALLS:
+                fe[0] = reflect[rows] * fw[0]
+            if to_e != WALLS:
+                fw[nx] = reflect[ny + rows] * fe[nx]
             settle_row(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
@@ -213,20 +232,20 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, wo
                 a, at = fold(row, ny) * nx, (row % RING) * nx
                 one, other = (down, up) if image(row, ny) else (up, down)
                 put_waves(half, r[a : a + nx], my[a : a + nx], one[at : at + nx], other[at : at + nx])
-            if sides > 0 and side == 0:
-                close_row(across, limiter, small, reflect[2 * ny : 2 * ny + nx], ny, up, down, 0, 1, spare)
-            elif sides > 0:
-                close_row(across, limiter, small, reflect[2 * ny + nx :], ny, down, up, ny - 1, -1, spare)
+            if side == 0 and to_s != WALLS:
+                close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
+            if side == 1 and to_n != WALLS:
+                close_row(to_n, across, limiter, small, north, ny, down, up, ny - 1, -1, spare)
         now, before = 2 * nx * (j % 2), 2 * nx * (1 - j % 2)
         fu, fd = between[now : now + nx], between[now + nx : now + 2 * nx]
         a, b, d = ((j - 3) % RING) * nx, ((j - 2) % RING) * nx, ((j - 1) % RING) * nx
         e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
         faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], fu)
         faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], fd)
-        if sides > 0 and j == 0:
-            send_back(reflect[2 * ny : 2 * ny + nx], fd, fu)
-        elif sides > 0 and j == ny:
-            send_back(reflect[2 * ny + nx :], fu, fd)
+        if j == 0 and to_s != WALLS:
+            send_back(south, fd, fu)
+        if j == ny and to_n != WALLS:
+            send_back(north, fu, fd)
         if j > 0:
             a, z = (j - 1) * nx, j * nx
             settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])

@@ -22,6 +22,7 @@ from fvsolve.kernels.plane.faces import (
     gather,
     place,
     put_sides,
+    width,
 )
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
@@ -137,10 +138,11 @@ def work_size(integers):
 
 
 @njit
-def liquid_rates(law, c0, rho, scheme, floats, integers, reflect, r, mx, my, work, rate_r, rate_x, rate_y):
+def liquid_rates(law, c0, rho, scheme, limiter, floats, integers, reflect, r, mx, my, work, rate_r, rate_x, rate_y):
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
-    law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest; scheme : UPWIND or MUSCL
+    law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
+    scheme, limiter : UPWIND, or MUSCL as in `faces.width`
     reflect : float64[b]  share of a wave that comes back, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
     work : float64[work_size(integers)]
@@ -161,12 +163,8 @@ def liquid_rates(law, c0, rho, scheme, floats, integers, reflect, r, mx, my, wor
     free = w[_FREE:]
     for i in range(BLOCK):
         w[_TOP + i], free[i] = 0.0, HUGE
-    known, sided, wall, edge = (
-        0,
-        0,
-        0,
-        0,
-    )  # blocks whose cells, whose sides are known; the boundary so far in both loops
+    wide_by = width(limiter)
+    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:
             while known < need[sided]:
@@ -177,9 +175,9 @@ def liquid_rates(law, c0, rho, scheme, floats, integers, reflect, r, mx, my, wor
                 k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
                 here, sp, su, sv = edges[k:wall], shown[k:], shown[b + k :], shown[2 * b + k :]
                 show(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, p, u, v, sp, su, sv)
-                put_sides(sided, floats, integers, p, free, sp, here, w, ps)
-                put_sides(sided, floats, integers, u, free, su, here, w, us)
-                put_sides(sided, floats, integers, v, free, sv, here, w, vs)
+                put_sides(sided, floats, integers, p, wide_by, free, sp, here, w, ps)
+                put_sides(sided, floats, integers, u, wide_by, free, su, here, w, us)
+                put_sides(sided, floats, integers, v, wide_by, free, sv, here, w, vs)
             sided += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK

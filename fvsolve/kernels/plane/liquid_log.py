@@ -1,10 +1,11 @@
 """Pressure waves of a liquid on a grid, law `log`, the full momentum flux. Knows rows of cells; knows no patch.
 
-r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho); deviation of
+r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho): deviation of
 density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is carried along u + c
-and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed from their own sides, and the state that
-both make at a face is the solution of the Riemann problem by two simple waves (Osher and Solomon 1982, below the speed
-of sound); the velocity along the face comes from the side that the flow comes from. Walls, rows and slots: see `liquid`.
+and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed from their own sides, and the state
+that both make at a face is the Riemann problem's with two simple waves (Osher and Solomon 1982), below the speed of
+sound; the velocity along a face comes from the side that the flow comes from. Fifth order is that of the waves:
+products of averages are of second order, with the Mach number for a factor. Sides, rows and slots: see `liquid`.
 """
 
 from math import sqrt
@@ -16,6 +17,7 @@ from fvsolve.kernels.plane.liquid import (
     EDGE,
     RING,
     SPARE,
+    WALLS,
     bears,
     close_row,
     close_side,
@@ -25,6 +27,7 @@ from fvsolve.kernels.plane.liquid import (
     mirror,
     put_waves,
     send_back,
+    side_of,
     value_upwind5,
 )
 from fvsolve.kernels.reconstruction import value_weno5
@@ -33,7 +36,7 @@ from fvsolve.kernels.records import LINEAR, MINMOD, UPWIND, VAN_LEER, WENO5
 
 @njit(forceinline=True)
 def log_sum(y):
-    """ln(1 + y) as 8 artanh of a fourth root, to round-off for 1 + y from 1/2 to 2; no call, so that loops are vectors."""
+    """ln(1 + y) by its fourth root's artanh, to round-off for y from -1/2 to 1; no call, so that loops are vectors."""
     s = sqrt(1.0 + y)
     q = 1.0 + sqrt(s)
     t = y / ((1.0 + s) * (q * q))
@@ -143,8 +146,10 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
     w, v, top, work = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx], work[3 * nx :]
     east, west, over, work = work[:wide], work[wide : 2 * wide], work[2 * wide : 3 * wide], work[3 * wide :]
     fe, fw, ft, spare = work[:f], work[f : 2 * f], work[2 * f : 3 * f], work[3 * f :]
-    sides, rows = reflect.size, 0
-    along, across = bears(scheme, nx, sides), bears(scheme, ny, sides)
+    rows = 0
+    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
+    to_w, to_e, to_s, to_n = side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
+    along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
     for i in range(nx):
         top[i] = 0.0
     for j in range(ny + 1):  # faces between rows j - 1 and j
@@ -156,13 +161,17 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
             put_waves(0.5, w, u, east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
             mirror(nx, east, west)
             mirror(nx, over, over)
-            if sides > 0:
-                close_side(along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
-                close_side(along, limiter, small, reflect[ny + rows], nx, west, east, nx + BEYOND - 1, -1, spare)
+            if to_w != WALLS:
+                close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
+            if to_e != WALLS:
+                last = nx + BEYOND - 1
+                close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
             faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
             faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
-            if sides > 0:
-                fe[0], fw[nx] = reflect[rows] * fw[0], reflect[ny + rows] * fe[nx]
+            if to_w != WALLS:
+                fe[0] = reflect[rows] * fw[0]
+            if to_e != WALLS:
+                fw[nx] = reflect[ny + rows] * fe[nx]
             faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
             fluxes(c0, rho, fe, fw, ft)
             settle_row(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
@@ -177,20 +186,20 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
                 one, other = (down, up) if image(row, ny) else (up, down)
                 put_primitives(c0, rho, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
                 put_waves(0.5, w, v, one[at : at + nx], other[at : at + nx])
-            if sides > 0 and side == 0:
-                close_row(across, limiter, small, reflect[2 * ny : 2 * ny + nx], ny, up, down, 0, 1, spare)
-            elif sides > 0:
-                close_row(across, limiter, small, reflect[2 * ny + nx :], ny, down, up, ny - 1, -1, spare)
+            if side == 0 and to_s != WALLS:
+                close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
+            if side == 1 and to_n != WALLS:
+                close_row(to_n, across, limiter, small, north, ny, down, up, ny - 1, -1, spare)
         now, before = 3 * nx * (j % 2), 3 * nx * (1 - j % 2)
         gu, gd, gt = between[now : now + nx], between[now + nx : now + 2 * nx], between[now + 2 * nx : now + 3 * nx]
         a, b, d = ((j - 3) % RING) * nx, ((j - 2) % RING) * nx, ((j - 1) % RING) * nx
         e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
         faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], gu)
         faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], gd)
-        if sides > 0 and j == 0:
-            send_back(reflect[2 * ny : 2 * ny + nx], gd, gu)
-        elif sides > 0 and j == ny:
-            send_back(reflect[2 * ny + nx :], gu, gd)
+        if j == 0 and to_s != WALLS:
+            send_back(south, gd, gu)
+        if j == ny and to_n != WALLS:
+            send_back(north, gu, gd)
         faces_carried(
             across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
         )

@@ -12,8 +12,7 @@ from fvsolve.kernels.records import (
     I_PATCHES,
     I_PLANE,
     I_SETTINGS,
-    LIQUID_FACES,
-    LIQUID_GRID,
+    LAW_LOG,
     RATE,
     SHALLOW_FACES,
 )
@@ -45,7 +44,7 @@ def patch_pressures(t, y, dydt, out, handle):
         else:
             slope, content = basin["speed"] * basin["speed"], basin["thickness"] * patch["area"]
         pressure = slope * stored
-        if basin["kind"] == LIQUID_GRID or basin["kind"] == LIQUID_FACES:
+        if st["law"] == LAW_LOG and basin["density"] > 0.0:
             strain = stored / basin["density"]
             pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
         out[layout["pressure"] + patch["node"]] = pressure

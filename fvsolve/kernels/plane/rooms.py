@@ -2,17 +2,20 @@
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane import liquid, liquid_log, shallow
+from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log, shallow, shallow_faces
 from fvsolve.kernels.plane.friction import add_friction
 from fvsolve.kernels.plane.patches import book_open
 from fvsolve.kernels.records import (
     ACOUSTIC_GRID,
     I_BASINS,
+    I_INTEGERS,
     I_PLANE,
     I_SETTINGS,
+    LIQUID_FACES,
     LIQUID_GRID,
     NO_DRAG,
     RATE,
+    SHALLOW_FACES,
     SHALLOW_GRID,
 )
 
@@ -84,6 +87,56 @@ def liquid_grids(t, y, dydt, out, handle):
             basin["speed"], basin["density"], basin["small"], basin["scheme"], basin["limiter"], nx, ny,
             plane[k : k + nx], plane[k + nx : k + nx + ny],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
+            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
+            dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+        )  # fmt: skip
+        book_open(tables, basin, basin["thickness"], dydt, out)
+        out[RATE] = max(out[RATE], rate)
+
+
+@njit
+def shallow_meshes(t, y, dydt, out, handle):
+    """Rates of water on meshes of any cells."""
+    tables = open_tables(handle)
+    st, plane, integers = tables[I_SETTINGS][0], tables[I_PLANE], tables[I_INTEGERS]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] != SHALLOW_FACES:
+            continue
+        n, o, at, f = basin["n"], basin["y"], basin["plan"], basin["flows"]
+        plan = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n))
+        dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+        rate_x, rate_y = dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n]
+        flow = plane[:0]
+        if f >= 0:  # scalars are carried by them
+            flow = plane[f : f + basin["faces"]]
+        rate = shallow_faces.shallow_rates(
+            st["gravity"], basin["scheme"], plane[basin["mesh"] :], integers[basin["links"] :],
+            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
+            plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
+        )  # fmt: skip
+        if basin["friction"] != NO_DRAG:
+            add_friction(
+                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], rate, plan[0], dh, qx, qy,
+                rate_x, rate_y,
+            )  # fmt: skip
+        book_open(tables, basin, st["rho"], dydt, out)
+        out[RATE] = max(out[RATE], UNSPLIT * rate)
+
+
+@njit
+def liquid_meshes(t, y, dydt, out, handle):
+    """Rates of a liquid on meshes of any cells, under laws linear and log."""
+    tables = open_tables(handle)
+    plane, integers = tables[I_PLANE], tables[I_INTEGERS]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] != LIQUID_FACES:
+            continue
+        n, o = basin["n"], basin["y"]
+        rate = liquid_faces.liquid_rates(
+            tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], basin["scheme"], plane[basin["mesh"] :],
+            integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
             y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
             dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
         )  # fmt: skip

@@ -67,54 +67,56 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
     after = east if factor * flow[nx] < 0.0 else c[nx - 1]
     q[0], q[nx] = before, after
     if nx > 1:
-        q[1] = one_value(scheme, limiter, factor * flow[1] > 0.0, before, c[0], c[1], c[2] if nx > 2 else after)
+        e = c[2] if nx > 2 else 2.0 * after - c[1]
+        q[1] = one_value(scheme, limiter, factor * flow[1] > 0.0, 2.0 * before - c[0], c[0], c[1], e)
     if nx > 2:
-        forward = factor * flow[nx - 1] > 0.0
-        q[nx - 1] = one_value(scheme, limiter, forward, c[nx - 3], c[nx - 2], c[nx - 1], after)
+        e = 2.0 * after - c[nx - 1]
+        q[nx - 1] = one_value(scheme, limiter, factor * flow[nx - 1] > 0.0, c[nx - 3], c[nx - 2], c[nx - 1], e)
 
 
 @inner
-def across(scheme, limiter, factor, scale, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
-    """Values qn at the northern faces of a row of cells c, and its rates; scale is factor times ky."""
+def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
+    """Values qn at the northern faces of a row of cells c, and its rates; ky : its own."""
     fe, qe = fx[1:], qx[1:]
     if scheme == UPWIND:
         for i in range(rate.size):
             low, high = c[i], d[i]
             q = low if factor * fn[i] > 0.0 else high
             qn[i] = q
-            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
     elif limiter == MINMOD:
         for i in range(rate.size):
             q = value(slope_minmod, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
             qn[i] = q
-            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
     elif limiter == VAN_LEER:
         for i in range(rate.size):
             q = value(slope_van_leer, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
             qn[i] = q
-            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
     else:
         for i in range(rate.size):
             q = value(slope_monotonized_central, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
             qn[i] = q
-            rate[i] = settled(scale * kx[i], c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
 
 
 @njit
 def second_order_work(nx, ny):
     """Floats that `second_order_rates` works in."""
-    return 6 * nx + 4
+    return 7 * nx + 4
 
 
 @njit
 def second_order_rates(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, work, rate):
     """Rates of cells of values c by upwind or muscl; arguments as of `grid_advection`."""
-    below, above, rows, rest = work[:nx], work[nx : 2 * nx], work[2 * nx : 4 * nx], work[4 * nx :]
+    below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
+    rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]
     last = (ny - 1) * nx
     for i in range(nx):
-        below[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
-        above[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
-        rows[i] = below[i]
+        rows[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
+        north[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
+        below[i], above[i] = 2.0 * rows[i] - c[i], 2.0 * north[i] - c[last + i]
     for j in range(-1, ny):  # values along a row are had a row ahead: they are in memory when they are read
         if j < ny - 1:
             k = j + 1
@@ -123,9 +125,9 @@ def second_order_rates(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, 
         if j >= 0:
             a, z = j * nx, (j + 1) * nx
             b = c[a - nx : a] if j > 0 else below
-            d = c[z : z + nx] if j < ny - 1 else above
-            e = c[z + nx : z + 2 * nx] if j < ny - 2 else above
+            d = c[z : z + nx] if j < ny - 1 else north
+            e = c[z + nx : z + 2 * nx] if j < ny - 2 else above if j < ny - 1 else north
             fx, qx = flow_x[j * (nx + 1) :], rest[(j % 2) * (nx + 2) :]
             qs, qn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx :]
             fs, fn = flow_y[a:], flow_y[z:]
-            across(scheme, limiter, factor, factor * ky[j], b, c[a:], d, e, fx, qx, fs, qs, fn, kx, qn, rate[a:z])
+            across(scheme, limiter, factor, ky[j], b, c[a:], d, e, fx, qx, fs, qs, fn, kx, qn, rate[a:z])

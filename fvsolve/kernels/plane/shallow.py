@@ -16,12 +16,15 @@ from fvsolve.jit import njit
 from fvsolve.kernels.plane.shallow_rows import (
     EAST,
     FIELDS,
+    FLOW_EAST,
     GHOSTS,
-    MASS,
+    MOST,
     NORTH,
+    STRIDE,
+    WAVE,
     put_beyond,
     put_cells,
-    put_ends,
+    put_end,
     put_flows,
     put_fluxes,
     put_limited,
@@ -30,22 +33,12 @@ from fvsolve.kernels.plane.shallow_rows import (
 from fvsolve.kernels.plane.shallow_smooth import put_smooth
 from fvsolve.kernels.records import LINEAR, WENO5
 
-__all__ = ["PLANS", "grid_rates", "width", "work_size"]
+__all__ = ["PLANS", "WORK", "grid_rates"]
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # rows of cells at hand
-
-
-@njit
-def width(nx):
-    """Floats of a row with its ghosts, an odd number of cache lines, so that rows do not push each other out."""
-    return 8 * ((nx + 2 * GHOSTS + 7) // 8 | 1)
-
-
-@njit
-def work_size(nx, ny):
-    """Floats that `grid_rates` works in."""
-    return (RING * FIELDS + 52) * width(nx)
+BLOCK, SIDE, FLUX = FIELDS * STRIDE, 5 * STRIDE, 4 * STRIDE
+WORK = RING * BLOCK + 6 * SIDE + 3 * FLUX + 5 * STRIDE  # floats that `grid_rates` works in
 
 
 @njit
@@ -56,22 +49,37 @@ def copy(source, target):
 
 
 @njit
-def put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top):
-    """Row j of cells; also one beyond the first or the last, from those before it."""
-    cells = ring[j & (RING - 1)]
+def place(j, i):
+    """Where cell i of row j is in the ring."""
+    return (j & (RING - 1)) * BLOCK + GHOSTS + i
+
+
+@njit
+def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top):
+    """Columns `first` to `last` of row j of cells and their ghosts; also one beyond the grid, from those before it."""
+    fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
+    cells, walls = ring[place(j, left - first) :], reflect.size > 0
     if 0 <= j < ny:
-        a, b = j * nx, (j + 1) * nx
-        put_cells(g, plan[0, a:b], plan[1, a:b], dh[a:b], qx[a:b], qy[a:b], kx, ky[j], cells, top)
-        walls = reflect.size > 0
+        a, b = j * nx + left, j * nx + right
+        put_cells(
+            g, plan[0, a:b], plan[1, a:b], dh[a:b], qx[a:b], qy[a:b], kx[left:right], ky[j],
+            cells, top[GHOSTS + left - first :],
+        )  # fmt: skip
         if fifth:
             put_flows(qx[a:b], qy[a:b], cells)
-        put_ends(nx, reflect[j] if walls else 1.0, reflect[ny + j] if walls else 1.0, cells)
+        block = ring[place(j, -GHOSTS) :]
+        if left == 0:
+            put_end(fields, 3 if fifth else 2, reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
+        if right == nx:
+            put_end(fields, 3 if fifth else 2, reflect[ny + j] if walls else 1.0, block, GHOSTS + nx - 1 - first, 1, nx)
         return
-    last = 0 if j < 0 else ny - 1
+    edge = 0 if j < 0 else ny - 1
     mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)
-    at = 2 * ny if j < 0 else 2 * ny + nx
-    walls = reflect[at : at + nx] if reflect.size > 0 else reflect
-    put_beyond(nx, walls, ring[last & (RING - 1)], ring[mirror & (RING - 1)], cells)
+    at = 2 * ny + first if j < 0 else 2 * ny + nx + first
+    put_beyond(
+        last - first, fields, reflect[at : at + last - first] if walls else reflect,
+        ring[place(edge, 0) :], ring[place(mirror, 0) :], ring[place(j, 0) :],
+    )  # fmt: skip
 
 
 @njit
@@ -86,61 +94,89 @@ def grid_rates(
     plan : float64[PLANS, n], depth of the profile at rest and its surface less the level [m]
     dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
-    work : float64[work_size(nx, ny)], fastest where it begins at a cache line
+    work : float64[WORK], fastest where it begins at a cache line
     """
-    wide, fifth = width(nx), scheme == LINEAR or scheme == WENO5
-    ring, at = work[: RING * FIELDS * wide].reshape((RING, FIELDS, wide)), RING * FIELDS * wide
-    sides, at = work[at : at + 36 * wide].reshape((3, 2, 6, wide)), at + 36 * wide
-    fluxes, at = work[at : at + 12 * wide].reshape((3, 4, wide)), at + 12 * wide
-    pushes, at = work[at : at + 3 * wide].reshape((3, wide)), at + 3 * wide
-    top = work[at : at + nx]
-    for i in range(nx):
+    most = 0.0
+    for first in range(0, nx, MOST):
+        last = min(first + MOST, nx)
+        rate = column_rates(
+            g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, work,
+            rate_h, rate_x, rate_y,
+        )  # fmt: skip
+        most = max(most, rate)
+    return most
+
+
+@njit
+def column_rates(
+    g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, work,
+    rate_h, rate_x, rate_y,
+):  # fmt: skip
+    """The same of columns `first` to `last`, no more than MOST of them, row by row."""
+    n, fifth = last - first, scheme == LINEAR or scheme == WENO5
+    ring, at = work[: RING * BLOCK], RING * BLOCK
+    lows, highs, at = work[at : at + 3 * SIDE], work[at + 3 * SIDE : at + 6 * SIDE], at + 6 * SIDE
+    fluxes, at = work[at : at + 3 * FLUX], at + 3 * FLUX
+    pushes, deep, top = work[at : at + 3 * STRIDE], work[at + 3 * STRIDE :], work[at + 4 * STRIDE :]
+    west, east, along, push_x = lows[2 * SIDE :], highs[2 * SIDE :], fluxes[2 * FLUX :], pushes[2 * STRIDE :]
+    for i in range(STRIDE):
         top[i] = 0.0
     reach = 3 if fifth else 2
     ahead = min(reach, ny)
     for j in range(ahead):
-        put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top)
     for j in range(-1, -1 - reach, -1):
-        put_row(g, j, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top)
-    one = GHOSTS - 1  # the cell beyond the first
+        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top)
     for j in range(-1, ny + 1):
         while ahead < j + reach:
-            put_row(g, ahead, fifth, nx, ny, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+            put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top)
             ahead += 1
         # values of row j at its southern and northern faces
-        now, was, r = j & 1, (j - 1) & 1, RING - 1
-        before, here, after = ring[(j - 1) & r], ring[j & r], ring[(j + 1) & r]
-        low, high, push = sides[now, 0], sides[now, 1], pushes[now]
-        put_limited(scheme, limiter, nx, before, GHOSTS, here, GHOSTS, after, GHOSTS, low, high, push)
+        now, was = j & 1, (j - 1) & 1
+        here, before = ring[place(j, 0) :], ring[place(j - 1, 0) :]
+        low, high, push = lows[now * SIDE :], highs[now * SIDE :], pushes[now * STRIDE :]
+        put_limited(scheme, limiter, n, before, here, ring[place(j + 1, 0) :], low, high, push)
         if fifth:
             put_smooth(
-                g, scheme, nx, ring[(j - 2) & r], GHOSTS, before, GHOSTS, here, GHOSTS, after, GHOSTS,
-                ring[(j + 2) & r], GHOSTS, low, high, push,
+                g, scheme, ring[place(j - 2, 0) :], before, here, ring[place(j + 1, 0) :], ring[place(j + 2, 0) :],
+                low, high, push, deep[:n],
             )  # fmt: skip
         if j < 0:
             continue
         # faces between rows j - 1 and j
-        put_fluxes(g, nx, NORTH, EAST, fifth, sides[was, 1], 0, low, 0, before, GHOSTS, here, GHOSTS, fluxes[now])
+        south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], highs[was * SIDE :]
+        l, r = (under, low) if fifth else (before, here)  # where speeds are looked at
+        put_fluxes(
+            g, n, under, under[NORTH:], under[EAST:], low, low[NORTH:], low[EAST:],
+            l[NORTH:], l[WAVE:], r[NORTH:], r[WAVE:], north,
+        )  # fmt: skip
         if flow_y.size > 0:
-            copy(fluxes[now, MASS], flow_y[j * nx : (j + 1) * nx])
+            copy(north, flow_y[j * nx + first : j * nx + last])
         if j == 0:
             continue
         # row j - 1 : faces along it, and its rates
-        west, east, a, z = sides[2, 0], sides[2, 1], (j - 1) * nx, j * nx
-        put_limited(scheme, limiter, nx + 2, before, one - 1, before, one, before, one + 1, west, east, pushes[2])
+        whole = (n + 9) // 8 * 8  # more than is looked at, so that nothing is left over of a vector
+        cell = ring[place(j - 1, -1) :]
+        put_limited(scheme, limiter, whole, ring[place(j - 1, -2) :], cell, before, west, east, push_x)
         if fifth:
             put_smooth(
-                g, scheme, nx + 2, before, one - 2, before, one - 1, before, one, before, one + 1,
-                before, one + 2, west, east, pushes[2],
+                g, scheme, ring[place(j - 1, -3) :], ring[place(j - 1, -2) :], cell, before, ring[place(j - 1, 1) :],
+                west, east, push_x, deep[:whole],
             )  # fmt: skip
-        put_fluxes(g, nx + 1, EAST, NORTH, fifth, east, 0, west, 1, before, one, before, one + 1, fluxes[2])
+        l, r = (east, west[1:]) if fifth else (cell, before)
+        put_fluxes(
+            g, (n + 8) // 8 * 8, east, east[EAST:], east[NORTH:], west[1:], west[EAST + 1 :], west[NORTH + 1 :],
+            l[EAST:], l[WAVE:], r[EAST:], r[WAVE:], along,
+        )  # fmt: skip
         if flow_x.size > 0:
-            copy(fluxes[2, MASS], flow_x[(j - 1) * (nx + 1) : j * (nx + 1)])
+            at = (j - 1) * (nx + 1)
+            copy(along, flow_x[at + first : at + last + 1])
+        a, z = (j - 1) * nx + first, (j - 1) * nx + last
         put_rates(
-            g, kx, ky[j - 1], pushes[2, 1:], pushes[was], fluxes[2], fluxes[was], fluxes[now],
+            g, kx[first:last], ky[j - 1], push_x[1:], pushes[was * STRIDE :], along, south, north,
             rate_h[a:z], rate_x[a:z], rate_y[a:z],
         )  # fmt: skip
     most = 0.0
-    for i in range(nx):
+    for i in range(STRIDE):
         most = max(most, top[i])
     return most

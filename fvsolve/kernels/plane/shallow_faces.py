@@ -24,6 +24,7 @@ from fvsolve.kernels.plane.faces import (
     gather,
     place,
     put_sides,
+    width,
 )
 from fvsolve.kernels.records import UPWIND
 
@@ -33,7 +34,7 @@ THIN = 1e-6  # depth below which velocities fade [m]
 # rows of BLOCK in the scratch of `settle`: what lies beyond, rates, sums for the step, flow through the side
 _E, _U, _V, _C, _RH, _RX, _RY, _FAST, _GONE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-ROWS = 13
+ROWS = 14
 
 
 @njit
@@ -100,6 +101,13 @@ def clear(w):
 
 
 @njit
+def put_shores(h, shore):
+    """How much the surface may differ at the sides of a block of cells: not at all where the bed is dry."""
+    for i in range(BLOCK):
+        shore[i] = HUGE if h[i] > 0.0 else 0.0
+
+
+@njit
 def quickest(w, top):
     """The greatest rate so far in each lane: half of what waves pass, or all that leaves."""
     for i in range(BLOCK):
@@ -128,11 +136,12 @@ def work_size(integers):
 
 
 @njit
-def shallow_rates(g, scheme, floats, integers, reflect, plan, dh, qx, qy, flow, work, rate_h, rate_x, rate_y):
+def shallow_rates(g, scheme, limiter, floats, integers, reflect, plan, dh, qx, qy, flow, work, rate_h, rate_x, rate_y):
     """Rates of all cells; returns the greatest of sum L (|u| + c) / (2 A) and of the share that leaves a cell [1/s].
 
     Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
-    scheme : UPWIND or MUSCL; reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
+    scheme, limiter : UPWIND, or MUSCL as in `faces.width`
+    reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
     flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
@@ -149,15 +158,11 @@ def shallow_rates(g, scheme, floats, integers, reflect, plan, dh, qx, qy, flow, 
     if first_order:
         hs, es, us, vs = h, e, u, v
     shown, w = rest[4 * wide : 4 * wide + 2 * b], rest[4 * wide + 2 * b :]
-    top, free = w[11 * BLOCK :], w[12 * BLOCK :]
+    top, free, shore = w[11 * BLOCK :], w[12 * BLOCK :], w[13 * BLOCK :]
     for i in range(BLOCK):
         top[i], free[i] = 0.0, HUGE
-    known, sided, wall, edge = (
-        0,
-        0,
-        0,
-        0,
-    )  # blocks whose cells, whose sides are known; the boundary so far in both loops
+    wide_by = width(limiter)
+    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:
             while known < need[sided]:
@@ -170,10 +175,13 @@ def shallow_rates(g, scheme, floats, integers, reflect, plan, dh, qx, qy, flow, 
                 here, su, sv = edges[k:wall], shown[k:wall], shown[b + k : b + wall]
                 mirror(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, u, v, su, sv)
                 o = (sided % ring) * BLOCK
-                put_sides(sided, floats, integers, h, h[o:], su, edges[:0], w, hs)  # at most twice the depth
-                put_sides(sided, floats, integers, e, free, su, edges[:0], w, es)
-                put_sides(sided, floats, integers, u, free, su, here, w, us)
-                put_sides(sided, floats, integers, v, free, sv, here, w, vs)
+                put_sides(
+                    sided, floats, integers, h, wide_by, h[o:], su, edges[:0], w, hs
+                )  # from zero to twice the depth
+                put_shores(h[o:], shore)
+                put_sides(sided, floats, integers, e, wide_by, shore, su, edges[:0], w, es)
+                put_sides(sided, floats, integers, u, wide_by, free, su, here, w, us)
+                put_sides(sided, floats, integers, v, wide_by, free, sv, here, w, vs)
             sided += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK

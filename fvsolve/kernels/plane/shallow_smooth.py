@@ -1,28 +1,19 @@
 """Fifth-order values of shallow water at faces, where it is deep enough. Knows rows of cells; knows no grid.
 
 Depth, surface and unit flows are reconstructed from cell means, velocities are their quotients. The integral of
-h de/dx over a cell is exact for quartics: product of the parabolas through both faces and the mean, and what
-the third differences of either and the second of the other add.
+h de/dx over a cell is exact for cubics: the product of the parabolas through both faces and the mean, and what the
+third differences of either add to it with the second of the other.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.shallow_rows import (
-    DEPTH,
-    EAST,
-    FLOW_EAST,
-    NORTH,
-    SURFACE,
-    THIN,
-    WAVE,
-)
+from fvsolve.kernels.plane.shallow_rows import EAST, FLOW_EAST, NORTH, STRIDE, SURFACE, THIN, WAVE
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import WENO5
 
 SMALL = 1e-20  # squares of differences below which WENO's weights are its linear ones [m2, m4/s2]
 STEEP = 0.5  # shallowest of five depths over the deepest, below which values are limited ones
-DEEP = 5  # row of `high` that says where it is deep, 1
 
 
 @njit
@@ -58,13 +49,11 @@ def put_fifth(scheme, p, q, r, s, t, deep, low, high):
 @njit
 def put_velocities(g, deep, side):
     """Velocities from unit flows where it is deep, and wave speeds."""
-    h, u, v, c = side[DEPTH], side[EAST], side[NORTH], side[WAVE]
     for i in range(deep.size):
-        depth = max(h[i], 0.0)
-        c[i] = sqrt(g * depth)
+        depth = max(side[i], 0.0)
         wet = max(depth, THIN)
         part = 2.0 * depth / (depth * depth + wet * wet) if deep[i] > 0.0 else 1.0
-        u[i], v[i] = part * u[i], part * v[i]
+        side[i + EAST], side[i + NORTH], side[i + WAVE] = part * side[i + EAST], part * side[i + NORTH], sqrt(g * depth)
 
 
 @njit
@@ -78,17 +67,16 @@ def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
 
 
 @njit
-def put_smooth(g, scheme, n, p, i, q, j, r, k, s, l, t, m, low, high, push):
-    """Fifth-order values at both faces of n cells over limited ones, from five blocks and the first cell of each."""
-    deep = high[DEEP, :n]
-    put_deep(p[DEPTH, i:], q[DEPTH, j:], r[DEPTH, k:], s[DEPTH, l:], t[DEPTH, m:], deep)
-    for f in range(WAVE):
-        o = f if f < EAST else f - EAST + FLOW_EAST
-        put_fifth(scheme, p[o, i:], q[o, j:], r[o, k:], s[o, l:], t[o, m:], deep, low[f], high[f])
+def put_smooth(g, scheme, p, q, r, s, t, low, high, push, deep):
+    """Fifth-order values at both faces of a row of cells r over limited ones, from two on either side."""
+    put_deep(p, q, r, s, t, deep)
+    for f in range(4):
+        at = f * STRIDE
+        o = at if at < EAST else at - EAST + FLOW_EAST
+        put_fifth(scheme, p[o:], q[o:], r[o:], s[o:], t[o:], deep, low[at:], high[at:])
+    e = SURFACE
     put_push(
-        r[DEPTH, k:], deep, low[DEPTH], high[DEPTH], low[SURFACE], high[SURFACE],
-        p[DEPTH, i:], q[DEPTH, j:], s[DEPTH, l:], t[DEPTH, m:],
-        p[SURFACE, i:], q[SURFACE, j:], r[SURFACE, k:], s[SURFACE, l:], t[SURFACE, m:], push[:n],
+        r, deep, low, high, low[e:], high[e:], p, q, s, t, p[e:], q[e:], r[e:], s[e:], t[e:], push[: deep.size]
     )  # fmt: skip
     put_velocities(g, deep, low)
     put_velocities(g, deep, high)

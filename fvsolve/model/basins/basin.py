@@ -9,8 +9,10 @@ import numpy as np
 
 from fvsolve.case.basins import behind
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
+from fvsolve.model.face_mesh import lower_mesh
 
 if TYPE_CHECKING:
     from fvsolve.mesh.points import Points
@@ -35,6 +37,7 @@ class Basin:
         self.case, self.name, self.part, self.mesh = case, name, case.nodes[name], case.meshes[name]
         self.x, self.y = np.ascontiguousarray(self.mesh.centre.T)
         self.n = self.x.size
+        self.memory = 0  # its tables and its state [bytes]
         grid = self.mesh.grid
         self.is_grid = grid is not None and self.n == grid.nx * grid.ny
         self.scalars = list(case.scalars)
@@ -55,6 +58,10 @@ class Basin:
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """What cells hold at deviations float64[quantities, n], SI."""
+        raise NotImplementedError
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest of what tells of its waves at the start, SI."""
         raise NotImplementedError
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
@@ -118,7 +125,7 @@ class Basin:
 
     def lower_common(self, scene, row) -> None:
         """Fill what all kinds need."""
-        numerics, mesh = self.case.numerics, self.mesh
+        numerics, mesh, before = self.case.numerics, self.mesh, scene.plane_size + len(scene.integers)
         self.row, row["n"] = row, self.n
         row["scheme"] = rec.UPWIND if numerics.scheme == "upwind" else FIFTH.get(numerics.scheme, rec.MUSCL)
         row["limiter"] = LIMITERS.get(numerics.limiter, rec.MONOTONIZED_CENTRAL)
@@ -127,6 +134,15 @@ class Basin:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = scene.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
+        else:
+            if row["scheme"] not in (rec.UPWIND, rec.MUSCL):
+                scene.warnings.append(f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; "
+                                      "muscl is taken there")  # fmt: skip
+                row["scheme"] = rec.MUSCL
+            floats, self.integers, _ = lower_mesh(mesh)
+            row["mesh"], row["faces"] = scene.to_plane(floats), mesh.left.size
+            row["links"] = len(scene.integers)
+            scene.integers += self.integers.tolist()
         given = self.reflects()
         row["reflect"], row["outer_given"], row["open"] = scene.to_plane(given), given.size, -1
         if given.size:
@@ -143,6 +159,9 @@ class Basin:
         for name in self.scalars:
             scene.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
 
+        self.memory = 8 * (scene.plane_size + len(scene.integers) + scene.size - before)
+        scene.warnings += [f"basin {self.name}: {note}" for note in mesh.notes]
+
     def lower_scalars(self, scene, row) -> None:
         """Reserve what scalars are carried by and in, and values beyond the boundary."""
         mesh, grid = self.mesh, self.mesh.grid
@@ -153,7 +172,7 @@ class Basin:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
             toil = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
         else:
-            flows, toil = mesh.left.size, self.n + self.carrying_work()
+            flows, toil = mesh.left.size, self.n + advection_faces.work_size(self.integers)
         if row["flows"] < 0:
             row["flows"] = scene.to_plane(np.zeros(flows))
         row["toil"] = scene.to_plane(np.zeros(toil))

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.case.basins import bed_of
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import shallow
+from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.model.basins.basin import Basin
 
@@ -37,14 +37,18 @@ class FreeSurface(Basin, physics="free-surface"):
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning
         if self.is_grid:
-            self.lower_grid(scene, row, plan)
+            self.lower_grid(scene, row)
         else:
-            self.lower_faces(scene, row, plan)
+            self.lower_faces(scene, row)
         row["plan"] = scene.to_plane(plan)
 
-    def lower_grid(self, scene, row, plan: np.ndarray) -> None:
+    def lower_grid(self, scene, row) -> None:
         row["kind"] = rec.SHALLOW_GRID
         row["work"] = scene.to_plane(np.zeros(shallow.work_size(self.mesh.grid.nx, self.mesh.grid.ny)))
+
+    def lower_faces(self, scene, row) -> None:
+        row["kind"] = rec.SHALLOW_FACES
+        row["work"] = scene.to_plane(np.zeros(shallow_faces.work_size(self.integers)))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
@@ -62,6 +66,12 @@ class FreeSurface(Basin, physics="free-surface"):
         share = 2.0 * depth / (depth * depth + wet * wet)
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        depth = self.depth + self.start()[0]
+        low, high = float(depth.min()), float(depth.max())
+        speeds = np.sqrt(self.case.gravity * np.array([low, high]))
+        return {"depth": (low, high), "wave_speed": (float(speeds[0]), float(speeds[1]))}
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field not in ("depth", "surface", "bed"):

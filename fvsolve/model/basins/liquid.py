@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import liquid, liquid_log
+from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log
 from fvsolve.model.basins.basin import Basin
 
 SCALE = 1e5  # [Pa]
@@ -42,15 +42,16 @@ class Liquid(Basin, physics="liquid"):
 
     def lower(self, scene, row) -> None:
         row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
-        row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
         height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
         row["rest"] = self.part.pressure - self.case.ambient_pressure + height
+        row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
         if self.is_grid:
             row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.LIQUID_GRID
             size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
             row["work"] = scene.to_plane(np.zeros(size))
         else:
-            row["kind"] = rec.ACOUSTIC_FACES if self.linear else rec.LIQUID_FACES
+            row["kind"] = rec.LIQUID_FACES
+            row["work"] = scene.to_plane(np.zeros(liquid_faces.work_size(self.integers)))
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
         """Pressure above that at rest [Pa], of deviations of the density."""
@@ -71,6 +72,9 @@ class Liquid(Basin, physics="liquid"):
         density = self.density + (np.zeros(self.n) if self.linear else y[0])
         velocity = np.column_stack([y[1] / density, y[2] / density, np.zeros(self.n)])
         return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        return {"wave_speed": (self.speed, self.speed)}
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field != "pressure":

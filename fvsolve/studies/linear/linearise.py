@@ -18,7 +18,7 @@ from fvsolve.studies.linear.slopes import SMOOTH, central, kinks, one_sided, set
 from fvsolve.units import DIMENSIONS
 
 UNITS = {"opening": "-", "position": "-", "pressure": "Pa", "head": "m", "flow": "m3/s", "force": "N", "speed": "-",
-         "torque": "N m", "set pressure": "Pa"}  # fmt: skip
+         "torque": "N m", "set pressure": "Pa", "value": "-"}  # fmt: skip
 BOUNDS = {"opening": (0.0, 1.0), "speed": (0.0, np.inf), "position": (-1.0, 1.0)}
 STATE_UNITS = {
     "mass": "kg", "excess": "kg", "air": "kg", "forward": "kg/s", "backward": "kg/s", "memory": "kg/s", "flow": "kg/s",
@@ -89,7 +89,8 @@ class Linear:
 def state_unit(name: str, opens: bool) -> str:
     """SI unit of a state; the speed of what opens and shuts is that of its opening."""
     quantity = name.rsplit(".", 1)[1].rstrip("0123456789[]")
-    return "1/s" if quantity == "speed" and opens else STATE_UNITS[quantity]
+    amount = "kg/m" if name.endswith("]") else "kg"  # of a scalar, times its own unit
+    return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
 
 
 def linearise(
@@ -126,7 +127,8 @@ def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
     probes = model.case.probes[:outputs]
     return Linear(
         at, a, both[:n].copy(), c, both[n:].copy(), inputs, tuple(one.text for one in probes),
-        tuple(UNITS[known[name].kind] for name in inputs), tuple(DIMENSIONS[one.dimension].si for one in probes),
+        tuple(UNITS[known[name].kind] for name in inputs),
+        tuple(one.unit or DIMENSIONS[one.dimension].si for one in probes),
         tuple(values), tuple(model.observe(at.t, at.y)[:outputs].tolist()), {"A": error_a, "C": error_c, "BD": error},
     )  # fmt: skip
 

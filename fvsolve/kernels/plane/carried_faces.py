@@ -1,0 +1,36 @@
+"""Scalars in basins on meshes of any cells as a room of a scene. Knows the tables; the rest is as in `carried`."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.plane.advection_faces import advection_rates
+from fvsolve.kernels.plane.carried import deep, made_ready
+from fvsolve.kernels.records import (
+    CARRIED_FACES,
+    I_BASINS,
+    I_INTEGERS,
+    I_PLANE,
+    I_SCALARS,
+    RATE,
+    SHALLOW_FACES,
+)
+
+
+@njit
+def carry_on_meshes(t, y, dydt, out, handle):
+    """Rates of all amounts, carried and spread."""
+    tables = open_tables(handle)
+    plane, scalars, integers = tables[I_PLANE], tables[I_SCALARS], tables[I_INTEGERS]
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] != SHALLOW_FACES and basin["kind"] != CARRIED_FACES:
+            continue
+        n, flow = basin["n"], plane[basin["flows"] : basin["flows"] + basin["faces"]]
+        factor, depth = made_ready(t, tables, b, y), plane[basin["toil"] : basin["toil"] + deep(basin)]
+        for q in range(scalars.size):
+            o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
+            quickest = advection_rates(
+                basin["scheme"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :], integers[basin["links"] :],
+                flow, depth, plane[ring : ring + basin["outer"]], y[o : o + n], plane[basin["toil"] + n :],
+                dydt[o : o + n],
+            )  # fmt: skip
+            out[RATE] = max(out[RATE], quickest)

@@ -1,0 +1,396 @@
+"""What basins show: fields at points and along lines, flows through patches, frames, pictures, what check tells."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import meshio
+import numpy as np
+import pytest
+from pytest import approx
+from scipy.interpolate import RegularGridInterpolator
+from scipy.spatial import Delaunay
+from truth.meshes import delaunay, shaken, write
+from truth.scenes import AMBIENT, GRAVITY, RHO, ramp, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.draw.view import LABELS, digits, span
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.kernels import calls
+from fvsolve.kernels.handle import make_handle
+from fvsolve.kernels.plane.observe import observe_basins
+from fvsolve.mesh import read, rectangle
+from fvsolve.mesh.points import Points
+from fvsolve.output.fields import parted, shape, write_frame
+
+PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
+FIELDS = ("depth", "surface", "bed", "u", "v", "speed")
+SIZE, CELLS = (10.0, 4.0), (20, 8)
+
+
+def pool(**more) -> dict:
+    outlet = {"outlet": {"side": "east", "span": [1.0, 3.0]}}
+    return {"type": "basin", "size": list(SIZE), "cells": list(CELLS), "level": 2.0, "patches": outlet, **more}
+
+
+def draining(probes, end=2.0, output=None, **more) -> dict:
+    """A basin that empties through a valve."""
+    nodes = {"pool": pool(**more), "out": reservoir(AMBIENT)}
+    links = {"tap": valve("pool.outlet", "out", 0.02, ramp(0.0, 1.0, 0.0, 1.0))}
+    case = scene(nodes, links, end, PLANE, probes, 0.1)
+    case["output"] |= output or {}
+    return case
+
+
+def liquid(probes, **more) -> dict:
+    block = {"type": "basin", "physics": "liquid", "pressure": 5e5, "thickness": 0.02, **more}
+    return scene({"block": block}, {}, 1e-3, PLANE, probes, 1e-4)
+
+
+# points -----------------------------------------------------------------------------------------------------
+
+
+def meshes(folder):
+    yield rectangle((3.0, 2.0), (12, 9), grading=(3.0, 0.4))
+    yield rectangle((4.0, 4.0), (16, 16), holes=[(1.0, 1.0, 2.0, 2.5)])
+    yield read(write(folder / "shaken.msh", *shaken()))
+    yield read(write(folder / "triangles.msh", *delaunay()))
+
+
+def test_points_read_linear_fields_exactly_inside_and_no_value_beyond_those_of_the_cells(tmp_path):
+    rng = np.random.default_rng(4)
+    for mesh in meshes(tmp_path):
+        points, hull, many = Points(mesh), Delaunay(mesh.centre), 0
+        outer = np.unique(mesh.ends[mesh.inner :])
+        linear = 1.0 + 2.0 * mesh.centre[:, 0] - 3.0 * mesh.centre[:, 1]
+        low, high = mesh.points.min(0), mesh.points.max(0)
+        for x, y in low + (high - low) * rng.random((300, 2)):
+            cell = points.cell(x, y)
+            if cell < 0:
+                continue
+            cells, weights = points.reading(x, y)
+            assert weights.min() > 0.0 and weights.sum() == approx(1.0, abs=1e-14)
+            if not np.isin(mesh.cells[cell], outer).any() and hull.find_simplex((x, y)) >= 0:
+                many += 1
+                assert weights @ linear[cells] == approx(1.0 + 2.0 * x - 3.0 * y, abs=1e-12)
+        assert many > 20
+        for k, centre in enumerate(mesh.centre):
+            assert points.cell(*centre) == k
+            cells, weights = points.reading(*centre)
+            assert weights[cells == k] == approx(1.0, abs=1e-12)
+
+
+def test_the_nearest_point_inside_is_nearest_and_inside():
+    points = Points(rectangle((4.0, 4.0), (16, 16), holes=[(1.0, 1.0, 2.0, 2.5)]))
+    for outside, inside in (((-1.0, 2.0), (0.0, 2.0)), ((1.2, 1.6), (1.0, 1.6)), ((9.0, 9.0), (4.0, 4.0))):
+        assert points.cell(*outside) == -1
+        near = points.nearest(*outside)
+        assert points.cell(*near) >= 0 and near == approx(inside, abs=1e-3)
+
+
+# probes -----------------------------------------------------------------------------------------------------
+
+
+def random_state(model, scale) -> np.ndarray:
+    return scale * np.random.default_rng(5).standard_normal(model.y_size)
+
+
+def test_probes_between_centres_are_bilinear_in_what_frames_hold():
+    """Over a bed that is partly dry; the truth is SciPy's interpolation of the frame."""
+    places = [(3.5, 1.2), (0.6, 3.3), (5.0, 2.0), (9.1, 0.3), (7.77, 2.9)]
+    probes = [f"pool.{field}@{x},{y}" for x, y in places for field in FIELDS]
+    case = draining(probes, bed="0.3*x", elevation=7.0)
+    case["nodes"]["out"]["elevation"] = 7.0
+    model = fvsolve.build(fvsolve.load(case))
+    y = random_state(model, 0.3)
+    found = dict(zip(probes, model.observe(0.0, y), strict=True))
+    frame = model.frame(y, model.new_out())["pool"]
+    assert (frame["depth"] == 0.0).sum() > 20
+    u, v, _ = frame["velocity"].T
+    nx, ny = CELLS
+    axes = [(np.arange(n) + 0.5) * size / n for n, size in ((ny, SIZE[1]), (nx, SIZE[0]))]
+    for x, y in places:
+        want = {name: float(RegularGridInterpolator(axes, values.reshape(ny, nx))((y, x)))
+                for name, values in {**frame, "u": u, "v": v}.items() if name != "velocity"}  # fmt: skip
+        want["speed"] = np.hypot(want["u"], want["v"])
+        for field in FIELDS:
+            assert found[f"pool.{field}@{x},{y}"] == approx(want[field], rel=1e-12, abs=1e-13), field
+
+
+def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
+    """On triangles and quadrilaterals of a file, each in a cell of its own."""
+    path = write(tmp_path / "block.msh", *shaken())
+    mesh = read(path)
+    cells = (3, 17, len(mesh.cells) - 1)
+    probes = [f"block.{field}@{float(mesh.centre[k, 0])!r},{float(mesh.centre[k, 1])!r}"
+              for k in cells for field in ("pressure", "u", "v", "speed")]  # fmt: skip
+    model = fvsolve.build(fvsolve.load(liquid(probes, mesh={"file": str(path)})))
+    y = random_state(model, 1e-3)
+    found = np.zeros(len(probes))
+    observe_basins(0.0, y, model.new_out(), make_handle((*model.tables, calls.empty_calls(1))), found)
+    frame = model.frame(y, model.new_out())["block"]
+    for k, values in zip(cells, found.reshape(-1, 4), strict=True):
+        u, v, _ = frame["velocity"][k]
+        assert values == approx([frame["pressure"][k], u, v, np.hypot(u, v)], rel=1e-11)
+        assert values[0] - 5e5 == approx(2.2e9 / RHO * y[k], rel=1e-6)
+
+
+def test_the_flow_of_a_patch_is_what_the_basin_gains():
+    """The rates of all cells, times their areas, are the flow through the only patch, when it falls dry as well."""
+    model = fvsolve.build(fvsolve.load(draining(["pool.outlet.flow", "tap.flow"], level=2e-3)))
+    area = SIZE[0] * SIZE[1] / (CELLS[0] * CELLS[1])
+    shares = []
+    for lower in (0.0, -1e-3, -1.4e-3, -1.9e-3):
+        y = np.zeros(model.y_size)
+        y[: model.basins[0].n] = lower
+        flow, asked = model.observe(1.5, y)
+        assert flow == approx(model.rhs(1.5, y)[: model.basins[0].n].sum() * area, rel=1e-9)
+        shares.append(-flow / asked)
+    assert shares[:2] == [1.0, 1.0] and 1.0 > shares[2] > shares[3] > 0.0
+
+
+def test_a_run_records_points_and_patches_and_claims_about_them():
+    case = draining(["pool.outlet.flow", "pool.depth@5,2"], output={"units": {"level": "cm"}})
+    case["expect"] = {
+        "at(pool.depth@5,2, 0 s)": {"value": "2 m", "rtol": 1e-12},
+        "max(pool.u@9.9,2)": {"value": "0.03 m/s", "atol": "0.03 m/s"},
+    }
+    run = fvsolve.run(case)
+    assert [claim.ok for claim in run.expectations] == [True, True]
+    assert run.units["pool.depth@5,2"] == "cm" and run["pool.depth@5,2"][0] == approx(200.0, rel=1e-12)
+    whole = 0.5 * float(np.sum((run["pool.outlet.flow"][1:] + run["pool.outlet.flow"][:-1]) * np.diff(run.t)))
+    mass = run.ledger["mass"]
+    assert whole == approx((mass["final"] - mass["initial"]) / RHO, rel=1e-3)
+    assert 0.0 < run.extremes["pool.u@9.9,2"].greatest < 0.06
+
+
+@pytest.mark.parametrize(
+    "probe, says",
+    [
+        ("pool.depth", 'a basin is read at points: say where, for example "pool.depth@'),
+        ("pool.depth@here", '"@here" is no point x,y [m]; wanted for example "@'),
+        ("pool.depth@1", '"@1" is no point x,y [m]'),
+        ("pool.depth@nan,1", "nan, 1 is no point"),
+        ("pool.depth@11,2", "11,2 m lies outside the mesh or in a hole; the nearest point inside is 9.99"),
+        ("pool.dept@1,1", 'pool is a basin, without "dept"; it has depth, surface, bed, u, v, speed; did you mean'),
+        ("pool.pressure@1,1", 'without "pressure"'),
+        ("pool.outlet.depth", 'pool.outlet is a patch, without "depth"; it has pressure, gauge_pressure, head, flow'),
+        ("pool.outlet.flow@1,2", "pool.outlet is a patch: flow has no place along it; leave @1,2 out"),
+    ],
+)
+def test_a_probe_that_means_no_point_is_refused(probe, says):
+    with pytest.raises(CaseError, match=re.escape(says)):
+        fvsolve.load(draining([probe]))
+
+
+def test_the_point_that_a_fault_names_is_taken():
+    with pytest.raises(CaseError) as error:
+        fvsolve.load(draining(["pool.depth@11,-3"]))
+    near = str(error.value).rpartition(" ")[2]
+    assert fvsolve.load(draining([f"pool.depth@{near}"])).probes[0].point == approx((10.0, 0.0), abs=1e-3)
+
+
+# lines ------------------------------------------------------------------------------------------------------
+
+LINE = {"basin": "pool", "from": [0.25, 1.0], "to": ["9.75 m", 3.0], "points": 5}
+
+
+def table(path) -> tuple[list[str], np.ndarray]:
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    return rows[0], np.array(rows[1:], dtype=float)
+
+
+def test_lines_hold_what_the_frames_hold_at_their_points(tmp_path):
+    case = draining([], output={"fields": 3, "lines": {"cut": LINE}, "units": {"velocity": "mm/s"}})
+    assert fvsolve.run(case, out=tmp_path / "run").ok
+    assert sorted(path.name for path in (tmp_path / "run" / "lines").iterdir()) == [
+        f"cut-{k:06d}.csv" for k in range(4)
+    ]
+    header, found = table(tmp_path / "run" / "lines" / "cut-000003.csv")
+    assert header[:4] == ["distance [m]", "x [m]", "y [m]", "depth [m]"]
+    assert header[4:] == ["surface [m]", "bed [m]", "u [mm/s]", "v [mm/s]", "speed [mm/s]"]
+    assert found[:, 1:3] == approx(np.linspace((0.25, 1.0), (9.75, 3.0), 5), rel=1e-14)
+    assert found[-1, 0] == approx(np.hypot(9.5, 2.0), rel=1e-14)
+    frame = meshio.read(tmp_path / "run" / "fields" / "pool-000003.vtu").cell_data_dict
+    nx, ny = CELLS
+    axes = [(np.arange(n) + 0.5) * size / n for n, size in ((ny, SIZE[1]), (nx, SIZE[0]))]
+    for column, values, unit in ((3, frame["depth"]["quad"], 1.0), (6, frame["velocity"]["quad"][:, 0], 1e-3)):
+        want = RegularGridInterpolator(axes, values.reshape(ny, nx))(found[:, [2, 1]])
+        assert unit * found[:, column] == approx(want, rel=1e-12)
+
+
+def test_lines_of_a_resumed_run_are_those_of_the_unbroken_one(tmp_path):
+    case = draining([], 30.0, {"fields": 12, "lines": {"cut": LINE}}, cells=[80, 40])
+    times = []
+
+    def interrupt(t, seconds, steps):
+        times.append(t)
+        if t > 3.0:
+            raise KeyboardInterrupt
+
+    assert not fvsolve.run(case, out=tmp_path / "run", progress=interrupt).ok and 3.0 < times[-1] < 30.0
+    (tmp_path / "run" / "lines" / "cut-000012.csv").write_text("after the checkpoint")
+    assert fvsolve.run(case, out=tmp_path / "run", resume=True).ok
+    assert fvsolve.run(case, out=tmp_path / "whole").ok
+    for k in range(13):
+        name = f"lines/cut-{k:06d}.csv"
+        assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    case["output"]["lines"] = {}
+    assert fvsolve.run(case | {"numerics": case["numerics"] | {"end": 1.0}}, out=tmp_path / "run", force=True).ok
+    assert not list((tmp_path / "run").glob("lines/*"))
+
+
+def test_a_line_that_lies_in_no_basin_is_refused():
+    lines = {
+        "a": LINE | {"basin": "pol"}, "b": LINE | {"to": [12, 2]}, "c": LINE | {"to": LINE["from"]},
+        "d d": LINE,
+    }  # fmt: skip
+    with pytest.raises(CaseError) as error:
+        fvsolve.load(draining([], output={"fields": 0, "lines": lines}))
+    for says in (
+        'output.lines.a.basin: no basin named "pol"; basins are pool',
+        "output.lines.b.to: 12,2 m lies outside the mesh or in a hole; the nearest point inside is",
+        "output.lines.c.to: is where the line starts",
+        '"d d" is no name',
+        "output.lines: are written at every frame, and fields is 0",
+    ):
+        assert says in str(error.value)
+
+
+def test_a_line_across_a_hole_has_nothing_there(tmp_path):
+    from fvsolve.output.lines import Line
+
+    case = fvsolve.load(liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]]) | {
+        "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}
+    })  # fmt: skip
+    model = fvsolve.build(case)
+    line = Line(case.output.lines["cut"], model.basins[0], case)
+    rows = line.text(model.frame(model.start, model.new_out())["block"]).splitlines()
+    found = [float(row.split(",")[3]) for row in rows[1:]]  # the hole has its ends, 1 m and 2 m, as its outline
+    assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)
+
+
+# frames -----------------------------------------------------------------------------------------------------
+
+
+def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_its_units(tmp_path):
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkDataArray
+
+    path = write(tmp_path / "block.msh", *shaken())
+    model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
+    basin = model.basins[0]
+    fields = model.frame(random_state(model, 1e-3), model.new_out())["block"]
+    points, cells = shape(basin)
+    data = {name: parted(values, cells) for name, values in fields.items()}
+    write_frame(tmp_path / "block.vtu", points, cells, data, basin.units)
+    found, drawn = meshio.read(tmp_path / "block.vtu"), pyvista.read(tmp_path / "block.vtu")
+    kinds = {block.type for block in found.cells}
+    assert kinds == {"triangle", "quad"} and drawn.n_cells == basin.n
+    assert np.array_equal(np.concatenate(found.cell_data["pressure"]), fields["pressure"])
+    assert np.array_equal(drawn.cell_data["velocity"], fields["velocity"])
+    assert np.allclose(drawn.compute_cell_sizes().cell_data["Area"], basin.mesh.area, rtol=1e-12)
+    units = {name: drawn.GetCellData().GetArray(name).GetInformation().Get(vtkDataArray.UNITS_LABEL())
+             for name in fields}  # fmt: skip
+    assert units == {"pressure": "Pa", "velocity": "m/s"}
+
+
+# pictures ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "low, high",
+    [(0.0, 1.0), (1.7888, 1.7901), (1.99, 1.990001), (101324.0, 101327.0), (2.0, 2.0), (0.0, 0.0), (-3e-6, 4e-6),
+     (5e8, 5.00001e8), (0.99999, 100.0)],
+)  # fmt: skip
+def test_the_labels_of_a_bar_of_colours_differ(low, high):
+    ends = span(low, high)
+    labels = [digits(*ends) % value for value in np.linspace(*ends, LABELS)]
+    assert len(set(labels)) == LABELS
+    assert all(abs(float(text) - value) < 0.1 * (ends[1] - ends[0])
+               for text, value in zip(labels, np.linspace(*ends, LABELS), strict=True))  # fmt: skip
+
+
+def drawn(fvs, *arguments) -> str:
+    code, out, err = fvs("view", *arguments)
+    if "OpenGL" in err:
+        pytest.skip(err)
+    assert code == 0, err
+    return out.strip()
+
+
+@pytest.fixture
+def dam(tmp_path, monkeypatch):
+    """A run directory of a dam that breaks, with two frames."""
+    monkeypatch.chdir(tmp_path)
+    case = draining([], 0.5, {"fields": 1}, level=1.0, start={"level": "where(x < 5, 1, 0)"})
+    fvsolve.run(case, out="dam")
+    return "dam"
+
+
+def test_view_draws_contours_and_magnitudes(dam, fvs):
+    plain = open(drawn(fvs, dam, "--out", "a.png"), "rb").read()
+    lines = open(drawn(fvs, dam, "--contours", "5", "--out", "b.png"), "rb").read()
+    assert plain != lines and plain.startswith(b"\x89PNG")
+    assert drawn(fvs, dam, "--field", "velocity").endswith("velocity.png")
+    code, _, err = fvs("view", dam, "--field", "dept")
+    assert code == 2 and "no field 'dept'; did you mean \"depth\"" in err and "bed, depth, surface, velocity" in err
+
+
+def test_view_animates_all_frames(dam, fvs):
+    from PIL import Image
+
+    with Image.open(drawn(fvs, dam, "--animate", "dam.gif")) as film:
+        frames = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            frames.append(np.asarray(film.convert("RGB")).astype(int))
+    assert len(frames) == 2
+    bar = [frame[-60:, 250:750].std() for frame in frames]  # the bar of colours stands in every one
+    assert min(bar) > 20.0 and np.abs(frames[1] - frames[0])[:400].max() > 50
+    code, _, err = fvs("view", dam, "--animate", "dam.avi")
+    assert code == 2 and "wanted a name that ends in .gif or .mp4" in err
+    code, _, err = fvs("view", dam, "--animate", "dam.gif", "--time", "0 s")
+    assert code == 2 and "--animate draws all times" in err
+
+
+def test_an_mp4_without_imageio_says_what_to_install(dam, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "imageio", None)
+    with pytest.raises(FvsolveError, match="pip install imageio imageio-ffmpeg"):
+        fvsolve.open_run(dam).animate("dam.mp4")
+
+
+# check ------------------------------------------------------------------------------------------------------
+
+
+def test_check_tells_of_basins(tmp_path, monkeypatch, fvs):
+    monkeypatch.chdir(tmp_path)
+    fvsolve.run(draining([], 0.1, bed="0.1*x"), out="run")
+    code, out, _ = fvs("check", "run/case.toml", "--json")
+    said = json.loads(out)
+    one = said["basins"]["pool"]
+    assert code == 0 and said["cells"] == one["cells"] == 160
+    assert (one["physics"], one["path"], one["area"]) == ("free-surface", "grid", approx(40.0))
+    assert one["depth"] == approx([2.0 - 0.975, 2.0 - 0.025])
+    assert one["wave_speed"] == approx(np.sqrt(GRAVITY * np.array(one["depth"])))
+    assert one["patches"]["outlet"] == {"faces": 4, "length": approx(2.0), "area": approx(1.0), "reflects": 1.0}
+    assert one["memory"] >= 8 * 160 * (3 + 2)  # its state, the profile's depth and bed at the least
+    code, out, _ = fvs("check", "run/case.toml")
+    assert code == 0 and "pool.outlet" in out and "free-surface" in out and "1.025 to 1.975" in out
+
+
+def test_what_a_mesh_leaves_unsaid_is_noted(tmp_path):
+    points, cells = shaken()
+    path = write(tmp_path / "mm.msh", 1e7 * np.array(points), cells)
+    model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
+    assert any("basin block: the mesh is" in note and 'unit = "mm"' in note for note in model.warnings)
+    assert any("the file names no group of lines" in note for note in model.warnings)
+
+
+def test_a_summary_counts_the_cells_of_basins():
+    assert fvsolve.run(draining([], 0.2)).summary["cells"] == 160

@@ -1,0 +1,157 @@
+"""Face flows: what names, stream functions and files make of a mesh, against integrals of velocities over faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytest import approx
+from truth.meshes import shaken, write
+
+from fvsolve.errors import MeshError
+from fvsolve.mesh import read, rectangle
+from fvsolve.model.velocity import EXPRESSIONS, face_flows, grid_flows
+
+PI = np.pi
+# Of each name: parameters, and the velocities u, v (x, y) they mean, as its source gives them.
+VELOCITIES = {
+    "constant": ({"u": 2.0, "v": -3.0}, lambda x, y: (2.0 + 0 * x, -3.0 + 0 * x)),
+    "rotation": (
+        {"centre": (0.3, 0.6), "angular_velocity": 2.0},
+        lambda x, y: (-2.0 * (y - 0.6), 2.0 * (x - 0.3)),
+    ),
+    "swirl": ({}, lambda x, y: (np.sin(PI * x) ** 2 * np.sin(2 * PI * y), -(np.sin(PI * y) ** 2) * np.sin(2 * PI * x))),
+    "shear": ({"rate": 3.0, "y0": 0.5, "u": 1.0}, lambda x, y: (1.0 + 3.0 * (y - 0.5), 0 * x)),
+    "parabolic": (
+        {"speed": 2.0, "south": 0.5, "north": 2.5},
+        lambda x, y: (2.0 * 1.5 * (1.0 - (y - 1.5) ** 2), 0 * x),
+    ),
+    "cellular": (
+        {"speed": 2.0, "width": 0.5, "height": 1.0},
+        lambda x, y: (2.0 * np.sin(2 * PI * x) * np.cos(PI * y), -4.0 * np.cos(2 * PI * x) * np.sin(PI * y)),
+    ),
+}
+
+
+@pytest.fixture
+def mixed(tmp_path):
+    """Triangles and quads, none a parallelogram, from (-1, 0.5) to (2, 2.5)."""
+    return read(write(tmp_path / "shaken.msh", *shaken()))
+
+
+def integral(mesh, velocity):
+    """Flow of u, v (x, y) through every face, by six of Gauss's points."""
+    a, b = mesh.points[mesh.ends[:, 0]], mesh.points[mesh.ends[:, 1]]
+    total = 0.0
+    for at, weight in zip(*np.polynomial.legendre.leggauss(6), strict=True):
+        place = 0.5 * (1.0 - at) * a + 0.5 * (1.0 + at) * b
+        total = total + 0.5 * weight * np.sum(np.stack(velocity(*place.T), axis=1) * mesh.normal, axis=1)
+    return total * mesh.length
+
+
+def divergence(mesh, flows):
+    """What leaves every cell."""
+    out = np.zeros(len(mesh.cells))
+    np.add.at(out, mesh.left, flows)
+    inner = mesh.right >= 0
+    np.subtract.at(out, mesh.right[inner], flows[inner])
+    return out
+
+
+def test_every_name_is_tried():
+    assert VELOCITIES.keys() == EXPRESSIONS.keys()
+
+
+@pytest.mark.parametrize("name", VELOCITIES)
+def test_flows_by_name_are_the_integrals_of_their_velocity_and_leave_no_divergence_to_the_bit(name, mixed):
+    parameters, velocity = VELOCITIES[name]
+    flows = face_flows(mixed, {"expression": name, **parameters})
+    assert flows == approx(integral(mixed, velocity), rel=1e-6, abs=1e-6)
+    assert np.all(divergence(mixed, flows) == 0.0)
+
+
+def test_names_say_in_one_line_what_they_are():
+    for function in EXPRESSIONS.values():
+        assert function.__doc__ and "\n" not in function.__doc__
+
+
+def test_random_stream_functions_leave_no_divergence_to_the_bit(mixed):
+    for seed in range(20):
+        stream = np.random.default_rng(seed).normal(size=len(mixed.points)) * 10.0**seed
+        assert np.all(divergence(mixed, face_flows(mixed, {"stream": stream})) == 0.0)
+
+
+@pytest.mark.parametrize("cells", [(4, 3), (1, 3), (4, 1), (1, 1)])
+def test_flows_of_a_grid_go_east_and_north(cells):
+    mesh = rectangle((2.0, 1.0), cells, grading=(1.0, 1.0), patches={"in": "west", "top": "north"})
+    nx, ny = cells
+    x, y = grid_flows(mesh, face_flows(mesh, {"expression": "rotation", "centre": (0.0, 0.0), "angular_velocity": 2.0}))
+    dx, dy = 2.0 / nx, 1.0 / ny
+    middle = -2.0 * (np.arange(ny) + 0.5) * dy
+    assert x.reshape(ny, nx + 1) == approx(np.tile(middle[:, None] * dy, nx + 1))
+    assert y.reshape(ny + 1, nx) == approx(np.tile(2.0 * (np.arange(nx) + 0.5) * dx * dx, (ny + 1, 1)))
+
+
+def test_flows_of_a_grid_want_a_full_rectangle(mixed):
+    holed = rectangle((1.0, 1.0), (4, 4), holes=[(0.5, 0.5, 1.0, 1.0)])
+    for mesh in (mixed, holed):
+        with pytest.raises(ValueError, match="no full rectangle"):
+            grid_flows(mesh, np.zeros(mesh.left.size))
+
+
+def written(path, header, *columns):
+    """A CSV file of columns."""
+    rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*map(np.ravel, columns), strict=True))
+    path.write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    return {"file": str(path)}
+
+
+def test_velocities_from_a_file_are_interpolated_linearly(tmp_path, mixed):
+    x, y = np.meshgrid(np.linspace(-1.0, 2.0, 5), np.linspace(0.5, 2.5, 4))
+    flows = face_flows(mixed, written(tmp_path / "v.csv", "x, y, u, v", x, y, 1.0 + 2.0 * x - y, x + 3.0 * y))
+    assert flows == approx(integral(mixed, lambda x, y: (1.0 + 2.0 * x - y, x + 3.0 * y)), abs=1e-12)
+
+
+def test_a_stream_function_from_a_file_leaves_no_divergence(tmp_path, mixed):
+    x, y = np.meshgrid(np.linspace(-1.0, 2.0, 31), np.linspace(0.5, 2.5, 21))
+    flows = face_flows(mixed, written(tmp_path / "psi.csv", "psi,x,y", np.sin(x) * np.cos(y), x, y))
+    assert np.all(divergence(mixed, flows) == 0.0)
+    assert flows == approx(integral(mixed, lambda x, y: (-np.sin(x) * np.sin(y), -np.cos(x) * np.cos(y))), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "velocity, words",
+    [
+        ({"expression": "rotaton"}, 'no velocity; did you mean "rotation"'),
+        ({"expression": "rotation", "centre": (0, 0)}, "wants angular_velocity as well"),
+        ({"expression": "shear", "rate": 1.0, "slope": 2.0}, "has no slope; it takes rate, u, y0"),
+        ({"expression": "swirl", "size": 0.0}, "not finite at"),
+        ({"stream": np.zeros(3)}, r"wanted a value for each of 20 corners"),
+        ({}, "velocity has nothing; wanted one of expression, file, stream"),
+        ({"file": "a.csv", "stream": np.zeros(20)}, "velocity has file, stream; wanted one"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity, words):
+    with pytest.raises(ValueError, match=words):
+        face_flows(rectangle((1.0, 1.0), (4, 3)), velocity)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (None, "cannot be read"),
+        ("", "header is empty"),
+        ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; wanted x, y, u, v or x, y, psi"),
+        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "1,0,b"; wanted 3 numbers, x, y, psi'),
+        ("x,y,psi\n0,0,1\n1,0,2\n", "2 points; wanted at least three"),
+        ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),
+        ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not reach around 9 of 20 places of the mesh, the first"),
+    ],
+)
+def test_files_that_do_not_do_are_refused_with_the_line(tmp_path, text, words):
+    path = tmp_path / "velocity.csv"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(MeshError) as refused:
+        face_flows(rectangle((1.0, 1.0), (4, 3)), {"file": path})
+    assert words in str(refused.value) and "velocity.csv" in str(refused.value)
