@@ -164,7 +164,7 @@ class Judge:
         return method if self.plan.way == "time" else min(space, method)
 
     def theory(self) -> dict[str, float]:
-        """Norm -> order expected, NaN for none: jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
+        """Norm -> order expected, NaN: none; jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
         p, breaks = self.smooth_order(), self.breaks
         if self.plan.way == "time" or not breaks:
             return dict.fromkeys(NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p)
