@@ -13,7 +13,7 @@ from pytest import approx
 from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
 from truth.meshes import delaunay, shaken, write
-from truth.scenes import AMBIENT, GRAVITY, RHO, ramp, reservoir, scene, valve
+from truth.scenes import AMBIENT, GRAVITY, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.draw.view import LABELS, digits, span
@@ -284,7 +284,7 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
     basin = model.basins[0]
     fields = model.frame(random_state(model, 1e-3), model.new_out())["block"]
-    points, cells = shape(basin)
+    points, cells = shape(basin, np.zeros(2))
     data = {name: parted(values, cells) for name, values in fields.items()}
     write_frame(tmp_path / "block.vtu", points, cells, data, basin.units)
     found, drawn = meshio.read(tmp_path / "block.vtu"), pyvista.read(tmp_path / "block.vtu")
@@ -296,6 +296,20 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     units = {name: drawn.GetCellData().GetArray(name).GetInformation().Get(vtkDataArray.UNITS_LABEL())
              for name in fields}  # fmt: skip
     assert units == {"pressure": "Pa", "velocity": "m/s"}
+
+
+def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
+    case = draining([], 0.01, {"fields": 1})
+    case["nodes"]["pool"]["patches"]["inlet"] = {"side": "west"}
+    case["nodes"]["lake"] = lake(2.0)
+    case["links"]["main"] = pipe("lake", "pool.inlet", 20.0, 0.2, 1000.0, 10)
+    for name, position in (("lake", [-20, 30]), ("pool", [5, 7]), ("out", [20, 9])):
+        case["nodes"][name]["position"] = position
+    assert fvsolve.run(case, out=tmp_path / "run").ok
+    pipes = meshio.read(tmp_path / "run" / "fields" / "000001.vtu").points
+    corners = meshio.read(tmp_path / "run" / "fields" / "pool-000001.vtu").points
+    assert pipes[:2] == approx(np.array([[-20.0, 30.0, 0.0], [5.0, 9.0, 0.0]]))
+    assert corners.min(0) == approx([5.0, 7.0, 0.0]) and corners.max(0) == approx([15.0, 11.0, 0.0])
 
 
 # pictures ---------------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def title(one) -> str:
 
 
 def unit(variable: str, one) -> str:
-    """SI unit of a variable of a study."""
+    """SI unit of a variable of a study; of a scalar, whose unit is a label of the case, none."""
     from fvsolve.parts import KINDS
     from fvsolve.units import DIMENSIONS
 
@@ -93,8 +93,8 @@ def unit(variable: str, one) -> str:
         return one.units[variable]
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
     kinds = [kind for group in KINDS.values() for kind in group.values()]
-    return next(DIMENSIONS[known[quantity]].si for kind in kinds
-                for known in (kind.quantities, getattr(kind, "along", {})) if quantity in known)  # fmt: skip
+    return next((DIMENSIONS[known[quantity]].si for kind in kinds
+                 for known in (kind.quantities, getattr(kind, "along", {})) if quantity in known), "-")  # fmt: skip
 
 
 def write_table(path: Path, found) -> Path:

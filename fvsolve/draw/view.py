@@ -133,6 +133,7 @@ class Scene:
                 self.basin(plotter, mesh)
             elif self.field in mesh.cell_data:
                 plane = not are_pipes(mesh)
+                mesh.points[:, 2] *= self.rise
                 self.coloured(plotter, mesh.cell_data_to_point_data() if plane else tube(mesh), plane)
         if self.rise != 1.0:
             caption += f"; heights drawn {self.rise:.3g} times"

@@ -28,8 +28,8 @@ from fvsolve.kernels.records import (
 )
 from fvsolve.kernels.schedules import schedule_value
 
-ROUNDS = 200  # beyond one a node: flow that runs in a circle without volume is mixed by iteration
-DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it has no value of its own, and gets no quicker [m]
+ROUNDS, SAME = 10000, 4e-16  # of flow that runs in a circle without volume, which is mixed by iteration
+DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it holds no value, and gets no quicker [m]
 
 
 @njit
@@ -126,39 +126,46 @@ def arrivals(y, out, tables, q, amount, weight, beside, count):
 
 @njit(forceinline=True)
 def given_value(t, tables, q, i):
-    """Value of what flows in from node i."""
-    scalar = tables[I_SCALARS][q]
+    """Value of what flows in from outside at node i."""
+    scalar, kind = tables[I_SCALARS][q], tables[I_NODES][i]["kind"]
     place = tables[I_INTEGERS][scalar["places"] + i]
-    return schedule_value(tables, place, t) if place >= 0 else scalar["initial"]
+    return schedule_value(tables, place, t) if place >= 0 and not stores(kind) else scalar["initial"]
 
 
 @njit(forceinline=True)
-def stored_value(y, tables, q, i):
-    """Value of the contents of node i; of an empty tank, what flows in where nothing is said."""
-    node, scalar = tables[I_NODES][i], tables[I_SCALARS][q]
-    mass = node["mass"] + y[node["y"]]
-    if mass <= DAMP * node["density"] * node["area"]:
-        return scalar["initial"]
-    return bounded(y[tables[I_INTEGERS][scalar["places"] + i]] / mass, scalar)
+def stores(kind):
+    """Whether a node of this kind holds an amount."""
+    return kind == TANK or kind == CHAMBER
+
+
+@njit(forceinline=True)
+def mixes(y, out, tables, i):
+    """Whether node i has the value of what flows in now: it has no volume, or is dry."""
+    node = tables[I_NODES][i]
+    if not stores(node["kind"]):
+        return node["kind"] == JUNCTION
+    dry = node["mass"] + y[node["y"]] <= DAMP * node["density"] * node["area"]
+    return dry or out[tables[I_LAYOUT][0]["supply"] + i] > 0.0
 
 
 @njit
 def start_values(t, y, out, tables, q, amount, weight, beside, count):
     """Values of all places as far as they do not hang on other nodes."""
-    nodes, layout = tables[I_NODES], tables[I_LAYOUT][0]
+    nodes, layout, scalar = tables[I_NODES], tables[I_LAYOUT][0], tables[I_SCALARS][q]
     at = layout["value"] + q * nodes.size
     for i in range(nodes.size):
         kind = nodes[i]["kind"]
         if kind == FIXED:
             out[at + i] = given_value(t, tables, q, i)
-        elif kind == TANK or kind == CHAMBER:
-            out[at + i] = stored_value(y, tables, q, i)
-        elif kind != PATCH:  # whose basin has set it
+        elif mixes(y, out, tables, i):
             supply = out[layout["supply"] + i]
             if supply > 0.0:
                 amount[i] += supply * given_value(t, tables, q, i)
                 weight[i] += supply
-            out[at + i] = beside[i] / count[i] if count[i] > 0.0 else tables[I_SCALARS][q]["initial"]
+            out[at + i] = beside[i] / count[i] if count[i] > 0.0 else scalar["initial"]
+        elif kind != PATCH:  # whose basin has set it
+            mass = nodes[i]["mass"] + y[nodes[i]["y"]]
+            out[at + i] = bounded(y[tables[I_INTEGERS][scalar["places"] + i]] / mass, scalar)
 
 
 @njit
@@ -169,7 +176,7 @@ def mix(t, y, out, tables, q):
     amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
     arrivals(y, out, tables, q, amount, weight, total, share)
     start_values(t, y, out, tables, q, amount, weight, total, share)
-    for _ in range(n + ROUNDS):
+    for _ in range(ROUNDS):
         for i in range(n):
             total[i], share[i] = amount[i], weight[i]
         for k in range(valves.size):
@@ -181,14 +188,14 @@ def mix(t, y, out, tables, q):
             share[taker] += abs(flow)
         changed = False
         for i in range(n):
-            if nodes[i]["kind"] == JUNCTION and share[i] > 0.0:
+            if share[i] > 0.0 and mixes(y, out, tables, i):
                 value = total[i] / share[i]
-                changed = changed or value != out[at + i]
+                changed = changed or abs(value - out[at + i]) > SAME * abs(value)
                 out[at + i] = value
         if not changed or valves.size == 0:
             break
     for i in range(n):
-        if nodes[i]["kind"] == TANK or nodes[i]["kind"] == CHAMBER:
+        if stores(nodes[i]["kind"]):
             mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], SHALLOW * nodes[i]["density"] * nodes[i]["area"])
             out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables[I_SCALARS][q]["decay"])
 
@@ -230,11 +237,11 @@ def exchange(t, y, dydt, out, tables, q):
         kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
         if kind == FIXED:
             out[gain + i] = -out[brought + i]
-        elif kind == JUNCTION and supply > 0.0:
+        elif kind != PATCH and supply > 0.0:
             out[gain + i] = supply * given_value(t, tables, q, i)
         else:
             out[gain + i] = supply * out[value + i]
-        if (kind == TANK or kind == CHAMBER) and dydt.size > 0:
+        if stores(kind) and dydt.size > 0:
             at = tables[I_INTEGERS][scalar["places"] + i]
             fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
             dydt[at] = out[brought + i] + out[gain + i] - fades

@@ -351,6 +351,7 @@ BASIN = np.dtype(
         ("period", "f8"),  # of its turning back [s]; 0 for none
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
         ("roughness", "f8"),  # Manning's n, or a factor
+        ("unsplit", "f8"),  # what counts as rate of its cells over that of the kernels
         ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
     ],
     align=True,

@@ -49,7 +49,8 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     measures, distances = np.split(measures, [faces.MEASURES])
     floats = [_by_block(measures), mesh.normal[inner + rank].T.ravel(), mesh.length, _by_block(distances)]
     need = np.maximum.accumulate(need)
-    integers = [[slots, n, f, f - inner, ring], _by_block(indices), need, slot[inner + rank], rank, face_of]
+    places = _by_block(indices).astype(np.int32).view(np.int64)
+    integers = [[slots, n, f, f - inner, ring], places, need, slot[inner + rank], rank, face_of]
     return np.concatenate(floats), np.concatenate(integers).astype(np.int64), order
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.case.basins import patch_names
 from fvsolve.errors import RunError
 from fvsolve.output import layout
 
@@ -32,9 +33,13 @@ class FieldSeries:
     def __init__(self, folder: Path, model):
         self.folder = folder
         self.frames = 0
-        self.points, self.lines = geometry(model) if model.pipes else (np.zeros((0, 3)), np.zeros((0, 2), dtype=int))
+        places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
+        if model.pipes:
+            places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
+            self.points, self.lines = geometry(model, places)
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
-        self.basins = {basin.name: (*shape(basin), basin.units | carried) for basin in model.basins}
+        units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
+        self.basins = {basin.name: (*shape(basin, places[basin.name]), units[basin.name]) for basin in model.basins}
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
@@ -95,18 +100,23 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
     path.write_bytes(text)
 
 
-def geometry(model) -> tuple[np.ndarray, np.ndarray]:
-    """Points float64[n, 3] [m] and lines int[cells, 2]; pipes meet in the point of their node."""
-    lengths = {pipe.name: pipe.length for pipe in model.pipes}
-    places = layout.positions(model.case, lengths)
+def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Points float64[n, 3] [m] and lines int[cells, 2]; pipes meet in the point of their node, and basins at patches.
+
+    plan : parts -> float64[2] [m]
+    """
+    places = {name: plan[layout.place(name)] for name in model.node_names}
+    for basin in model.basins:
+        for patch in patch_names(basin.mesh):
+            places[f"{basin.name}.{patch}"] = plan[basin.name] + basin.mesh.middle[basin.mesh.patch(patch)].mean(axis=0)
     bends = layout.bends(model.case.links)
     ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
     index = {name: i for i, name in enumerate(ends)}
-    points = [np.array([[*places[layout.place(name)], model.elevation[name]] for name in ends])]
+    points = [np.array([[*places[name], model.elevation[name]] for name in ends])]
     lines, count = [], len(ends)
     for pipe in model.pipes:
         fractions = np.asarray(pipe.edges[1:-1]) / pipe.length
-        start, end = (places[layout.place(name)] for name in (pipe.from_, pipe.to))
+        start, end = places[pipe.from_], places[pipe.to]
         low, high = model.elevation[pipe.from_], model.elevation[pipe.to]
         inner = layout.path(start, end, fractions, bends[pipe.name])
         points.append(np.column_stack([inner, low + fractions * (high - low)]))
@@ -116,12 +126,11 @@ def geometry(model) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(points), np.concatenate(lines)
 
 
-def shape(basin) -> tuple[np.ndarray, list]:
+def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
     """Corners float64[p, 3] [m] of a basin's cells, on their bed, and blocks of cells of a kind, in their order."""
     mesh, part = basin.mesh, basin.part
     x, y = np.ascontiguousarray(mesh.points.T)
     bed = (part.elevation or 0.0) + (0.0 if part.bed is None else part.bed.at(x, y))
-    origin = part.position or (0.0, 0.0)
     points = np.column_stack([origin[0] + x, origin[1] + y, np.broadcast_to(bed, x.shape)])
     three = mesh.cells[:, 3] < 0
     ends = np.flatnonzero(np.diff(three)) + 1

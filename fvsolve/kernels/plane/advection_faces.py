@@ -8,6 +8,8 @@ second order, bounds not kept where cells lean. Nothing diffuses through walls a
 enters, the value outside holds at the face.
 """
 
+import numpy as np
+
 from fvsolve.jit import njit
 from fvsolve.kernels.plane.faces import (
     BLOCK,
@@ -58,13 +60,13 @@ def put_values(s, depth, c, d):
 @njit
 def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
     """Gradients by least squares of block j."""
-    slots, at = integers[0], j % integers[4] * BLOCK
+    slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
     c, gx, gy = values[at:], gx[at:], gy[at:]
     for i in range(BLOCK):
         gx[i], gy[i] = 0.0, 0.0
     for k in range(slots):
         slot = j * slots + k
-        gather(values, integers[HEAD + (slot * INDICES + CELL) * BLOCK :], w)
+        gather(values, places[(slot * INDICES + CELL) * BLOCK :], w)
         for q in range(edges.size):
             if edges[q] // BLOCK == 4 * j + k:
                 w[edges[q] % BLOCK] = shown[q]
@@ -136,9 +138,10 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, limited, spreads = blocks(integers), scheme != UPWIND, diffusivity > 0.0
     m = count * slots * BLOCK
-    at, to = HEAD + INDICES * m, MEASURES * m + 2 * b + f
+    at, to = HEAD + INDICES * m // 2, MEASURES * m + 2 * b + f
     need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
     faces, distances = integers[at + count + 2 * b :], floats[to:]
+    places = integers[HEAD:].view(np.int32)
     near, wide = ring * BLOCK, 4 * ring * BLOCK
     c, d, gx, gy = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
     cs = work[4 * near : 4 * near + wide] if limited else c
@@ -170,7 +173,7 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
         for k in range(slots):
             slot = j * slots + k
-            where, geo = integers[HEAD + slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
             far, own = distances[slot * DISTANCES * BLOCK :], 4 * o + k * BLOCK if limited else o
             gather(cs, where[SIDE * BLOCK :] if limited else where, w[_VALUE:])
             gather_flows(faces[slot * BLOCK :], factor, flow, w[_FLOW:])

@@ -29,7 +29,8 @@ def carry_on_meshes(t, y, dydt, out, handle):
         for q in range(scalars.size):
             o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
             quickest = advection_rates(
-                basin["scheme"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :], integers[basin["links"] :],
+                basin["scheme"], basin["limiter"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
+                integers[basin["links"] :],
                 flow, depth, plane[ring : ring + basin["outer"]], y[o : o + n], plane[basin["toil"] + n :],
                 dydt[o : o + n],
             )  # fmt: skip

@@ -9,14 +9,16 @@ cache: cell i of block j at (j BLOCK + i) modulo ring BLOCK, its side k at ((4 j
 Block j is settled once the sides of blocks before need[j] are known, and these once the cells before need[] of theirs.
 Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler sees that they are apart.
 
-integers : int64[:]  slots, cells, faces, boundary faces, ring; by block, side and row of BLOCK: places of cell and side
-           beyond (on the boundary its own); need[blocks]; of the boundary in order of sides: side not taken modulo,
-           number; by block and side: face (~f where its normal points inwards)
+integers : int64[:]  slots, cells, faces, boundary faces, ring; by block, side and row of BLOCK, two int32 to an
+           int64: places of cell and side beyond (on the boundary its own); need[blocks]; of the boundary in order of
+           sides: side not taken modulo, number; by block and side: face (~f where its normal points inwards)
 floats : float64[:]  by block, side and row of BLOCK: outward normal, length / area, from centre to the side's middle,
          weights of its difference in the gradient; of the boundary in order of sides: outward normal; of faces: length;
          by block, side and row again: 1 / area, 1 / distance to the cell beyond along the normal, the normal less that
          distance's direction
 """
+
+import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.records import MINMOD
@@ -25,7 +27,7 @@ CELL, SIDE, INDICES = 0, 1, 2
 NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
 SHARE, GAP, LEAN_X, LEAN_Y, DISTANCES = range(5)
 HEAD = 5
-BLOCK = 128  # cells whose geometry and neighbours stay in the nearest cache
+BLOCK = 256  # cells whose geometry and neighbours stay in the nearest cache
 TINY = 1e-300
 HUGE = 1e300
 WIDE = 2.0  # how far beyond the values around a linear field may go on shaken meshes
@@ -124,9 +126,9 @@ def put_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sid
     sides : float64[4 ring BLOCK]
     shown : float64[:]  what the boundary shows at its sides `edges`, int64[:], of this block
     """
-    slots, ring = integers[0], integers[4]
+    slots, ring, places = integers[0], integers[4], integers[HEAD:].view(np.int32)
     for k in range(slots):
-        gather(values, integers[HEAD + ((j * slots + k) * INDICES + CELL) * BLOCK :], scratch[k * BLOCK :])
+        gather(values, places[((j * slots + k) * INDICES + CELL) * BLOCK :], scratch[k * BLOCK :])
     for q in range(edges.size):
         scratch[edges[q] % (4 * BLOCK)] = shown[q]
     at = (j % ring) * BLOCK

@@ -6,6 +6,8 @@ from inside and (w - u) / 2 from beyond, with w = c r, u = m under `linear`, w =
 
 from math import sqrt
 
+import numpy as np
+
 from fvsolve.jit import njit
 from fvsolve.kernels.plane.faces import (
     BLOCK,
@@ -150,9 +152,10 @@ def liquid_rates(law, c0, rho, scheme, limiter, floats, integers, reflect, r, mx
     slots, n, b, ring = integers[0], integers[1], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
     m = count * slots * BLOCK
-    at, to = HEAD + INDICES * m, MEASURES * m
+    at, to = HEAD + INDICES * m // 2, MEASURES * m
     need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
     bx, by = floats[to : to + b], floats[to + b : to + 2 * b]
+    places = integers[HEAD:].view(np.int32)
     near, wide = ring * BLOCK, 4 * ring * BLOCK
     p, u, v, c = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
     rest = work[4 * near :]
@@ -183,7 +186,7 @@ def liquid_rates(law, c0, rho, scheme, limiter, floats, integers, reflect, r, mx
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
         for k in range(slots):
             slot = j * slots + k
-            where, geo = integers[HEAD + slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
             beyond, own = (where, o) if first_order else (where[SIDE * BLOCK :], 4 * o + k * BLOCK)
             gather(ps, beyond, w)
             gather(us, beyond, w[_U:])

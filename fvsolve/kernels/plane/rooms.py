@@ -19,8 +19,6 @@ from fvsolve.kernels.records import (
     SHALLOW_GRID,
 )
 
-UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one
-
 
 @njit
 def shallow_grids(t, y, dydt, out, handle):
@@ -50,7 +48,7 @@ def shallow_grids(t, y, dydt, out, handle):
                 rate_x, rate_y,
             )  # fmt: skip
         book_open(tables, basin, st["rho"], dydt, out)
-        out[RATE] = max(out[RATE], UNSPLIT * rate)
+        out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
 @njit
@@ -111,7 +109,7 @@ def shallow_meshes(t, y, dydt, out, handle):
         if f >= 0:  # scalars are carried by them
             flow = plane[f : f + basin["faces"]]
         rate = shallow_faces.shallow_rates(
-            st["gravity"], basin["scheme"], plane[basin["mesh"] :], integers[basin["links"] :],
+            st["gravity"], basin["scheme"], basin["limiter"], plane[basin["mesh"] :], integers[basin["links"] :],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
             plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
         )  # fmt: skip
@@ -121,7 +119,7 @@ def shallow_meshes(t, y, dydt, out, handle):
                 rate_x, rate_y,
             )  # fmt: skip
         book_open(tables, basin, st["rho"], dydt, out)
-        out[RATE] = max(out[RATE], UNSPLIT * rate)
+        out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
 @njit
@@ -135,7 +133,8 @@ def liquid_meshes(t, y, dydt, out, handle):
             continue
         n, o = basin["n"], basin["y"]
         rate = liquid_faces.liquid_rates(
-            tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], basin["scheme"], plane[basin["mesh"] :],
+            tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], basin["scheme"], basin["limiter"],
+            plane[basin["mesh"] :],
             integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
             y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
             dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],

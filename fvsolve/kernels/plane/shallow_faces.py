@@ -7,6 +7,8 @@ term is zero: a lake at rest stays at rest, with dry islands too.
 
 from math import sqrt
 
+import numpy as np
+
 from fvsolve.jit import njit
 from fvsolve.kernels.plane.faces import (
     BLOCK,
@@ -147,10 +149,11 @@ def shallow_rates(g, scheme, limiter, floats, integers, reflect, plan, dh, qx, q
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
     m = count * slots * BLOCK
-    at, to = HEAD + INDICES * m, MEASURES * m
+    at, to = HEAD + INDICES * m // 2, MEASURES * m
     need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
     faces = integers[at + count + 2 * b :]
     bx, by, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
+    places = integers[HEAD:].view(np.int32)
     near, wide = ring * BLOCK, 4 * ring * BLOCK
     h, e, u, v = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
     c, rest = work[4 * near : 5 * near], work[5 * near :]
@@ -187,7 +190,7 @@ def shallow_rates(g, scheme, limiter, floats, integers, reflect, plan, dh, qx, q
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
         for k in range(slots):
             slot = j * slots + k
-            where, geo = integers[HEAD + slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
             beyond, own = (where, o) if first_order else (where[SIDE * BLOCK :], 4 * o + k * BLOCK)
             gather(hs, beyond, w)
             gather(es, beyond, w[_E:])

@@ -8,9 +8,11 @@ from fvsolve.case.basins import bed_of
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
-from fvsolve.model.basins.basin import Basin
+from fvsolve.model.basins.basin import FIFTH, Basin
 
 SCALE = 0.1  # [m] of depth
+UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one,
+SHORES = 6.0  # and sixths of cells under fifth order where there is a shore
 
 
 class FreeSurface(Basin, physics="free-surface"):
@@ -44,10 +46,12 @@ class FreeSurface(Basin, physics="free-surface"):
 
     def lower_grid(self, scene, row) -> None:
         row["kind"] = rec.SHALLOW_GRID
-        row["work"] = scene.to_plane(np.zeros(shallow.work_size(self.mesh.grid.nx, self.mesh.grid.ny)))
+        dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
+        row["unsplit"] = SHORES if dry and row["scheme"] in FIFTH.values() else UNSPLIT
+        row["work"] = scene.to_plane(np.zeros(shallow.WORK))
 
     def lower_faces(self, scene, row) -> None:
-        row["kind"] = rec.SHALLOW_FACES
+        row["kind"], row["unsplit"] = rec.SHALLOW_FACES, UNSPLIT
         row["work"] = scene.to_plane(np.zeros(shallow_faces.work_size(self.integers)))
 
     def start(self) -> np.ndarray:
