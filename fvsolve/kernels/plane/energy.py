@@ -13,8 +13,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.patches import mean_deviation
-from fvsolve.kernels.plane.rooms import UNSPLIT
-from fvsolve.kernels.plane.shallow_rows import DEPTH, SURFACE, THIN
+from fvsolve.kernels.plane.shallow_faces import DEPTH, SURFACE, THIN
 from fvsolve.kernels.records import (
     CARRIED_GRID,
     I_BASINS,
@@ -55,7 +54,7 @@ def add_power(t, y, dydt, out, handle, power):
         rows = power[first + ROWS * b : first + ROWS * (b + 1)]
         rows[0] = rows[1] = rows[2] = rows[3] = 0.0
         if basins[b]["kind"] <= SHALLOW_FACES:
-            water_power(st, basins[b], tables[I_PLANE], out[RATE] / UNSPLIT, y, dydt, rows)
+            water_power(st, basins[b], tables[I_PLANE], out[RATE] / basins[b]["unsplit"], y, dydt, rows)
         elif basins[b]["kind"] < CARRIED_GRID:
             liquid_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
     for k in range(patches.size):
