@@ -27,6 +27,14 @@ def carried(basin) -> tuple[np.ndarray, np.ndarray]:
     return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
 
 
+def at_openings(basin) -> np.ndarray:
+    """Cells that what passes the open boundary hangs on."""
+    mesh, near = basin.mesh, neighbours(basin)
+    patches = (name for name, patch in basin.part.patches.items() if basin.reflection(patch) != 1.0)
+    behind = np.concatenate([mesh.left[mesh.patch(name)] for name in patches] or [np.zeros(0, np.int64)])
+    return np.flatnonzero(near[:, np.unique(behind)].sum(axis=1))
+
+
 def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
     """States of cells, of the first quantities or all."""
     many = len(basin.quantities) if quantities is None else quantities
