@@ -19,8 +19,9 @@ import fvsolve
 from fvsolve.draw.view import LABELS, digits, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import calls
+from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
-from fvsolve.kernels.plane.observe import observe_basins
+from fvsolve.kernels.plane.observe import observe_basins, observe_dense_flows
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.points import Points
 from fvsolve.output.fields import parted, shape, write_frame
@@ -149,6 +150,25 @@ def test_the_flow_of_a_patch_is_what_the_basin_gains():
         assert flow == approx(model.rhs(1.5, y)[: model.basins[0].n].sum() * area, rel=1e-9)
         shares.append(-flow / asked)
     assert shares[:2] == [1.0, 1.0] and 1.0 > shares[2] > shares[3] > 0.0
+
+
+def test_the_flow_of_a_patch_has_the_density_of_its_place():
+    """Under a law where density follows pressure: mass over the density at the patch's pressure."""
+    case = liquid(["block.hole.flow", "block.hole.pressure"], size=[1.0, 1.0], cells=[4, 4], pressure=2e7)
+    case["nodes"]["block"]["patches"] = {"hole": {"side": "west"}}
+    case["nodes"]["out"] = reservoir(AMBIENT)
+    case["links"]["leak"] = valve("block.hole", "out", 1e-4)
+    case["fluid"] = {**case["fluid"], "law": "log"}
+    model = fvsolve.build(fvsolve.load(case))
+    out, found = model.new_out(), np.zeros(2)
+    node = model.node_names.index("block.hole")
+    out[int(model.layout["net"]) + node] = -3.0
+    out[int(model.layout["pressure"]) + node] = 3e7 - model.tables[rec.I_NODES][node]["pressure"]
+    handle = make_handle((*model.tables, calls.empty_calls(1)))
+    observe_basins(0.0, model.start, out, handle, found)
+    assert found[0] == approx(-3.0 / RHO, rel=1e-14)
+    observe_dense_flows(0.0, model.start, out, handle, found)
+    assert found[0] == approx(-3.0 / (RHO * np.exp((3e7 - AMBIENT) / 2.2e9)), rel=1e-9)
 
 
 def test_a_run_records_points_and_patches_and_claims_about_them():

@@ -77,6 +77,7 @@ ROOMS = {
         before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
         observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
+    "patches, barotropic": Room(observe="plane.observe: observe_dense_flows"),
     "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
     "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
@@ -137,6 +138,7 @@ class Scene:
             yield BASINS.get(kind, Room())
         if self.basins:
             yield ROOMS["patches"]
+            yield Room() if linear else ROOMS["patches, barotropic"]
         if self.scalars:  # carried by the flow that rates of waves now have
             yield ROOMS["values"] if self.basins else Room()
             yield ROOMS["scalars"]

@@ -108,7 +108,7 @@ def greatest_velocity(m, flow):
     return most / least
 
 
-@njit(forceinline=True)
+@njit
 def carry_in_pipe(y, dydt, out, tables, p):
     """Rates of all scalars in pipe p; what decays goes to the ledger, the greatest rate to out[RATE]."""
     st, layout, pipe, scratch = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES][p], tables[I_SCRATCH]

@@ -13,7 +13,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.patches import mean_deviation
-from fvsolve.kernels.plane.shallow_faces import DEPTH, SURFACE, THIN
+from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     CARRIED_GRID,
     I_BASINS,
@@ -69,7 +69,7 @@ def add_power(t, y, dydt, out, handle, power):
 def water_power(st, basin, plane, fastest, y, dydt, rows):
     """Friction, whose rate is held to `fastest` [1/s] as the rates hold it, and rate of storage of water."""
     n, o = basin["n"], basin["y"]
-    depths, surface = plane[basin["plan"] + DEPTH * n :], plane[basin["plan"] + SURFACE * n :]
+    depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
     friction, rate = 0.0, 0.0
     for i in range(n):
@@ -111,7 +111,7 @@ def patch_loss(tables, patch, flow, y):
     """What speed is lost where `flow` [kg/(s m2)] enters or leaves the cells behind a patch [W]."""
     basin, plane, integers = tables[I_BASINS][patch["basin"]], tables[I_PLANE], tables[I_INTEGERS]
     n, o, mean, lost = basin["n"], basin["y"], mean_deviation(tables, patch, y), 0.0
-    depths, area = plane[basin["plan"] + DEPTH * n :], plane[basin["area"] :]
+    depths, area = plane[basin["plan"] :], plane[basin["area"] :]
     for m in range(patch["count"]):
         i = integers[patch["first"] + m]
         mean += area[i] * depths[i] / patch["area"]
@@ -135,7 +135,7 @@ def add_stored(t, y, dydt, out, handle, stored):
         basin, total = basins[b], 0.0
         n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
         if basin["kind"] <= SHALLOW_FACES:
-            depths, surface = plane[basin["plan"] + DEPTH * n :], plane[basin["plan"] + SURFACE * n :]
+            depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
             weight = st["rho"] * st["gravity"]
             for i in range(n):
                 d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2

@@ -1,6 +1,6 @@
 """What probes read off basins: fields at points, flows through patches. Knows the tables; changes no state."""
 
-from math import sqrt
+from math import log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density
@@ -20,7 +20,7 @@ from fvsolve.kernels.records import (
     I_PLANE,
     I_PROBES,
     I_SETTINGS,
-    LAW_LINEAR,
+    LAW_LOG,
     PATCH_FLOW,
     SHALLOW_FACES,
 )
@@ -35,26 +35,31 @@ def observe_basins(t, y, out, handle, values):
         probe = probes[k]
         kind = probe["kind"]
         if kind == PATCH_FLOW:
-            values[k] = patch_flow(tables, probe, out)
+            values[k] = probe["scale"] * patch_flow(tables, probe, out)
         elif kind == CELL_STATE or kind == CELL_DEPTH:
             values[k] = probe["scale"] * stored(tables, probe, y) + probe["offset"]
-        elif kind == CELL_U:
-            values[k] = velocity(tables, probe, 1, y)
-        elif kind == CELL_V:
-            values[k] = velocity(tables, probe, 2, y)
-        elif kind == CELL_SPEED:
-            u, v = velocity(tables, probe, 1, y), velocity(tables, probe, 2, y)
-            values[k] = sqrt(u * u + v * v)
+        elif kind == CELL_U or kind == CELL_V or kind == CELL_SPEED:
+            u, v = velocity(tables, probe, y)
+            values[k] = u if kind == CELL_U else v if kind == CELL_V else sqrt(u * u + v * v)
+
+
+@njit
+def observe_dense_flows(t, y, out, handle, values):
+    """Flows through patches at the density of the place, under all laws but linear [m3/s]."""
+    tables = open_tables(handle)
+    st, probes, at = tables[I_SETTINGS][0], tables[I_PROBES], tables[I_LAYOUT][0]["pressure"]
+    for k in range(probes.size):
+        if probes[k]["kind"] == PATCH_FLOW:
+            i = probes[k]["index"]
+            rho = density(st, tables[I_FLOATS], tables[I_NODES][i]["pressure"] + out[at + i])
+            values[k] = patch_flow(tables, probes[k], out) / rho
 
 
 @njit
 def patch_flow(tables, probe, out):
-    """Flow into a basin through a patch, at the density of the place [m3/s]."""
-    st, layout, i = tables[I_SETTINGS][0], tables[I_LAYOUT][0], probe["index"]
-    flow = out[layout["net"] + i] + out[layout["supply"] + i]
-    if st["law"] == LAW_LINEAR:
-        return probe["scale"] * flow
-    return flow / density(st, tables[I_FLOATS], tables[I_NODES][i]["pressure"] + out[layout["pressure"] + i])
+    """Mass that flows into a basin through a patch [kg/s]."""
+    layout, i = tables[I_LAYOUT][0], probe["index"]
+    return out[layout["net"] + i] + out[layout["supply"] + i]
 
 
 @njit
@@ -67,23 +72,27 @@ def stored(tables, probe, y):
         value = y[at + i]
         if probe["kind"] == CELL_DEPTH:
             value = max(tables[I_PLANE][basin["plan"] + i] + value, 0.0)
+        elif probe["side"] == 0 and tables[I_SETTINGS][0]["law"] == LAW_LOG:  # pressure over the slope at rest
+            value = basin["density"] * log1p(value / basin["density"])
         total += tables[I_FLOATS][probe["weights"] + m] * value
     return total
 
 
 @njit
-def velocity(tables, probe, axis, y):
-    """Weighted sum of velocities along x, axis 1, or y, axis 2 [m/s]."""
-    basin, rho, total = tables[I_BASINS][probe["index"]], tables[I_SETTINGS][0]["rho"], 0.0
-    n = basin["n"]
+def velocity(tables, probe, y):
+    """Weighted sums of velocities along x and y [m/s]."""
+    basin, u, v = tables[I_BASINS][probe["index"]], 0.0, 0.0
+    n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):
         i = tables[I_INTEGERS][probe["cell"] + m]
-        flow = y[basin["y"] + axis * n + i]
+        share = 1.0 / basin["density"] if basin["kind"] > SHALLOW_FACES else 1.0
+        if tables[I_SETTINGS][0]["law"] == LAW_LOG:
+            share = 1.0 / (basin["density"] + y[o + i])
         if basin["kind"] <= SHALLOW_FACES:  # which fades where water is thin
             depth = max(tables[I_PLANE][basin["plan"] + i] + y[basin["y"] + i], 0.0)
             wet = max(depth, THIN)
-            flow *= 2.0 * depth / (depth * depth + wet * wet)
-        else:
-            flow /= rho
-        total += tables[I_FLOATS][probe["weights"] + m] * flow
-    return total
+            share = 2.0 * depth / (depth * depth + wet * wet)
+        share *= tables[I_FLOATS][probe["weights"] + m]
+        u += share * y[o + n + i]
+        v += share * y[o + 2 * n + i]
+    return u, v

@@ -55,6 +55,9 @@ class Transport(Basin, physics="transport"):
     def start(self) -> np.ndarray:
         return np.zeros((0, self.n))
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        return {}
+
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         raise NotImplementedError(field)  # there are scalars alone
 
