@@ -165,6 +165,21 @@ def test_implicit_steps_may_cross_many_cells():
     assert run.summary["steps"] < 100
 
 
+@pytest.mark.parametrize("physics", ["free-surface", "liquid"])
+def test_what_leaves_by_an_open_side_is_in_the_ledger_of_implicit_steps(physics):
+    """Its row of the pattern is that of the cells about the side: mass stays to round-off, as by explicit steps."""
+    case = alone(pool((12, 8), SLOSH), 3.0) if physics == "free-surface" else block((12, 8), 1e-3)
+    (basin,) = case["nodes"].values()
+    basin["patches"] = {"east": {"side": "east", "boundary": "open"}}
+    model = built(case)
+    assert (
+        stray(model, 0.0, model.start + 0.05 * model.scale * np.random.default_rng(0).normal(size=model.y_size)) < 1e-9
+    )
+    del case["numerics"]["courant"]
+    case["numerics"] |= {"method": "radau-iia-5", "rtol": 1e-4}
+    assert abs(fvsolve.run(case).ledger["mass"]["relative"]) < 1e-13
+
+
 # limits of steps -------------------------------------------------------------------------------------------------
 
 
@@ -221,7 +236,7 @@ def test_a_method_that_keeps_squares_leaves_all_the_loss_to_the_scheme():
     case = alone(pool((16, 8), SLOSH), 1.0)
     kept, made = (energy(case, {"numerics.method": method}) for method in ("gauss-4", "ssp-rk2"))
     size = energy_of_slosh()
-    assert abs(kept.step[-1]) < 1e-9 * size < 1e-4 * size < -made.step[-1]
+    assert abs(kept.step[-1]) < 1e-9 * size and made.step[-1] < -1e-5 * size
     assert kept.stored["pool"][-1] == approx(-kept.scheme["pool"][-1], abs=1e-9 * size)
 
 
@@ -316,3 +331,72 @@ def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
     assert not built(case).warnings
     said = [one for one in fvsolve.run(case).summary["warnings"] if "slower" in one]
     assert len(said) == 1 and said[0].startswith("pool: waves about") and " s" in said[0].rsplit("at", 1)[1]
+
+
+# liquids, and what is carried ------------------------------------------------------------------------------------
+
+
+def block(cells, end: float, **numerics) -> dict:
+    """A pulse of pressure in a block of liquid between walls."""
+    start = {"pressure": "1e5*exp(-150*((x - 0.4)**2 + (y - 0.2)**2))"}
+    given = {"size": [1.0, 0.5], "cells": list(cells), "pressure": 1e6, "thickness": 0.1, "wave_speed": 1000.0}
+    return scene({"block": {"type": "basin", "physics": "liquid", "start": start, **given}}, {}, end, PLANE | numerics)
+
+
+def test_fifth_order_shows_on_grids_for_cells_start_from_their_means():
+    """A pulse in a liquid, and a slosh along one axis: from values at centres no more than second order would show."""
+    found = order(block((32, 16), 1e-4, scheme="upwind5", method="rk4", courant=0.4), levels=4)
+    assert min(found.fits["block at the end: density"]["L1"].pairwise[:2]) > 3.8
+    slosh = alone(pool((20, 2), "1 + 0.02*cos(0.3141592653589793*x)"), 1.0, scheme="upwind5", method="rk4")
+    assert order(slosh, levels=4).fits["pool at the end: depth"]["L1"].order == approx(5.0, abs=0.2)
+
+
+def test_energy_of_a_liquid_falls_by_what_the_scheme_takes():
+    """Quicker the finer the cells, at third order by limited slopes; what it starts with is that of the pulse."""
+    loss = [energy(block((n, n // 2), 5e-4, courant=0.5)).scheme["block"][-1] for n in (32, 64, 128)]
+    assert loss[0] > loss[1] > loss[2] > 0.0 and np.log2(loss[1] / loss[2]) == approx(3.0, abs=0.6)
+    found = energy(block((128, 64), 1e-6, courant=0.5))
+    pulse = 0.1 * 1e10 * math.pi / 300.0 / (2.0 * RHO * 1e6)  # thickness p^2 / (2 rho a^2), of exp(-300 r^2)
+    still = 0.1 * 0.5 * (1e6 - AMBIENT) ** 2 / (2.0 * RHO * 1e6)
+    rise = 0.1 * (1e6 - AMBIENT) * 1e5 * math.pi / 150.0 / (RHO * 1e6)
+    assert found.at_start["block"] == approx(still + rise + pulse, rel=1e-3)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "upwind5"])
+def test_a_liquid_blows_up_at_the_predicted_step(scheme):
+    row = stability(block((12, 4), 1e-3), [scheme], ["rk4"]).rows[0]
+    assert row.difference == approx(0.0, abs=3e-4)
+
+
+def test_friction_of_the_bed_is_booked_and_takes_what_it_takes():
+    """Beside what the scheme takes, a slosh over Manning's bed loses what it has less: to a hundredth."""
+    smooth, rough = (energy(alone(pool((32, 16), SLOSH, **more), 2.0)) for more in ({}, {"manning": 0.05}))
+    (taken,) = rough.dissipated.values()
+    assert taken[-1] > 0.0 and rough.made[-1] == approx(smooth.made[-1], rel=0.01)
+    left = rough.stored["pool"][-1] - smooth.stored["pool"][-1]
+    assert left == approx(-taken[-1], rel=0.01)
+
+
+def swirl(**numerics) -> dict:
+    """A dye in a vortex that turns back (LeVeque 1996)."""
+    dye = "exp(-60*((x - 0.35)**2 + (y - 0.5)**2))"
+    sheet = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [16, 16], "scalars": {"dye": dye}}
+    sheet["velocity"] = {"expression": "swirl", "period": 1.5}
+    return scene({"sheet": sheet}, {}, 1.5, PLANE | {"courant": 0.5} | numerics, every=0.5, scalars={"dye": {}})
+
+
+def test_a_dye_in_a_vortex_that_turns_back_keeps_its_bounds_and_shows_its_order():
+    """Steps are those of its full speed: where it stands still for a moment they do not jump over what follows."""
+    found = order(swirl(), levels=4, cells=32)
+    assert found.fits["sheet at the end: dye"]["L1"].order == approx(2.1, abs=0.3)
+    for cells in (32, 64):
+        model = built(swirl() | {"nodes": {"sheet": swirl()["nodes"]["sheet"] | {"cells": [cells, cells]}}})
+        basin, start = model.basins[0], model.start
+        y = fvsolve.advance(model, fvsolve.initial_state(model), 1.5).y
+        assert basin.amounts(y).max() <= basin.amounts(start).max() and basin.amounts(y).min() >= 0.0
+
+
+def test_a_vortex_stands_still_where_it_is_linearised():
+    """What carries is held as it is at the start: the prediction is met, though the vortex would turn back."""
+    row = stability(swirl(), ["upwind"], ["rk4"]).rows[0]
+    assert row.difference == approx(0.0, abs=3e-4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -66,7 +67,7 @@ def draw(folder: Path, found) -> list[Path]:
         name = "order.png" if len(found) == 1 else f"order-{one.scheme}-{one.method}.png"
         sizes = [row.level.size for row in one.rows]
         curves = {
-            f"{variable} [{unit(variable, one)}]": {
+            f"{variable} [{unit(variable, one.units)}]": {
                 norm: ([row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows], fits[norm])
                 for norm in NORMS
             }
@@ -84,17 +85,17 @@ def title(one) -> str:
     return f"{scheme}{one.method}, {one.plan.words}"
 
 
-def unit(variable: str, one) -> str:
-    """SI unit of a variable of a study; of a scalar, whose unit is a label of the case, none."""
+def unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
+    """SI unit of a variable, as `known` of a study or its part has it; of a scalar, a label of the case's, none."""
     from fvsolve.parts import KINDS
     from fvsolve.units import DIMENSIONS
 
-    if variable in one.units:
-        return one.units[variable]
+    if variable in known:
+        return known[variable]
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
     kinds = [kind for group in KINDS.values() for kind in group.values()]
-    return next((DIMENSIONS[known[quantity]].si for kind in kinds
-                 for known in (kind.quantities, getattr(kind, "along", {})) if quantity in known), "-")  # fmt: skip
+    return next((DIMENSIONS[own[quantity]].si for kind in kinds
+                 for own in (kind.quantities, getattr(kind, "along", {})) if quantity in own), "-")  # fmt: skip
 
 
 def write_table(path: Path, found) -> Path:
@@ -113,7 +114,7 @@ def lines(one, variable: str, norm: str, fit):
     """The rows of one norm."""
     for k, row in enumerate(one.rows):
         yield [
-            one.scheme, one.method, one.kind, variable, unit(variable, one), norm, row.level.cells,
+            one.scheme, one.method, one.kind, variable, unit(variable, one.units), norm, row.level.cells,
             repr(row.level.size), number(row.level.step), number(row.errors.get(variable, {}).get(norm, math.nan)),
             number(fit.pairwise[k - 1]) if k else "", fit.marks[k], number(fit.order), number(fit.spread), row.steps,
             row.rhs, row.cell_updates, number(row.seconds),
@@ -133,7 +134,7 @@ def show(one) -> None:
     for variable in one.variables[:SHOWN]:
         terminal.line(console, "")
         where = " at the end, all pipes" if variable in ("pressure", "flow") else ""
-        terminal.line(console, f"{variable} [{unit(variable, one)}]{where}")
+        terminal.line(console, f"{variable} [{unit(variable, one.units)}]{where}")
         terminal.table(["cells", "step [s]", "L1", "order", "L2", "order", "max", "order", "rhs", "seconds", "mark"],
                        rows_of(one, variable), console)  # fmt: skip
     terminal.line(console, "")

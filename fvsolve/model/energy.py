@@ -156,6 +156,8 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
     for basin in model.basins:
         basin.of(found)[:] = basin_weights(basin, basin.of(y))
+        if basin.scalars:
+            basin.amounts(found)[:] = 0.5 * basin.mesh.area
     for row in tables[rec.I_NODES]:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             found[row["y"]] = stiffness(model, row) / (2.0 * rho)

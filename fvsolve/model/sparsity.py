@@ -86,6 +86,8 @@ class Couplings:
             yield from self.remembered(pipe)
         for basin in self.basins:
             yield pattern.carried(basin) if basin.part.physics == "transport" else pattern.inside(basin)
+            if basin.row["open"] >= 0:
+                yield every(states(self.size + basin.row["open"]), pattern.of_cells(basin, pattern.at_openings(basin)))
         yield from self.stored()
         yield from self.rigid()
         yield from self.moving()

@@ -134,7 +134,7 @@ def carry_on_grids(t, y, dydt, out, handle):
         nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
         kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
         flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
-        out[RATE] = max(out[RATE], abs(factor) * basin["fastest"])
+        out[RATE] = max(out[RATE], basin["fastest"])  # at full speed: while it turns back it gets quicker in a step
         for q in range(tables[I_SCALARS].size):
             at, ring = basin["carried"] + q * n, o + q * basin["outer"]
             grid_advection(
@@ -157,7 +157,7 @@ def carry_by_fifth(t, y, dydt, out, handle):
         nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
         kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
         flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
-        out[RATE] = max(out[RATE], abs(factor) * basin["fastest"])
+        out[RATE] = max(out[RATE], basin["fastest"])  # at full speed: while it turns back it gets quicker in a step
         fastest = basin["fastest"]
         if depth.size > 0:
             fastest = grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work)
@@ -196,7 +196,7 @@ def settle_amounts(t, y, dydt, out, handle):
                 spreads = grid_diffusion(
                     nx, ny, kx, ky, scalars[q]["diffusivity"], factor, flow_x, flow_y, depth, outside, s, work, rate,
                 )  # fmt: skip
-                out[RATE] = max(out[RATE], abs(factor) * basin["fastest"] + spreads)
+                out[RATE] = max(out[RATE], basin["fastest"] + spreads)
             settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out)
 
 

@@ -22,9 +22,20 @@ def carried(basin) -> tuple[np.ndarray, np.ndarray]:
     """The same of amounts that a given velocity carries, each on itself; what is held to bounds looks further."""
     near, at = neighbours(basin), int(basin.row["carried"])
     if basin.row["scheme"] == rec.WENO5:
-        near = near @ near
+        near, box = near @ near, eye_array(basin.n, dtype=bool)
+        for ring in rings(basin):
+            box = box @ ring @ ring @ ring @ ring
+        near = near + box
     found = kron(eye_array(len(basin.scalars), dtype=bool), csr_array(near, dtype=bool)).tocoo()
     return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
+
+
+def at_openings(basin) -> np.ndarray:
+    """Cells that what passes the open boundary hangs on."""
+    mesh, near = basin.mesh, neighbours(basin)
+    patches = (name for name, patch in basin.part.patches.items() if basin.reflection(patch) != 1.0)
+    behind = np.concatenate([mesh.left[mesh.patch(name)] for name in patches] or [np.zeros(0, np.int64)])
+    return np.flatnonzero(near[:, np.unique(behind)].sum(axis=1))
 
 
 def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
@@ -35,19 +46,22 @@ def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndar
 
 def neighbours(basin) -> csr_array:
     """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
-    mesh, reach = basin.mesh, REACH.get(int(basin.row["scheme"]), 3)
-    left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
-    groups = [slice(None)]
-    if basin.is_grid:
-        across = np.abs(mesh.normal[: mesh.inner, 0]) > 0.5
-        groups = [across, ~across]
     found = csr_array(eye_array(basin.n, dtype=bool))
-    for group in groups:
-        ones = np.ones(left[group].size, dtype=bool)
-        one = csr_array(coo_array((ones, (left[group], right[group])), shape=(basin.n, basin.n)))
-        ring = one + one.T + eye_array(basin.n, dtype=bool)
+    for ring in rings(basin):
         reached = ring
-        for _ in range(reach - 1):
+        for _ in range(REACH.get(int(basin.row["scheme"]), 3) - 1):
             reached = reached @ ring
         found = found + reached
     return csr_array(found, dtype=bool)
+
+
+def rings(basin) -> list[csr_array]:
+    """bool[n, n]: each cell and those next to it, along one axis of a grid after the other, on other meshes all."""
+    mesh, found = basin.mesh, []
+    left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
+    across = np.abs(mesh.normal[: mesh.inner, 0]) > 0.5
+    for group in (across, ~across) if basin.is_grid else (slice(None),):
+        ones = np.ones(left[group].size, dtype=bool)
+        one = csr_array(coo_array((ones, (left[group], right[group])), shape=(basin.n, basin.n)))
+        found.append(csr_array(one + one.T + eye_array(basin.n, dtype=bool), dtype=bool))
+    return found

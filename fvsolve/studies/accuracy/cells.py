@@ -104,9 +104,14 @@ def greatest_rate(case, found: Mapping[str, tuple[int, ...]]) -> float:
 def space_order(case) -> int:
     """Order of the scheme in all that has cells, where all is smooth."""
     scheme = case.numerics.scheme
-    fifth = [scheme in FIFTH and basin.cells is not None and not basin.holes and basin.physics != "free-surface"
-             for basin in basins(case).values()]  # fmt: skip
+    fifth = [scheme in FIFTH and bool(basin.cells) and not basin.holes for basin in basins(case).values()]
     return ORDER[scheme] if all(fifth) else min(ORDER[scheme], PLANE_ORDER)
+
+
+def order_varies(case) -> bool:
+    """Whether that is an upper bound: water in the plane comes down to second order, along one axis it does not."""
+    fifth = space_order(case) > PLANE_ORDER
+    return fifth and any(basin.physics == "free-surface" for basin in basins(case).values())
 
 
 def starts_with_jump(case, coarse: Mapping, fine: Mapping) -> bool:

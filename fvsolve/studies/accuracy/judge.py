@@ -11,7 +11,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, differences, recorded, size_of
-from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, space_order, starts_with_jump
+from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, order_varies, space_order, starts_with_jump
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.order import Order, Row
 from fvsolve.studies.accuracy.plane import unit_of
@@ -164,10 +164,10 @@ class Judge:
         return method if self.plan.way == "time" else min(space, method)
 
     def theory(self) -> dict[str, float]:
-        """Norm -> order that is expected: jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
+        """Norm -> order expected, NaN: none; jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
         p, breaks = self.smooth_order(), self.breaks
         if self.plan.way == "time" or not breaks:
-            return dict.fromkeys(NORMS, p)
+            return dict.fromkeys(NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p)
         s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
         if s == 0.0 and any(basin.physics == "free-surface" for basin in basins(self.case).values()):
             return {"L1": 1.0, "L2": 0.5, "max": 0.0}  # bores keep steep

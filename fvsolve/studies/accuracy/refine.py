@@ -115,7 +115,7 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
                            "fewer levels, or fewer cells to begin with")  # fmt: skip
     rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
     for k, own in enumerate(now):
-        step, stepping = stepping_of(case, own, own if way == "both" else now[-1], k, courant)
+        step, stepping = stepping_of(case, own, own if way == "both" else {**now[-1]}, k, courant)
         length = max(size(case, name, own[name]) for name in moving)
         rows.append(Level(keys(own) | stepping, length, total(case, own), step))
     names = ", ".join(name.split(".")[1] for name in moving)

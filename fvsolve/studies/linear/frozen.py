@@ -77,7 +77,7 @@ def _arrive(model, at: float | None) -> tuple[float, np.ndarray]:
 
 
 def stopped(model, t: float, before: bool = False):
-    """The same model with every schedule held at its value at t [s], left or right limit."""
+    """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit."""
     tables = list(model.tables)
     tables[rec.I_SETTINGS][0]["limit"] = t if before else np.inf
     schedules = tables[rec.I_SCHEDULES].copy()
@@ -88,7 +88,22 @@ def stopped(model, t: float, before: bool = False):
     tables[rec.I_SCHEDULES] = schedules
     rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]
     tables[rec.I_PIECES] = np.array(rows).reshape(-1, 7)
+    hold_velocities(model, tables, t)
     return replace(model, tables=tuple(tables), breaks=[])
+
+
+def hold_velocities(model, tables: list, t: float) -> None:
+    """Let velocities that are given to basins, and turn back in a period, stand still as they are at t."""
+    if not any(row["period"] > 0.0 for row in tables[rec.I_BASINS]):
+        return
+    tables[rec.I_BASINS], tables[rec.I_PLANE] = tables[rec.I_BASINS].copy(), tables[rec.I_PLANE].copy()
+    for basin, row in zip(model.basins, tables[rec.I_BASINS], strict=True):
+        if row["period"] > 0.0:
+            grid = basin.mesh.grid
+            faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
+            factor = np.cos(np.pi * t / row["period"])
+            tables[rec.I_PLANE][row["flows"] : row["flows"] + faces] *= factor
+            row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
 
 
 def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
@@ -109,7 +124,7 @@ def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
 
 
 def has_limiter(model) -> bool:
-    """Whether a limited scheme is at work; in basins all that is not `upwind`, or `upwind5` of a liquid on a grid."""
+    """Whether a limited scheme is at work; in basins all that is not `upwind`, or `upwind5` on a grid."""
     scheme = model.case.numerics.scheme
     if any(limited(basin, scheme) for basin in model.basins):
         return True
@@ -118,5 +133,4 @@ def has_limiter(model) -> bool:
 
 def limited(basin, scheme: str) -> bool:
     """Whether a basin limits its slopes under a scheme."""
-    straight = basin.is_grid and basin.part.physics != "free-surface"
-    return scheme != "upwind" and not (scheme == "upwind5" and straight)
+    return scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid)

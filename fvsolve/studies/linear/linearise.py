@@ -138,7 +138,9 @@ def refuse_limiter(model) -> None:
     scheme, able = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
         smooth = "upwind"
-        if "upwind5" in able and not model.basins:
+        if model.basins and all(basin.is_grid for basin in model.basins):
+            smooth = "upwind or upwind5"
+        elif "upwind5" in able and not model.basins:
             smooth = f"{FROZEN_AS[scheme]} (what {scheme} is where all is smooth), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
