@@ -12,6 +12,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.plane.friction import FASTEST
 from fvsolve.kernels.plane.patches import mean_deviation
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
@@ -24,7 +25,6 @@ from fvsolve.kernels.records import (
     I_SETTINGS,
     MANNING,
     NO_DRAG,
-    RATE,
     SHALLOW_FACES,
 )
 
@@ -54,7 +54,7 @@ def add_power(t, y, dydt, out, handle, power):
         rows = power[first + ROWS * b : first + ROWS * (b + 1)]
         rows[0] = rows[1] = rows[2] = rows[3] = 0.0
         if basins[b]["kind"] <= SHALLOW_FACES:
-            water_power(st, basins[b], tables[I_PLANE], out[RATE] / basins[b]["unsplit"], y, dydt, rows)
+            water_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
         elif basins[b]["kind"] < CARRIED_GRID:
             liquid_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
     for k in range(patches.size):
@@ -66,8 +66,8 @@ def add_power(t, y, dydt, out, handle, power):
 
 
 @njit
-def water_power(st, basin, plane, fastest, y, dydt, rows):
-    """Friction, whose rate is held to `fastest` [1/s] as the rates hold it, and rate of storage of water."""
+def water_power(st, basin, plane, y, dydt, rows):
+    """Friction, held to FASTEST as in the rates, and rate of storage of water with a free surface."""
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
@@ -80,19 +80,19 @@ def water_power(st, basin, plane, fastest, y, dydt, rows):
         level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
         moves = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
         rate += area[i] * (level * dydt[o + i] + st["rho"] * moves)
-        friction += area[i] * drag_power(st, basin, fastest, depth, u * u + v * v)
+        friction += area[i] * drag_power(st, basin, depth, u * u + v * v)
     rows[2], rows[3] = friction, rate
 
 
 @njit
-def drag_power(st, basin, fastest, depth, square):
+def drag_power(st, basin, depth, square):
     """What the bed takes of water that runs over it, per area [W/m2]; square : of its velocity."""
     if basin["friction"] == NO_DRAG or square == 0.0:
         return 0.0
     rate, wet = 0.125 * basin["roughness"] * sqrt(square) / max(depth, THIN), max(depth, THIN)
     if basin["friction"] == MANNING:
         rate = st["gravity"] * basin["roughness"] ** 2 * sqrt(square) / wet ** (4.0 / 3.0)
-    return st["rho"] * depth * square * rate / (1.0 + rate / fastest)
+    return st["rho"] * depth * square * rate / (1.0 + rate / FASTEST)
 
 
 @njit

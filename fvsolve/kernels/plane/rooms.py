@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log, shallow, shallow_faces
-from fvsolve.kernels.plane.friction import add_friction
+from fvsolve.kernels.plane.friction import FASTEST, add_friction
 from fvsolve.kernels.plane.patches import book_open
 from fvsolve.kernels.records import (
     ACOUSTIC_GRID,
@@ -58,11 +58,12 @@ def shallow_grids(t, y, dydt, out, handle):
         )  # fmt: skip
         if f >= 0:
             through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
-        if basin["friction"] != NO_DRAG:  # held below the rate of waves, which the step follows anyhow
-            add_friction(
-                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], rate, plan[0], dh, qx, qy,
-                rate_x, rate_y,
+        if basin["friction"] != NO_DRAG:
+            fades = add_friction(
+                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], FASTEST, plan[0], dh, qx,
+                qy, rate_x, rate_y,
             )  # fmt: skip
+            out[RATE] = max(out[RATE], fades)
         book_open(tables, basin, st["rho"], dydt, out)
         out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
@@ -130,10 +131,11 @@ def shallow_meshes(t, y, dydt, out, handle):
             plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
         )  # fmt: skip
         if basin["friction"] != NO_DRAG:
-            add_friction(
-                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], rate, plan[0], dh, qx, qy,
-                rate_x, rate_y,
+            fades = add_friction(
+                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], FASTEST, plan[0], dh, qx,
+                qy, rate_x, rate_y,
             )  # fmt: skip
+            out[RATE] = max(out[RATE], fades)
         book_open(tables, basin, st["rho"], dydt, out)
         out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
