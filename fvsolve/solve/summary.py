@@ -134,11 +134,13 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the contents."""
     nodes = model.tables[rec.I_NODES]
     initial, change = model.contents(y)
-    tanks = [(x, row["full"]) for x, row in zip(ledger, nodes, strict=True) if row["kind"] in (rec.TANK, rec.PATCH)]
+    passes = {int(basin.row["open"]) for basin in model.basins}  # patches where what passes is booked
+    named = list(zip(range(len(nodes)), model.node_names, ledger, nodes, strict=True))
+    tanks = [(x, row["full"]) for i, _, x, row in named if row["kind"] in (rec.TANK, rec.PATCH) and i not in passes]
     spilled = sum(-x for x, full in tanks if x < 0 and full < np.inf)
     made_up = sum(x for x, full in tanks if x > 0 or full == np.inf)
-    outside = [(name, float(x)) for name, x, row in zip(model.node_names, ledger, nodes, strict=True)
-               if row["kind"] in (rec.FIXED, rec.JUNCTION)]  # fmt: skip
+    outside = [(name, float(x)) for i, name, x, row in named
+               if row["kind"] in (rec.FIXED, rec.JUNCTION) or i in passes]  # fmt: skip
     remainder = change - float(np.sum(ledger))
     return {
         "initial": initial,
