@@ -19,7 +19,8 @@ def add_friction(law, g, coefficient, fastest, depth0, dh, qx, qy, rate_x, rate_
     """Add -r q to the rates of unit flows; returns the greatest rate 2 r [1/s] that the flow's error fades at.
 
     law, coefficient : MANNING n [s/m^(1/3)] or DARCY f [-], float64[n] or float64[1] for all
-    fastest : bound of r [1/s], FASTEST in scenes; depth0, dh : depth of the profile and less that [m]; qx, qy : unit flows [m2/s]
+    fastest : bound of r [1/s], in scenes FASTEST; depth0, dh : depth of the profile and less that [m]
+    qx, qy : unit flows [m2/s]
     """
     most, one = 0.0, coefficient.size == 1
     for i in range(dh.size):
