@@ -318,7 +318,8 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
              for name in fields}  # fmt: skip
     assert units == {"pressure": "Pa", "velocity": "m/s"}
     shown = view.read(tmp_path / "block.vtu", "pressure")  # pictures are in bar
-    assert shown["pressure"] == approx(1e-5 * fields["pressure"], rel=1e-15) and view.unit_of(shown, "pressure") == "bar"
+    assert shown["pressure"] == approx(1e-5 * fields["pressure"], rel=1e-15)
+    assert view.unit_of(shown, "pressure") == "bar"
 
 
 def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
