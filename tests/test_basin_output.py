@@ -16,6 +16,7 @@ from truth.meshes import delaunay, shaken, write
 from truth.scenes import AMBIENT, GRAVITY, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.draw import view
 from fvsolve.draw.view import LABELS, digits, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import calls
@@ -316,6 +317,9 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     units = {name: drawn.GetCellData().GetArray(name).GetInformation().Get(vtkDataArray.UNITS_LABEL())
              for name in fields}  # fmt: skip
     assert units == {"pressure": "Pa", "velocity": "m/s"}
+    shown = view.read(tmp_path / "block.vtu", "pressure")  # pictures are in bar
+    assert shown["pressure"] == approx(1e-5 * fields["pressure"], rel=1e-15)
+    assert view.unit_of(shown, "pressure") == "bar"
 
 
 def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
@@ -338,12 +342,13 @@ def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
 @pytest.mark.parametrize(
     "low, high",
     [(0.0, 1.0), (1.7888, 1.7901), (1.99, 1.990001), (101324.0, 101327.0), (2.0, 2.0), (0.0, 0.0), (-3e-6, 4e-6),
-     (5e8, 5.00001e8), (0.99999, 100.0)],
+     (-1e-8, 1.0), (5e8, 5.00001e8), (0.99999, 100.0)],
 )  # fmt: skip
 def test_the_labels_of_a_bar_of_colours_differ(low, high):
     ends = span(low, high)
     labels = [digits(*ends) % value for value in np.linspace(*ends, LABELS)]
     assert len(set(labels)) == LABELS
+    assert not any(text.startswith("-") and float(text) == 0.0 for text in labels)
     assert all(abs(float(text) - value) < 0.1 * (ends[1] - ends[0])
                for text, value in zip(labels, np.linspace(*ends, LABELS), strict=True))  # fmt: skip
 

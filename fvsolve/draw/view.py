@@ -23,6 +23,8 @@ SHIFT = 0.12  # of half the height of the picture
 FRAME = 100  # of an animation [ms]
 LABELS = 4
 EVEN = 1e-9  # a field whose values differ by less, of the greatest, is even
+NONE = 1e-3  # an end of the colours nearer to zero, of their range, is zero: labels show no -0.00
+SHOWN = {"Pa": ("bar", 1e-5)}  # units of the file that others are drawn for
 INK, BED, WATER, DEEP = "#1f2933", "#c9b99a", "#8ab6d6", "#5b87a6"
 ASLANT = (0.6, -1.0, 0.75)  # basins are looked at from there, x to the right and y away
 REMEDY = (
@@ -178,14 +180,15 @@ BAR = {
 
 
 def read(file: str | Path, field: str) -> Any:
-    """A frame's file; vectors of the field by their magnitude."""
+    """A frame's file; vectors of the field by their magnitude, pressures in bar."""
     import numpy as np
     import pyvista
 
     mesh = pyvista.read(file)
-    if field in mesh.cell_data and mesh.cell_data[field].ndim == 2:
-        unit = unit_of(mesh, field)
-        mesh.cell_data[field] = np.linalg.norm(mesh.cell_data[field], axis=1)
+    if field in mesh.cell_data:
+        values, unit = mesh.cell_data[field], unit_of(mesh, field)
+        unit, scale = SHOWN.get(unit, (unit, 1.0))
+        mesh.cell_data[field] = scale * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
         mesh.GetCellData().GetArray(field).GetInformation().Set(_key(), unit)
     return mesh
 
@@ -205,7 +208,7 @@ def span(low: float, high: float) -> tuple[float, float]:
     """Ends of the colours of a field: its own, or some way about an even one."""
     most = max(abs(low), abs(high))
     if high - low > EVEN * most:
-        return low, high
+        return tuple(0.0 if abs(end) < NONE * (high - low) else end for end in (low, high))
     middle, half = 0.5 * (low + high), 0.05 * most or 0.5
     return middle - half, middle + half
 
