@@ -366,8 +366,13 @@ PATCHES = np.dtype(
         ("count", "i8"),
         ("area", "f8"),  # of these [m2]
         ("depth", "f8"),  # of water at rest, their mean [m]
-        ("ring", "i8"),  # of its faces' numbers in `integers`, as the boundary has them
+        (
+            "ring",
+            "i8",
+        ),  # of its faces' numbers in `integers`, as the boundary has them; of cells behind these after them
         ("faces", "i8"),  # how many these are
+        ("length", "f8"),  # of these [m]
+        ("normals", "i8"),  # in `plane`: outward normals along x, along y, and length over area of cells, of each
         ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
     ],
     align=True,

@@ -13,7 +13,6 @@ from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.friction import FASTEST
-from fvsolve.kernels.plane.patches import mean_deviation
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     CARRIED_GRID,
@@ -62,7 +61,7 @@ def add_power(t, y, dydt, out, handle, power):
         flow = out[tables[I_LAYOUT][0]["net"] + node] + out[tables[I_LAYOUT][0]["supply"] + node]
         power[first + ROWS * patch["basin"]] += potential(tables, out, node) * flow / st["rho"]
         if basins[patch["basin"]]["kind"] <= SHALLOW_FACES:
-            power[first + ROWS * patch["basin"] + 1] += patch_loss(tables, patch, flow / patch["area"], y)
+            power[first + ROWS * patch["basin"] + 1] += patch_loss(tables, patch, flow, y)
 
 
 @njit
@@ -108,20 +107,29 @@ def liquid_power(st, basin, plane, y, dydt, rows):
 
 @njit
 def patch_loss(tables, patch, flow, y):
-    """What speed is lost where `flow` [kg/(s m2)] enters or leaves the cells behind a patch [W]."""
-    basin, plane, integers = tables[I_BASINS][patch["basin"]], tables[I_PLANE], tables[I_INTEGERS]
-    n, o, mean, lost = basin["n"], basin["y"], mean_deviation(tables, patch, y), 0.0
+    """What speed is lost where `flow` [kg/s] enters the cells behind a patch, or leaves them [W]; see `patches`."""
+    st, basin, plane, integers = (
+        tables[I_SETTINGS][0],
+        tables[I_BASINS][patch["basin"]],
+        tables[I_PLANE],
+        tables[I_INTEGERS],
+    )
+    n, o, lost, away = basin["n"], basin["y"], 0.0, -flow / patch["length"]
     depths, area = plane[basin["plan"] :], plane[basin["area"] :]
     for m in range(patch["count"]):
         i = integers[patch["first"] + m]
-        mean += area[i] * depths[i] / patch["area"]
-    for m in range(patch["count"]):
-        i = integers[patch["first"] + m]
+        share = per_flow(max(depths[i] + y[o + i], 0.0))
+        square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
+        lost += 0.5 * area[i] * square * flow / patch["area"]
+    for m in range(patch["faces"]):
+        i, at, many = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
         depth = max(depths[i] + y[o + i], 0.0)
-        share, square = per_flow(depth), y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
-        lost += 0.5 * area[i] * share * share * square * flow
-        if flow < 0.0 and mean > 0.0:
-            lost -= area[i] * share * square / mean * flow
+        share, wide = per_flow(depth), plane[at + 2 * many + m] * area[i]
+        u, v = share * y[o + n + i], share * y[o + 2 * n + i]
+        along = u * plane[at + m] + v * plane[at + many + m]
+        lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * away
+        if away > 0.0:
+            lost += wide * away * (u * u + v * v - along * along)
     return lost
 
 

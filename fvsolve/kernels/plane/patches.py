@@ -4,6 +4,7 @@ from math import log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     I_BASINS,
     I_INTEGERS,
@@ -88,9 +89,26 @@ def patch_flows(t, y, dydt, out, handle):
             shallow_patch(tables, patch, asked, y, dydt, out)
         elif dydt.size > 0:
             basin = tables[I_BASINS][patch["basin"]]
-            flow = asked / (basin["thickness"] * patch["area"])
+            n, flow = basin["n"], asked / (basin["thickness"] * patch["area"])
             for m in range(patch["count"]):
                 dydt[basin["y"] + tables[I_INTEGERS][patch["first"] + m]] += flow
+            for m in range(patch["faces"]):
+                i = basin["y"] + tables[I_INTEGERS][patch["ring"] + patch["faces"] + m]
+                push = -basin["speed"] * asked / (basin["thickness"] * patch["length"])
+                give_way(tables[I_PLANE], patch, m, push, dydt, i + n, i + 2 * n)
+
+
+@njit
+def give_way(plane, patch, m, push, dydt, x, y):
+    """Add to the momentum of the cell behind face m of a patch what a wall would not have let pass.
+
+    A wall stops what runs into it, p + Z u_n; where v passes the pressure on it is p + Z (u_n - v).
+    push : Z v, v positive outward
+    """
+    at, many = patch["normals"], patch["faces"]
+    share = push * plane[at + 2 * many + m]
+    dydt[x] += share * plane[at + m]
+    dydt[y] += share * plane[at + many + m]
 
 
 @njit
@@ -109,8 +127,8 @@ def quickest_inflow(tables, out):
 @njit
 def shallow_patch(tables, patch, asked, y, dydt, out):
     """What a patch brings or takes of water with a free surface; where it is thin, what is asked may not be had."""
-    rho, layout, integers = tables[I_SETTINGS][0]["rho"], tables[I_LAYOUT][0], tables[I_INTEGERS]
-    basin = tables[I_BASINS][patch["basin"]]
+    st, layout, integers, plane = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_INTEGERS], tables[I_PLANE]
+    basin, rho = tables[I_BASINS][patch["basin"]], st["rho"]
     n, o, first = basin["n"], basin["y"], patch["first"]
     depth, share = patch["depth"] + mean_deviation(tables, patch, y), 1.0
     if asked < 0.0:  # 1.5, the steepest slope of the share
@@ -120,8 +138,17 @@ def shallow_patch(tables, patch, asked, y, dydt, out):
     out[layout["supply"] + patch["node"]] += supply
     flow = (asked + supply) / (rho * patch["area"])  # [m/s] of depth
     for m in range(patch["count"] if dydt.size > 0 else 0):
-        i = o + integers[first + m]
-        dydt[i] += flow
-        if flow < 0.0 and depth > 0.0:  # water that leaves takes its momentum along
-            dydt[i + n] += flow * y[i + n] / depth
-            dydt[i + 2 * n] += flow * y[i + 2 * n] / depth
+        dydt[o + integers[first + m]] += flow
+    out_per_width = -(asked + supply) / (rho * patch["length"])  # [m2/s]
+    for m in range(patch["faces"] if dydt.size > 0 and out_per_width != 0.0 else 0):
+        k = integers[patch["ring"] + patch["faces"] + m]
+        i, at, many = o + k, patch["normals"], patch["faces"]
+        h = max(plane[basin["plan"] + k] + y[i], 0.0)
+        share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
+        along_x, along_y = plane[at + m], plane[at + many + m]
+        u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
+        give_way(plane, patch, m, (abs(u) + sqrt(st["gravity"] * h)) * out_per_width, dydt, i + n, i + 2 * n)
+        if out_per_width > 0.0:  # water that leaves takes along what it has across
+            across, taken = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * many + m]
+            dydt[i + n] += out_per_width * taken * across * along_y
+            dydt[i + 2 * n] -= out_per_width * taken * across * along_x

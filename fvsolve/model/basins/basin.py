@@ -218,10 +218,13 @@ class Basin:
         row["first"], row["count"], row["area"] = len(scene.integers), cells.size, self.mesh.area[cells].sum()
         scene.integers += cells.tolist()
         row["depth"] = np.average(self.rest()[cells], weights=self.mesh.area[cells])
-        faces = np.arange(*self.mesh.patch(patch).indices(self.mesh.left.size)) - self.mesh.inner
-        faces = np.argsort(self.ring())[faces] if self.is_grid else faces
-        row["ring"], row["faces"] = len(scene.integers), faces.size
-        scene.integers += faces.tolist()
+        own, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner
+        numbers = np.argsort(self.ring())[own - outer] if self.is_grid else own - outer
+        row["ring"], row["faces"], behind_faces = len(scene.integers), own.size, self.mesh.left[own]
+        scene.integers += [*numbers.tolist(), *behind_faces.tolist()]
+        length = self.mesh.length[own]
+        row["length"] = length.sum()
+        row["normals"] = scene.to_plane(np.array([*self.mesh.normal[own].T, length / self.mesh.area[behind_faces]]))
         given = self.part.patches[patch].scalars if patch in self.part.patches else {}
         row["values"] = len(scene.integers)
         scene.integers += [scene.schedules.add(given[name]) if name in given else -1 for name in self.scalars]

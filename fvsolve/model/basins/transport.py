@@ -29,10 +29,15 @@ class Transport(Basin, physics="transport"):
             )
         else:
             row["flows"] = scene.to_plane(flows)
-        inward = -flows[mesh.inner :]
-        if (inward != 0.0).any():
-            first = next(name for name in self.part.patches if flows[mesh.patch(name)].any())
-            row["open"] = scene.node_index[f"{self.name}.{first}"]
+        passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
+        if mesh.patches[-1] in passing:
+            own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
+            at = mesh.middle[own[np.argmax(flows[own] != 0.0)]]
+            what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
+            scene.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
+            scene.check()
+        if passing:
+            row["open"] = scene.node_index[f"{self.name}.{passing[0]}"]
 
     def flows(self, scene) -> np.ndarray:
         """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
