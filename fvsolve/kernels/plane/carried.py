@@ -3,7 +3,7 @@
 Amounts are per area, s = depth c; a basin with a given velocity has depth 1.
 """
 
-from math import cos, pi
+from math import cos, pi, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -115,6 +115,19 @@ def made_ready(t, tables, b, y):
 
 
 @njit
+def pace(t, basin):
+    """Rate of a given velocity r; that of one that turns back holds for a step 1 / r, in which it grows.
+
+    r = F |cos(pi t / T)| where it stands, and |cos| gains at most pi / (T r): r (r - F |cos|) = F pi / T.
+    """
+    fastest, period = basin["fastest"], basin["period"]
+    if not period > 0.0 or not fastest > 0.0:
+        return fastest
+    now = fastest * abs(cos(pi * t / period))
+    return min(fastest, 0.5 * (now + sqrt(now * now + 4.0 * fastest * pi / period)))
+
+
+@njit
 def deep(basin):
     """Number of depths that were made ready: none where it is 1."""
     return basin["n"] if basin["kind"] <= SHALLOW_FACES else 0
@@ -134,7 +147,7 @@ def carry_on_grids(t, y, dydt, out, handle):
         nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
         kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
         flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
-        out[RATE] = max(out[RATE], abs(factor) * basin["fastest"])
+        out[RATE] = max(out[RATE], pace(t, basin))
         for q in range(tables[I_SCALARS].size):
             at, ring = basin["carried"] + q * n, o + q * basin["outer"]
             grid_advection(
@@ -157,7 +170,7 @@ def carry_by_fifth(t, y, dydt, out, handle):
         nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
         kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
         flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
-        out[RATE] = max(out[RATE], abs(factor) * basin["fastest"])
+        out[RATE] = max(out[RATE], pace(t, basin))
         fastest = basin["fastest"]
         if depth.size > 0:
             fastest = grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work)
@@ -196,7 +209,7 @@ def settle_amounts(t, y, dydt, out, handle):
                 spreads = grid_diffusion(
                     nx, ny, kx, ky, scalars[q]["diffusivity"], factor, flow_x, flow_y, depth, outside, s, work, rate,
                 )  # fmt: skip
-                out[RATE] = max(out[RATE], abs(factor) * basin["fastest"] + spreads)
+                out[RATE] = max(out[RATE], pace(t, basin) + spreads)
             settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out)
 
 

@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.advection_faces import advection_rates
-from fvsolve.kernels.plane.carried import deep, made_ready
+from fvsolve.kernels.plane.carried import deep, made_ready, pace
 from fvsolve.kernels.records import (
     CARRIED_FACES,
     I_BASINS,
@@ -34,4 +34,4 @@ def carry_on_meshes(t, y, dydt, out, handle):
                 flow, depth, plane[ring : ring + basin["outer"]], y[o : o + n], plane[basin["toil"] + n :],
                 dydt[o : o + n],
             )  # fmt: skip
-            out[RATE] = max(out[RATE], quickest)
+            out[RATE] = max(out[RATE], quickest + (pace(t, basin) - abs(factor) * basin["fastest"]))

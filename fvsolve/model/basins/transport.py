@@ -28,7 +28,10 @@ class Transport(Basin, physics="transport"):
                 grid.nx, grid.ny, kx, ky, flow_x, flow_y, np.zeros(0), np.zeros(max(grid.nx, self.n))
             )
         else:
-            row["flows"] = scene.to_plane(flows)
+            row["flows"], inner = scene.to_plane(flows), mesh.inner
+            through = np.bincount(mesh.left, np.abs(flows), self.n)
+            through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
+            row["fastest"] = (0.5 * through / mesh.area).max()
         inward = -flows[mesh.inner :]
         if (inward != 0.0).any():
             first = next(name for name in self.part.patches if flows[mesh.patch(name)].any())
