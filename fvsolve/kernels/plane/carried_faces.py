@@ -34,4 +34,4 @@ def carry_on_meshes(t, y, dydt, out, handle):
                 flow, depth, plane[ring : ring + basin["outer"]], y[o : o + n], plane[basin["toil"] + n :],
                 dydt[o : o + n],
             )  # fmt: skip
-            out[RATE] = max(out[RATE], quickest)
+            out[RATE] = max(out[RATE], quickest + (1.0 - abs(factor)) * basin["fastest"])  # at full speed

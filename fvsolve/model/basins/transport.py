@@ -28,7 +28,10 @@ class Transport(Basin, physics="transport"):
                 grid.nx, grid.ny, kx, ky, flow_x, flow_y, np.zeros(0), np.zeros(max(grid.nx, self.n))
             )
         else:
-            row["flows"] = scene.to_plane(flows)
+            row["flows"], inner = scene.to_plane(flows), mesh.inner
+            through = np.bincount(mesh.left, np.abs(flows), self.n)
+            through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
+            row["fastest"] = (0.5 * through / mesh.area).max()
         passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]

@@ -1,0 +1,63 @@
+"""PyClaw on squares of cells: solvers and states, as its examples set them up. Knows no fvsolve."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import tempfile
+import warnings
+
+import numpy as np
+
+with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # it opens a log where it is imported
+    try:
+        from clawpack import pyclaw, riemann
+
+        logging.disable(logging.INFO)
+    except ImportError:
+        pyclaw = None
+
+FIELDS = {"vc_advection_2D": 1}  # and three of all others
+GIVEN = {"vc_advection_2D": 2, "shallow_bathymetry_fwave_2D": 1}  # fields of aux
+
+
+def classic(flux: str, split: bool, limited: bool = True):
+    """Lax-Wendroff with limited waves, by directions in turn or with transverse waves."""
+    solver = pyclaw.ClawSolver2D(getattr(riemann, flux))
+    solver.limiters = pyclaw.limiters.tvd.MC if limited else 0
+    solver.dimensional_split, solver.transverse_waves = split, 0 if split else 2
+    solver.cfl_desired, solver.cfl_max = 0.9, 1.0
+    return between_walls(solver, flux)
+
+
+def sharp(flux: str):
+    """SharpClaw: fifth-order WENO and SSP-RK(10, 4), its defaults."""
+    return between_walls(pyclaw.SharpClawSolver2D(getattr(riemann, flux)), flux)
+
+
+def between_walls(solver, flux: str):
+    """The solver, with walls around."""
+    solver.all_bcs = pyclaw.BC.wall if FIELDS.get(flux, 3) == 3 else pyclaw.BC.extrap
+    solver.aux_bc_lower[:] = solver.aux_bc_upper[:] = [pyclaw.BC.extrap] * 2
+    solver.max_steps = 10**9
+    return solver
+
+
+def solution(flux: str, cells: int, size: float, q: np.ndarray, aux=None, **given):
+    """A state on cells^2; q, aux : float64[fields, ny, nx], rows by y as fvsolve has them."""
+    domain = pyclaw.Domain([pyclaw.Dimension(0.0, size, cells, name=name) for name in "xy"])
+    state = pyclaw.State(domain, FIELDS.get(flux, 3), GIVEN.get(flux, 0))
+    state.q[...] = q.transpose(0, 2, 1)
+    if aux is not None:
+        state.aux[...] = aux.transpose(0, 2, 1)
+    state.problem_data.update(given)
+    return pyclaw.Solution(state, domain)
+
+
+def stepping(solver, found, step: float):
+    """advance(steps) by steps of one length."""
+    solver.dt_variable, solver.dt = False, step
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        solver.setup(found)
+    return lambda steps: solver.evolve_to_time(found, found.t + steps * step)

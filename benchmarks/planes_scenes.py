@@ -1,0 +1,45 @@
+"""Basins that planes.py runs, as cases for fvsolve. Runs nothing."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from networks import WATER
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+from truth.plain import triangles, write_msh  # noqa: E402
+
+SIZE = 10.0  # [m]
+BED = "0.3*sin(x)*cos(y)"
+HUMP = "exp(-((x - 5)**2 + (y - 5)**2))"
+BASINS = {
+    "advection": {
+        "physics": "transport", "velocity": {"expression": "swirl", "size": SIZE}, "scalars": {"dye": HUMP},
+    },
+    "free surface with bed": {"level": 1.0, "bed": BED, "start": {"level": f"1 + 0.2*{HUMP}"}},
+    "liquid": {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "start": {"pressure": f"1e6 + 1e5*{HUMP}"}},
+}  # fmt: skip
+
+
+def scene(basin: dict, end: float, **numerics) -> dict:
+    """A basin alone between walls, as a case; muscl, van Leer's limiter and SSP-RK2 if nothing else is said."""
+    used = {"end": end, "scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9} | numerics
+    if used["scheme"] != "muscl":
+        del used["limiter"]
+    made = {"schema": 1, "title": "a basin", "fluid": dict(WATER), "nodes": {"pool": {"type": "basin"} | basin}}
+    scalars = {"scalars": {"dye": {"unit": "mg/l"}}} if "scalars" in basin else {}
+    return made | scalars | {"numerics": used, "output": {"fields": 0}}
+
+
+def square(cells: int, size: float = SIZE) -> dict:
+    """A grid of cells^2."""
+    return {"size": [size, size], "cells": [cells, cells]}
+
+
+def of_triangles(path: Path, cells: int) -> dict:
+    """About cells^2 triangles of the same square, written to a file if there is none."""
+    if not path.exists():
+        write_msh(path, *triangles((SIZE, SIZE), SIZE / cells * np.sqrt(4.0 / np.sqrt(3.0))), {})
+    return {"mesh": {"file": str(path)}}

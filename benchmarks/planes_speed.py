@@ -1,0 +1,137 @@
+"""Million cell-steps per second in the plane, fvsolve beside PyClaw. Knows no truth."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import planes_pyclaw as peer
+from kernels import bandwidth
+from measure import against
+from planes_scenes import BASINS, SIZE, of_triangles, scene, square
+
+from fvsolve.case import load
+from fvsolve.model import Model, build
+from fvsolve.solve import initial_state
+from fvsolve.solve.loop import NO_LIMIT, Loop
+
+SIZES = (64, 128, 256, 512, 1024)  # cells along a side
+LARGEST = {"triangles": 256, "PyClaw": 512}
+AT = 256  # where goals hold
+GOALS = {"advection": 400.0, "free surface with bed": 80.0, "free surface, triangles": 25.0}  # [million/s]
+TIMES_PYCLAW, FLAT = 8.0, 1.3
+END = 1e6  # [s] that no run here comes to
+PEERS = {  # the same of PyClaw: Riemann solver, speed of waves [m/s], what it is given
+    "advection": ("vc_advection_2D", 1.0, {}),
+    "free surface with bed": ("shallow_bathymetry_fwave_2D", 4.5, dict(grav=9.81, dry_tolerance=1e-3, sea_level=0.0)),
+    "liquid": ("acoustics_2D", 1.0, dict(rho=1.0, bulk=1.0, zz=1.0, cc=1.0)),
+}
+COURANT = 0.4  # of PyClaw's steps here; cost per step does not depend on it
+
+
+def rate(advance: Callable[[int], object], elements: int, repeats: int = 20, chunk: float = 0.02) -> float:
+    """Elements per second of CPU time, best of `repeats`."""
+    advance(1)
+    times, spent = 1, 0.0
+    while spent < chunk / 3.0:
+        times *= 2
+        start = process_time()
+        advance(times)
+        spent = process_time() - start
+    times, found = max(1, round(times * chunk / spent)), []
+    for _ in range(repeats):
+        start = process_time()
+        advance(times)
+        found.append(process_time() - start)
+    return times * elements / min(found)
+
+
+def rates(model: Model, repeats: int) -> tuple[int, float, float]:
+    """(cells, whole steps and evaluations of the right-hand side per second and cell)."""
+    cells, y, out = model.basins[0].mesh.area.size, initial_state(model).y, model.new_out()
+    dydt, loop = np.empty_like(y), Loop(model)
+
+    def evaluate(times: int) -> None:
+        for _ in range(times):
+            model.functions.rhs(0.0, y, dydt, out, model.handle)
+
+    loop.now[:] = y
+    loop.begin(END, NO_LIMIT)
+    return cells, rate(loop.run, cells, repeats), rate(evaluate, cells, repeats)
+
+
+def of_pyclaw(name: str, cells: int, split: bool, repeats: int) -> float:
+    """The same of PyClaw's classic solver, whole steps."""
+    flux, speed, given = PEERS[name]
+    x, y = np.meshgrid(*[(np.arange(cells) + 0.5) * SIZE / cells] * 2)
+    hump, aux = np.exp(-((x - 5.0) ** 2 + (y - 5.0) ** 2)), None
+    q = np.zeros((peer.FIELDS.get(flux, 3), cells, cells))
+    q[0] = hump
+    if name == "advection":
+        aux = swirl_faces(cells)
+    elif name == "free surface with bed":
+        aux = 0.3 * np.sin(x) * np.cos(y)[None] - 1.0
+        q[0] = 0.2 * hump - aux[0]
+    found = peer.solution(flux, cells, SIZE, q, aux, **given)
+    step = COURANT * SIZE / cells / speed
+    return rate(peer.stepping(peer.classic(flux, split), found, step), cells**2, repeats)
+
+
+def swirl_faces(cells: int, size: float = SIZE) -> np.ndarray:
+    """Velocities through the western and southern faces of cells, by differences of LeVeque's stream function."""
+    s = np.sin(np.pi * np.arange(cells + 1) / cells) ** 2
+    psi = size / np.pi * np.outer(s, s)  # [y, x]
+    return np.array([np.diff(psi, axis=0)[:, :-1], -np.diff(psi, axis=1)[:-1]]) * cells / size
+
+
+def speed_table(quick: bool) -> None:
+    """Cell-steps per second of every physics and size, ratios to PyClaw and to the smallest and largest grids."""
+    sizes, repeats, table, each = SIZES[1:3] if quick else SIZES, 5 if quick else 30, {}, {}
+    print("\nMillion cell-steps/s (in brackets: evaluations of the right-hand side), muscl van-leer, SSP-RK2")
+    print("| cells |" + "".join(f" {n}^2 |" for n in sizes) + "\n|---|" + "---|" * len(sizes))
+    moved = "".join(f" {bandwidth(n * n) / 1e9:.0f} |" for n in sizes)
+    print(f"| triad on arrays of as many [GB/s] |{moved}", flush=True)
+    with tempfile.TemporaryDirectory(prefix="fvsolve-planes-") as folder:
+        cases = {name: lambda n, b=basin: scene(square(n) | b, END) for name, basin in BASINS.items()}
+        water = BASINS["free surface with bed"]
+        cases["free surface, triangles"] = lambda n: scene(of_triangles(Path(folder) / f"{n}.msh", n) | water, END)
+        for name, case in cases.items():
+            row = f"| {name} |"
+            for n in sizes:
+                if name.endswith("triangles") and n > LARGEST["triangles"]:
+                    row += " |"
+                    continue
+                cells, table[name, n], each[name, n] = rates(build(load(case(n))), repeats)
+                row += f" {table[name, n] / 1e6:.1f} ({each[name, n] / 1e6:.0f}) |"
+            print(row, flush=True)
+    for name in PEERS if peer.pyclaw else ():
+        for split in (True, False) if name != "free surface with bed" else (True,):
+            row = f"| PyClaw, {name}, {'directions in turn' if split else 'transverse waves'} |"
+            for n in sizes:
+                if n > LARGEST["PyClaw"]:
+                    row += " |"
+                    continue
+                table[name, n, split] = of_pyclaw(name, n, split, repeats // 3)
+                row += f" {table[name, n, split] / 1e6:.1f} |"
+            print(row, flush=True)
+    verdict(table, sizes)
+
+
+def verdict(table: dict, sizes) -> None:
+    """Print what the goals say."""
+    for name in dict.fromkeys(key[0] for key in table):
+        reached = [table[name, n] for n in sizes if (name, n) in table]
+        said = [f"{name} at {AT}^2: {table[name, AT] / 1e6:.0f} million/s"]
+        if name in GOALS:
+            said.append(against(GOALS[name], table[name, AT] / 1e6))
+        peers = [table[name.replace(", triangles", " with bed"), AT, split] for split in (True, False)
+                 if (name.replace(", triangles", " with bed"), AT, split) in table]  # fmt: skip
+        if peers:
+            factor = table[name, AT] / max(peers)
+            said.append(f"{factor:.1f} times PyClaw's quicker, {against(TIMES_PYCLAW, factor)}")
+        spread = max(reached) / min(reached)
+        said.append(f"quickest over slowest size {spread:.2f}, goal {FLAT}: {'met' if spread <= FLAT else 'missed'}")
+        print("  " + "; ".join(said))
