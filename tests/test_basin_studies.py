@@ -12,8 +12,8 @@ from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, va
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.model.basins import FreeSurface
 from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
+from fvsolve.model.basins.free_surface import FreeSurface
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.accuracy.cells import counts, keys, scaled

@@ -12,6 +12,7 @@ from truth.random_networks import random_network
 from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
+from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
 from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
@@ -66,6 +67,10 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
 @pytest.mark.parametrize("path", CASES, ids=lambda p: p.stem)
 def test_shipped_cases_keep_to_their_pattern(path):
     model, rng = fvsolve.build(fvsolve.load(path)), np.random.default_rng(0)
+    if path.stem == "tracer-basin":
+        with pytest.raises(FvsolveError, match="cannot be linearised yet"):
+            _ = model.structure
+        return
     for t in (0.0, 0.5 * model.case.numerics.end):
         assert stray(model, t, random_state(model, rng)) < 1e-7
 

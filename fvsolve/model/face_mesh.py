@@ -5,10 +5,14 @@ The layout is that of `fvsolve.kernels.plane.faces`, where the words are explain
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fvsolve.kernels.plane import faces
-from fvsolve.mesh import Mesh
+
+if TYPE_CHECKING:
+    from fvsolve.mesh import Mesh
 
 
 def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins.basin import FIFTH
+from fvsolve.model.basins import FIFTH
 from fvsolve.model.scalars import node_values, pipe_values
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
-    from fvsolve.model.basins import Basin
+    from fvsolve.model.basins.basin import Basin
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fvsolve.errors import Fault, MeshError, did_you_mean, listing
-from fvsolve.mesh import Mesh
+
+if TYPE_CHECKING:
+    from fvsolve.mesh import Mesh
 
 EXACT_BITS = 50  # of a stream function that are kept, so that sums of its differences are exact
 

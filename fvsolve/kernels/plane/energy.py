@@ -127,7 +127,8 @@ def patch_loss(tables, patch, flow, y):
         share, wide = per_flow(depth), plane[at + 2 * many + m] * area[i]
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
         along = u * plane[at + m] + v * plane[at + many + m]
-        lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * away
+        held = away - st["rho"] * depth * along  # against a wall all that runs into it is lost
+        lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * held
         if away > 0.0:
             lost += wide * away * (u * u + v * v - along * along)
     return lost

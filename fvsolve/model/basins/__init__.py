@@ -1,8 +1,29 @@
-"""Basins lowered to rows of tables: one module for each physics."""
+"""Basins lowered to rows of tables: one module for each physics, loaded by scenes that have one."""
 
-from fvsolve.model.basins.basin import Basin, at_start, lower_basins
-from fvsolve.model.basins.free_surface import FreeSurface
-from fvsolve.model.basins.liquid import Liquid
-from fvsolve.model.basins.transport import Transport
+from __future__ import annotations
 
-__all__ = ["Basin", "FreeSurface", "Liquid", "Transport", "at_start", "lower_basins"]
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
+
+
+def lower_basins(scene) -> None:
+    """Fill the tables of basins and their patches, and states for their cells."""
+    scene.basins, scene.basin_table, scene.patch_table = [], np.zeros(0, rec.BASIN), np.zeros(0, rec.PATCHES)
+    if scene.case.meshes:
+        from fvsolve.model.basins import free_surface, liquid, transport  # noqa: F401
+        from fvsolve.model.basins.basin import lower
+
+        lower(scene)
+
+
+def at_start(basins: list, size: int) -> np.ndarray:
+    """States at the start: no deviation from the profile but where basins start from one."""
+    found = np.zeros(size)
+    for basin in basins:
+        basin.of(found)[:] = basin.start()
+        if basin.scalars:
+            basin.start_scalars(found)
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
+from fvsolve.model.basins import FIFTH
 from fvsolve.model.face_mesh import lower_mesh
 
 if TYPE_CHECKING:
     from fvsolve.mesh.points import Points
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
-FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
 MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
 SIDES = ("west", "east", "south", "north")  # in the order of a grid's boundary faces
 
@@ -230,7 +230,7 @@ class Basin:
         scene.integers += [scene.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
 
 
-def lower_basins(scene) -> None:
+def lower(scene) -> None:
     """Fill the tables of basins and their patches, and states for their cells."""
     case = scene.case
     scene.basins = [Basin.physics[case.nodes[name].physics](case, name) for name in case.meshes]
@@ -242,13 +242,3 @@ def lower_basins(scene) -> None:
     for row, (name, place) in zip(scene.patch_table, patches, strict=True):
         row["basin"], row["node"] = names.index(place.basin), scene.node_index[name]
         scene.basins[row["basin"]].lower_patch(scene, place.patch, row)
-
-
-def at_start(basins: list[Basin], size: int) -> np.ndarray:
-    """States at the start: no deviation from the profile but where basins start from one."""
-    found: Any = np.zeros(size)
-    for basin in basins:
-        basin.of(found)[:] = basin.start()
-        if basin.scalars:
-            basin.start_scalars(found)
-    return found

@@ -8,7 +8,8 @@ from fvsolve.case.basins import bed_of
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
-from fvsolve.model.basins.basin import FIFTH, Basin
+from fvsolve.model.basins import FIFTH
+from fvsolve.model.basins.basin import Basin
 
 SCALE = 0.1  # [m] of depth
 UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one,

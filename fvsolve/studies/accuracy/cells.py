@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.basins.basin import FIFTH
+from fvsolve.model.basins import FIFTH
 from fvsolve.model.schemes import ORDER
 from fvsolve.parts import Basin, Pipe
 from fvsolve.studies.accuracy.plane import contents
