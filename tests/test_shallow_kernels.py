@@ -9,10 +9,10 @@ import pytest
 from pytest import approx
 from scipy.optimize import brentq
 
-from fvsolve.kernels.plane.friction import DARCY, MANNING, add_friction
+from fvsolve.kernels.plane.friction import add_friction
 from fvsolve.kernels.plane.shallow import PLANS, WORK, grid_rates
 from fvsolve.kernels.plane.shallow_smooth import put_push
-from fvsolve.kernels.records import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
+from fvsolve.kernels.records import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}
