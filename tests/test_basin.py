@@ -11,7 +11,6 @@ from truth.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, re
 
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.models import ladder
 from fvsolve.studies.failure.failure_map import failures
 
@@ -215,7 +214,7 @@ def test_what_basins_do_not_go_with_yet_is_said():
     case = alone(basin((4.0, 2.0), (8, 4), 0.2), 1.0)
     with pytest.raises(CaseError, match="one density"):
         fvsolve.load(case | {"fluid": {**case["fluid"], "law": "log"}})
-    for study in (chart, ladder, lambda case: failures(fvsolve.load(case))):
+    for study in (ladder, lambda case: failures(fvsolve.load(case))):
         with pytest.raises(FvsolveError, match="basins"):
             study(case)
 

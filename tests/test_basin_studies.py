@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fvsolve.model.basins.free_surface import FreeSurface
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
+from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
 from fvsolve.studies.accuracy.plane import lowered
 from fvsolve.studies.accuracy.refine import plan, resolutions
@@ -400,3 +402,22 @@ def test_a_vortex_stands_still_where_it_is_linearised():
     """What carries is held as it is at the start: the prediction is met, though the vortex would turn back."""
     row = stability(swirl(), ["upwind"], ["rk4"]).rows[0]
     assert row.difference == approx(0.0, abs=3e-4)
+
+
+def test_a_chart_of_a_slosh_lays_error_against_cost():
+    """Errors of probes and of all cells at the end fall along each curve; limited slopes beat first order."""
+    case = alone(pool((16, 8), SLOSH), 1.0)
+    case["output"]["probes"] = ["pool.depth@0.3,0.3"]
+    found = chart(case, schemes=["upwind", "muscl"], methods=["ssp-rk2"], cells=[8, 16, 32])
+    curves = found.curves()
+    for name in ("upwind ssp-rk2", "muscl ssp-rk2"):
+        errors = [(point.trajectory, point.end) for point in curves[name]]
+        assert all(point.ok for point in curves[name]) and len(errors) == 3
+        assert errors[0][0] > errors[1][0] > errors[2][0] and errors[0][1] > errors[1][1] > errors[2][1]
+    assert curves["muscl ssp-rk2"][2].end < 0.3 * curves["upwind ssp-rk2"][2].end
+    assert [point.setting.keys["nodes.pool.cells"] for point in curves["muscl ssp-rk2"]] == [[8, 4], [16, 8], [32, 16]]
+
+
+def test_a_chart_says_that_cells_of_a_file_are_not_refined():
+    with pytest.raises(FvsolveError, match="those of plain are a file's"):
+        chart(Path(__file__).parents[1] / "cases" / "flooding.toml")

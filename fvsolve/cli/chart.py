@@ -17,7 +17,7 @@ def chart(
     scheme: Annotated[str | None, typer.Option(metavar="LIST", help="upwind,muscl,upwind5,weno5 by default")] = None,
     method: Annotated[str | None, typer.Option(metavar="LIST", help="a telling few by default")] = None,
     cells: Annotated[
-        str | None, typer.Option(metavar="LIST", help="of the pipe a wave crosses last: 50,100,200")
+        str | None, typer.Option(metavar="LIST", help="of the longest pipe, or side of a basin: 50,100,200")
     ] = None,
     rtol: Annotated[str | None, typer.Option(metavar="LIST", help="of a case without pipes: 1e-3,1e-6")] = None,
     step: Annotated[

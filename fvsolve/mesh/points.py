@@ -29,7 +29,7 @@ class Points:
     def cell(self, x: float, y: float) -> int:
         """The number of the cell that a point lies in, on an edge the lowest; -1 outside and in holes."""
         n = len(self.mesh.cells)
-        nearest = np.sort(self.tree.query((x, y), min(CANDIDATES, n))[1].ravel())
+        nearest = np.sort(np.ravel(self.tree.query((x, y), min(CANDIDATES, n))[1]))
         for cells in (nearest, np.arange(n)):
             inside = self._inside(cells, x, y)
             if inside.any():

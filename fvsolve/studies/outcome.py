@@ -62,7 +62,7 @@ def prepared(case, set: Mapping | None = None):
     """The model of a case with keys changed, without frames; what `outcome` takes. Raises CaseError."""
     from fvsolve.case import load
 
-    return model_of(load(case, {**(set or {}), "output.fields": 0}))
+    return model_of(load(case, {**(set or {}), "output.fields": 0, "output.lines": {}}))
 
 
 def outcome(

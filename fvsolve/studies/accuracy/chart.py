@@ -10,8 +10,9 @@ from pathlib import Path
 
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
-from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.studies.accuracy.cells import from_files
 from fvsolve.studies.accuracy.distance import Distance, distance, track
 from fvsolve.studies.accuracy.front import Point, Row, cheapest, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
@@ -19,7 +20,7 @@ from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, 
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
-from fvsolve.studies.outcome import Told, prepared, refusal, without_basins
+from fvsolve.studies.outcome import Told, prepared, refusal
 from fvsolve.studies.points import Points
 
 WRONG = 1.0  # an error as great as all that the component does
@@ -116,7 +117,9 @@ class _Study:
         from fvsolve.case import load
 
         self.case: Case = load(case, set)
-        without_basins(self.case, "chart")
+        if from_files(self.case):
+            what = f"chart refines cells, and those of {listing(from_files(self.case))} are a file's"
+            raise FvsolveError(f"{what}; order --refine time does without")
         self.points, self.progress = Points(folder), progress
         self.default, self.compiling = default_curve(self.case), 0.0
         self.coarse: Coarse | None = None  # with pipes

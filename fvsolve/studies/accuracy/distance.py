@@ -7,10 +7,12 @@ an error of 0.01 is a hundredth of what that component does. The error of a run 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.studies.accuracy.plane import contents, lowered
 from fvsolve.studies.outcome import Outcome
 
 STILL = 1e-9  # a component that moves by less of its size than this says nothing
@@ -36,13 +38,21 @@ class Track:
     """What a run leaves to be compared.
 
     rows : float64[k, 1 + probes]  time [s] and probes [SI]; waves : pipe -> float64[2, cells], both waves at the end
-    [kg/s]; spans : pipe -> range of their sum over the run [kg/s]
+    [kg/s]; spans : pipe -> range of their sum over the run [kg/s]; pools : what cells of basins hold at the end
     """
 
     probes: tuple[str, ...]
     rows: np.ndarray
     waves: dict[str, np.ndarray]
     spans: dict[str, float]
+    pools: tuple[Pool, ...] = ()
+
+
+class Pool(NamedTuple):
+    """A basin and what its cells hold: quantity -> float64[n]."""
+
+    basin: Any
+    held: dict[str, np.ndarray]
 
 
 def track(found: Outcome) -> Track:
@@ -54,7 +64,8 @@ def track(found: Outcome) -> Track:
         envelope = model.tables[rec.I_ENVELOPE][:, cell : cell + n]
         span = float(envelope[2].max() - envelope[0].min())
         spans[pipe.name] = span if span > STILL * model.scale[at] else 0.0
-    return Track(found.probes, found.rows, waves, spans)
+    pools = tuple(Pool(basin, contents(basin, found.y)) for basin in model.basins)
+    return Track(found.probes, found.rows, waves, spans, pools)
 
 
 def ranges(rows: np.ndarray) -> np.ndarray:
@@ -73,6 +84,8 @@ def distance(run: Track, reference: Track) -> Distance:
     with np.errstate(invalid="ignore", over="ignore"):
         off = np.abs(run.rows[:, 1:] - reference.rows[:, 1:])[:, moving] / span[moving]
         fields = [one for name in run.waves for one in _field_errors(run, reference, name)]
+        for mine, theirs in zip(run.pools, reference.pools, strict=False):
+            fields += _pool_errors(mine, theirs)
         if not off.shape[1]:
             return Distance(end=max(fields, default=float("nan")))
         t = reference.rows[:, 0]  # rows before and after a jump share a time: the second weighs nothing twice
@@ -107,6 +120,17 @@ def _field_errors(run: Track, reference: Track, pipe: str) -> list[float]:
     theirs = np.array([averages(wave, mine.shape[1]) for wave in reference.waves[pipe]])
     off = mine - theirs
     return [float(np.mean(np.abs(off[0] + sign * off[1]))) / span for sign in (1.0, -1.0)]
+
+
+def _pool_errors(mine: Pool, theirs: Pool) -> list[float]:
+    """Mean over the cells of the error of each quantity, over its range, or over that of another with its unit."""
+    known = lowered(theirs.basin, list(theirs.held.values()), mine.basin)
+    share = mine.basin.mesh.area / mine.basin.mesh.area.sum()
+    spans = np.ptp(known, axis=1)
+    if known.shape[0] >= 3 and mine.basin.quantities:
+        spans[1:3] = spans[1:3].max()  # flows along x and y
+    return [float(np.sum(share * np.abs(one - other))) / span
+            for one, other, span in zip(mine.held.values(), known, spans, strict=True) if span > STILL]  # fmt: skip
 
 
 def averages(fine: np.ndarray, cells: int) -> np.ndarray:

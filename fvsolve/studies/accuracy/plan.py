@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from fvsolve.case import load
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME, SCHEMES
-from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.model.checks import rhs_seconds
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import counts, greatest_rate, total
-from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest, with_cells, without_cells
+from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest, own_cells, with_cells, without_cells
 from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
 from fvsolve.studies.outcome import prepared
 
@@ -33,6 +33,8 @@ class Coarse:
 
     works : cells times steps of runs with MOST_CELLS, half as many, a quarter ..., where pipes of one cell keep it
     compile_seconds : what it took beyond a second run [s]; dearness : of its rates, a cell, in usual ones
+    sizes : numbers of cells that a basin may have and their works, halved and doubled, so that its patches and holes
+    lie on lines; None where a pipe counts
     """
 
     cells: int
@@ -41,6 +43,7 @@ class Coarse:
     works: list[float]
     compile_seconds: float
     dearness: float = 1.0
+    sizes: list[tuple[int, float]] | None = None
 
     @property
     def stiff(self) -> bool:
@@ -50,6 +53,8 @@ class Coarse:
     @property
     def levels(self) -> list[int]:
         """Five numbers of cells, each twice the one before, the finest as fine as a minute allows."""
+        if self.sizes is not None:
+            return [n for n, work in self.sizes if self.dearness * work <= MOST_WORK][-LEVELS:] or [self.sizes[0][0]]
         finest = MOST_CELLS
         for work in self.works:
             stiff = self.steps * self.cells * 16 * finest / MOST_CELLS if self.stiff else 0.0
@@ -61,17 +66,30 @@ class Coarse:
 
 def coarse(case: Case) -> Coarse:
     """Run a case with pipes by the program's default on few cells."""
-    model = prepared(case, with_cells(case, default_scheme(case), DEFAULT_METHOD, MOST_CELLS // 16).keys)
+    few = own_cells(case) or MOST_CELLS // 16
+    model = prepared(case, with_cells(case, default_scheme(case), DEFAULT_METHOD, few).keys)
     span = case.numerics.end - case.numerics.start
-    waves, spent = span * float(model.wave_rates.max()) / DEFAULT_COURANT, compile_seconds(model)
+    waves, spent = span * float(model.wave_rate) / DEFAULT_COURANT, compile_seconds(model)
     found = finished(model, capped)
     done = (found.t - case.numerics.start) / span  # less than 1 where it was given up
-    twice = prepared(case, with_cells(case, default_scheme(case), DEFAULT_METHOD, MOST_CELLS // 8).keys)
-    more = (rhs_seconds(twice) - rhs_seconds(model)) / max(1, twice.cells - model.cells)  # a cell: nodes cost too
+    twice = prepared(case, with_cells(case, default_scheme(case), DEFAULT_METHOD, 2 * few).keys)
+    more = (rhs_seconds(twice) - rhs_seconds(model)) / max(1, twice.all_cells - model.all_cells)  # nodes cost too
     dearness = max(1.0, more / CELL)
-    works = [work(case, MOST_CELLS >> k) for k in range(MOST_CELLS.bit_length() - LEVELS)]
+    sizes = None if own_cells(case) is None else basin_sizes(case)
+    works = [] if sizes else [work(case, MOST_CELLS >> k) for k in range(MOST_CELLS.bit_length() - LEVELS)]
     steps = round(found.counts["steps"] / done) if done > 0.0 else 0
-    return Coarse(model.cells, waves, steps, works, spent, dearness)
+    return Coarse(model.all_cells, waves, steps, works, spent, dearness, sizes)
+
+
+def basin_sizes(case: Case) -> list[tuple[int, float]]:
+    """Numbers of cells that the basin that counts may have, halves and doubles of its own, and their works."""
+    own, found = own_cells(case), []
+    for n in (own * 2**k // 2**LEVELS for k in range(2 * LEVELS)):
+        try:
+            found += [(n, work(case, n))] if n > 0 and n * 2**LEVELS % own == 0 else []
+        except CaseError:
+            continue  # patches or holes off its lines
+    return found
 
 
 def work(case: Case, cells: int) -> float:

@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
-from fvsolve.parts import Pipe
 from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.studies.accuracy.cells import basins, counts, keys, pipes, scaled
 
 TOLERANCE = 1e-4  # of implicit methods where there are cells: their steps follow what moves, not the cells
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Scheme (None without cells), method, step control and its size; cells of the pipe a wave takes longest to cross.
+    """Scheme (None without cells), method, step control and its size; cells of the part that counts.
 
     keys : dotted keys of the case -> values
     """
@@ -43,27 +43,37 @@ class Setting:
 
 
 def longest(case: Case) -> str | None:
-    """Name of the pipe that a wave takes longest to cross, None without pipes."""
-    pipes = {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
-    return max(pipes, key=lambda name: pipes[name].length / case.wave_speed(name), default=None)
+    """Name of the part whose cells count: the basin with most along a side, else the pipe that a wave crosses last."""
+    found = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
+    if found:
+        return max(found, key=found.get)
+    found = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items()}
+    return max(found, key=found.get, default=None)
+
+
+def own_cells(case: Case) -> int | None:
+    """Cells along the longer side of the basin that counts, None where a pipe does."""
+    basin = basins(case).get(longest(case) or "")
+    return None if basin is None else max(basin.cells)
 
 
 def cell_keys(case: Case, cells: int) -> dict:
-    """Keys that give the longest pipe so many cells, and the others as many more or fewer as they had beside it.
+    """Keys that give the part that counts so many cells, and the others as many more or fewer as they had beside it.
 
-    Pipes that state `cells` keep stating them; those that do not share one `cell_time`.
+    Pipes that state `cells` keep stating them; those that do not share one `cell_time`. Beside basins all state them.
     """
-    main = longest(case)
-    pipes = {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
-    stated = {name for name in pipes if case.raw["links"][name].get("cells") is not None}
-    factor = cells / pipes[main].cells
-    found = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in pipes if name in stated}
+    main, own = longest(case), own_cells(case)
+    if own is not None:
+        return keys(scaled(counts(case), cells / own))
+    stated = {name for name in pipes(case) if case.raw["links"][name].get("cells") is not None}
+    factor = cells / pipes(case)[main].cells
+    found = {f"links.{name}.cells": max(1, round(pipes(case)[name].cells * factor)) for name in stated}
     if main not in stated:
-        found["numerics.cell_time"] = pipes[main].length / case.wave_speed(main) / cells
-    elif len(stated) < len(pipes):
-        travel = max(pipes[name].length / case.wave_speed(name) for name in pipes if name not in stated)
-        most = max(pipes[name].cells for name in pipes if name not in stated)
-        found["numerics.cell_time"] = travel / (most * factor)
+        found["numerics.cell_time"] = pipes(case)[main].length / case.wave_speed(main) / cells
+    elif len(stated) < len(pipes(case)):
+        free = [pipe for name, pipe in pipes(case).items() if name not in stated]
+        travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items() if name not in stated)
+        found["numerics.cell_time"] = travel / (max(pipe.cells for pipe in free) * factor)
     return found
 
 

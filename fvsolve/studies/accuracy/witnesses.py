@@ -147,6 +147,8 @@ def candidates(case: Case, finest: int | None, stiff: bool) -> dict[str, list[di
 def _sharp(case: Case, keys: dict) -> bool:
     """Whether nearly every step carries a wave through just one cell, so that nothing blurs it."""
     model = prepared(case, keys)
+    if model.basins:
+        return False
     rates, span = model.wave_rates, case.numerics.end - case.numerics.start
     if np.ptp(rates) > 1e-9 * rates.max():
         return False
