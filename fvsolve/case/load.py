@@ -96,7 +96,9 @@ class _Reader:
         has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
-        for name in [*kinds["nodes"]]:
+        for name, kind in [*kinds["nodes"].items()]:
+            if kind is Basin and name not in meshes:
+                kinds["nodes"][name] = None  # at fault itself
             if name in meshes:
                 pool = parts["nodes"][name]
                 own = {} if pool.physics == "liquid" else dict.fromkeys(carried, "number")
