@@ -252,3 +252,20 @@ def test_a_patch_that_runs_dry_does_not_shorten_steps():
     result = fvsolve.run(scene({"pool": pool, "out": reservoir(AMBIENT)}, links, 600.0, STEPS, ["tap.flow"], 10.0))
     assert result.ok and result.summary["steps"] < 20000 and 0.0 <= result["tap.flow"][-1] < 1e-3
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_a_run_keeps_its_mesh_and_its_resolved_case_reads_back(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    points, cells = triangles((4.0, 2.0), 0.5)
+    write(tmp_path / "meshes" / "t.msh", points, cells.tolist())
+    (tmp_path / "v.csv").write_text("x,y,u,v\n-1,-1,0,0\n9,-1,0,0\n-1,9,0,0\n9,9,0,0\n")
+    velocity = {"file": "v.csv"}
+    pool = {"type": "basin", "physics": "transport", "velocity": velocity, "mesh": {"file": "meshes/t.msh"}}
+    text = fvsolve.case.text.write(case(pool, 1.0, scalars={"dye": {"initial": 1.0}}))
+    (tmp_path / "c.toml").write_text(text)
+    assert fvsolve.run(tmp_path / "c.toml", out=tmp_path / "run").ok
+    (tmp_path / "meshes" / "t.msh").unlink()
+    (tmp_path / "v.csv").unlink()
+    again = fvsolve.load(tmp_path / "run" / "case.toml")
+    assert again.meshes["pool"].area.sum() == approx(8.0) and again.nodes["pool"].mesh.file == "t.msh"
+    assert fvsolve.run(again).ok

@@ -16,7 +16,6 @@ from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
 from fvsolve.parts.formula import Formula
-from fvsolve.parts.series import find_file
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
@@ -74,13 +73,10 @@ def mesh_of(basin: Basin, setting: Setting) -> Mesh:
             sides = {name: (one.side, *one.span) if one.span else one.side for name, one in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
             return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
-        path = find_file(basin.mesh.file, setting)
-        return read(path, basin.mesh.unit)
+        return read(setting.files[basin.mesh.file], basin.mesh.unit)
     except MeshError as error:
         below = ("mesh",) if basin.mesh else ()
         raise Misfit([((*below, *keys(fault.place)), fault.message) for fault in error.faults]) from None
-    except ValueError as error:
-        raise Misfit([(("mesh", "file"), str(error))]) from None
 
 
 def keys(place: str) -> tuple:

@@ -82,10 +82,23 @@ class Holes(Value):
         return tuple(Rows("length", length=4).read(one, setting) for one in given)
 
 
+class File(Value):
+    """A file, under the name by which it is kept beside the resolved case."""
+
+    def __init__(self, about: str) -> None:
+        self.about = about
+
+    def read(self, given: Any, setting: Setting) -> str:
+        return copy_name(find_file(Text().read(given, setting), setting), setting)
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "string"}
+
+
 class MeshFile(Table):
     """A mesh of triangles and quadrilaterals; groups of lines are patches."""
 
-    file: Annotated[str, Text("that meshio reads, relative to the case")]
+    file: Annotated[str, File("that meshio reads, relative to the case")]
     unit: Annotated[str, Text("of its coordinates")] = "m"
 
 
@@ -138,8 +151,8 @@ class Flowing(Value):
         if way in ("u, v", "stream"):
             found = {key: Shaped("number").read(found.get(key, 0.0), setting) for key in known}
         elif way == "file":
-            path = find_file(str(found["file"]), setting)
-            found, said["file"] = {"file": path}, copy_name(path, setting)
+            said["file"] = File("").read(found["file"], setting)
+            found = {"file": setting.files[said["file"]]}
         return Velocity(way, found, period, said)
 
 
