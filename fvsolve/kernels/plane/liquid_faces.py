@@ -26,24 +26,13 @@ from fvsolve.kernels.plane.faces import (
     put_sides,
     width,
 )
+from fvsolve.kernels.plane.liquid_log import log_sum
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
 # rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step
 _U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE = (k * BLOCK for k in range(1, 10))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
 ROWS = 10
-
-
-@njit(forceinline=True)
-def log_sum(y):
-    """ln(1 + y) as 8 artanh of a fourth root, to round-off for 1 + y from 1/2 to 2; no call, so loops are vectors."""
-    s = sqrt(1.0 + y)
-    q = 1.0 + sqrt(s)
-    t = y / ((1.0 + s) * (q * q))
-    z = t * t
-    p = 1.0 / 11.0 + z * (1.0 / 13.0 + z * (1.0 / 15.0))
-    p = 1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z * p))
-    return 8.0 * t * (1.0 + z * (1.0 / 3.0 + z * p))
 
 
 @njit

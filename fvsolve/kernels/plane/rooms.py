@@ -35,6 +35,20 @@ def through_faces(kx, ky, flow_x, flow_y):
 
 
 @njit
+def finish_water(tables, b, rate, depth, dh, qx, qy, dydt, rate_x, rate_y, out):
+    """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
+    st, basin = tables[I_SETTINGS][0], tables[I_BASINS][b]
+    if basin["friction"] != NO_DRAG:
+        roughness = tables[I_BASINS]["roughness"][b : b + 1]
+        fades = add_friction(
+            basin["friction"], st["gravity"], roughness, FASTEST, depth, dh, qx, qy, rate_x, rate_y
+        )  # fmt: skip
+        out[RATE] = max(out[RATE], fades)
+    book_open(tables, basin, st["rho"], dydt, out)
+    out[RATE] = max(out[RATE], basin["unsplit"] * rate)
+
+
+@njit
 def shallow_grids(t, y, dydt, out, handle):
     """Rates of water on grids."""
     tables = open_tables(handle)
@@ -58,14 +72,7 @@ def shallow_grids(t, y, dydt, out, handle):
         )  # fmt: skip
         if f >= 0:
             through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
-        if basin["friction"] != NO_DRAG:
-            fades = add_friction(
-                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], FASTEST, plan[0], dh, qx,
-                qy, rate_x, rate_y,
-            )  # fmt: skip
-            out[RATE] = max(out[RATE], fades)
-        book_open(tables, basin, st["rho"], dydt, out)
-        out[RATE] = max(out[RATE], basin["unsplit"] * rate)
+        finish_water(tables, b, rate, plan[0], dh, qx, qy, dydt, rate_x, rate_y, out)
 
 
 @njit
@@ -130,14 +137,7 @@ def shallow_meshes(t, y, dydt, out, handle):
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
             plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
         )  # fmt: skip
-        if basin["friction"] != NO_DRAG:
-            fades = add_friction(
-                basin["friction"], st["gravity"], tables[I_BASINS]["roughness"][b : b + 1], FASTEST, plan[0], dh, qx,
-                qy, rate_x, rate_y,
-            )  # fmt: skip
-            out[RATE] = max(out[RATE], fades)
-        book_open(tables, basin, st["rho"], dydt, out)
-        out[RATE] = max(out[RATE], basin["unsplit"] * rate)
+        finish_water(tables, b, rate, plan[0], dh, qx, qy, dydt, rate_x, rate_y, out)
 
 
 @njit

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
 MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
-SIDES = ("west", "east", "south", "north")  # in the order of a grid's boundary faces
 
 
 class Basin:
@@ -162,7 +161,6 @@ class Basin:
         row["carried"] = scene.size if self.scalars else -1
         for name in self.scalars:
             scene.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
-
         self.memory = 8 * (scene.plane_size + len(scene.integers) + scene.size - before)
         scene.warnings += [f"basin {self.name}: {note}" for note in mesh.notes]
 
