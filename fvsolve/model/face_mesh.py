@@ -15,18 +15,12 @@ if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
 
 
-def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(float64[:] floats, int64[:] integers, int64[n] order): geometry, who lies beyond, and mesh cell by place.
-
-    Cells of meshes from files are placed so that neighbours lie close in memory: place i holds the mesh's cell
-    order[i]. Faces keep their numbers.
-    """
-    order = np.arange(len(mesh.area))
-    place = np.argsort(order)
-    n, f, inner = len(order), len(mesh.left), mesh.inner
+def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """(float64[:] floats, int64[:] integers): geometry, and who lies beyond; cells and faces keep their numbers."""
+    n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
     face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
-    own = place[np.concatenate([mesh.left, mesh.right[:inner]])]
+    own = np.concatenate([mesh.left, mesh.right[:inner]])
     sort = np.lexsort((_turn(mesh, face), own))
     first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=n))[:-1]])
     side = np.empty(own.size, np.int64)
@@ -48,14 +42,14 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     face_of[at] = face
     measures = np.zeros((faces.MEASURES + faces.DISTANCES, indices.shape[1]))
     measures[faces.NX] = 1.0
-    measures[:, at] = _measures(mesh, face, own, order, n)
+    measures[:, at] = _measures(mesh, face, own, n)
     rank = np.argsort(slot[inner:f])
     measures, distances = np.split(measures, [faces.MEASURES])
     floats = [_by_block(measures), mesh.normal[inner + rank].T.ravel(), mesh.length, _by_block(distances)]
     need = np.maximum.accumulate(need)
     places = _by_block(indices).astype(np.int32).view(np.int64)
     integers = [[slots, n, f, f - inner, ring], places, need, slot[inner + rank], rank, face_of]
-    return np.concatenate(floats), np.concatenate(integers).astype(np.int64), order
+    return np.concatenate(floats), np.concatenate(integers).astype(np.int64)
 
 
 def _by_block(table: np.ndarray) -> np.ndarray:
@@ -69,15 +63,14 @@ def _turn(mesh: Mesh, face: np.ndarray) -> np.ndarray:
     return np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
 
 
-def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, order: np.ndarray, n: int) -> np.ndarray:
+def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
     """float64[MEASURES, sides]: what `faces` tells of every side."""
     number = np.where(face >= 0, face, ~face)
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[number]
-    cell = order[own]
-    to_side = mesh.middle[number] - mesh.centre[cell]
+    to_side = mesh.middle[number] - mesh.centre[own]
     beyond = np.where(face >= 0, mesh.right[number], mesh.left[number])
     across = 2.0 * np.sum(to_side * normal, axis=1, keepdims=True) * normal  # to the mirror image
-    across = np.where(beyond[:, None] >= 0, mesh.centre[beyond] - mesh.centre[cell], across)
+    across = np.where(beyond[:, None] >= 0, mesh.centre[beyond] - mesh.centre[own], across)
     weight = 1.0 / np.sum(across**2, axis=1)
     square = [np.bincount(own, weight * across[:, a] * across[:, b], n) for a, b in ((0, 0), (0, 1), (1, 1))]
     xx, xy, yy = (s[own] for s in square)
@@ -85,5 +78,5 @@ def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, order: np.ndarray, 
     slope = scale * (yy * across[:, 0] - xy * across[:, 1]), scale * (xx * across[:, 1] - xy * across[:, 0])
     gap = 1.0 / np.sum(across * normal, axis=1)
     lean = normal - across * gap[:, None]
-    share = 1.0 / mesh.area[cell]
+    share = 1.0 / mesh.area[own]
     return np.stack([*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *lean.T])

@@ -142,7 +142,7 @@ class Basin:
                 scene.warnings.append(f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; "
                                       "muscl is taken there")  # fmt: skip
                 row["scheme"] = rec.MUSCL
-            floats, self.integers, _ = lower_mesh(mesh)
+            floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = scene.to_plane(floats), mesh.left.size
             row["links"] = len(scene.integers)
             scene.integers += self.integers.tolist()
