@@ -17,11 +17,14 @@ from fvsolve.kernels.plane.shallow_rows import (
     EAST,
     FIELDS,
     FLOW_EAST,
+    FLUXES,
     GHOSTS,
+    HIGH,
     MOST,
     NORTH,
+    PUSH,
+    SIDES,
     STRIDE,
-    WAVE,
     put_beyond,
     put_cells,
     put_end,
@@ -37,8 +40,8 @@ __all__ = ["PLANS", "WORK", "grid_rates"]
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # rows of cells at hand
-BLOCK, SIDE, FLUX = FIELDS * STRIDE, 5 * STRIDE, 4 * STRIDE
-WORK = RING * BLOCK + 6 * SIDE + 3 * FLUX + 5 * STRIDE  # floats that `grid_rates` works in
+BLOCK, SIDE, FLUX = FIELDS * STRIDE, SIDES * STRIDE, FLUXES * STRIDE
+WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # floats that `grid_rates` works in
 
 
 @njit
@@ -115,10 +118,9 @@ def column_rates(
     """The same of columns `first` to `last`, no more than MOST of them, row by row."""
     n, fifth = last - first, scheme == LINEAR or scheme == WENO5
     ring, at = work[: RING * BLOCK], RING * BLOCK
-    lows, highs, at = work[at : at + 3 * SIDE], work[at + 3 * SIDE : at + 6 * SIDE], at + 6 * SIDE
-    fluxes, at = work[at : at + 3 * FLUX], at + 3 * FLUX
-    pushes, deep, top = work[at : at + 3 * STRIDE], work[at + 3 * STRIDE :], work[at + 4 * STRIDE :]
-    west, east, along, push_x = lows[2 * SIDE :], highs[2 * SIDE :], fluxes[2 * FLUX :], pushes[2 * STRIDE :]
+    sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
+    fluxes, deep, top = work[at : at + 3 * FLUX], work[at + 3 * FLUX :], work[at + 3 * FLUX + STRIDE :]
+    ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]  # of a row, from one cell before it on
     for i in range(STRIDE):
         top[i] = 0.0
     reach = 3 if fifth else 2
@@ -134,22 +136,19 @@ def column_rates(
         # values of row j at its southern and northern faces
         now, was = j & 1, (j - 1) & 1
         here, before = ring[place(j, 0) :], ring[place(j - 1, 0) :]
-        low, high, push = lows[now * SIDE :], highs[now * SIDE :], pushes[now * STRIDE :]
-        put_limited(scheme, limiter, n, before, here, ring[place(j + 1, 0) :], low, high, push)
+        low = sides[now * SIDE :]
+        put_limited(scheme, limiter, n, before, here, ring[place(j + 1, 0) :], low)
         if fifth:
             put_smooth(
                 g, scheme, ring[place(j - 2, 0) :], before, here, ring[place(j + 1, 0) :], ring[place(j + 2, 0) :],
-                low, high, push, deep[:n],
+                low, deep[:n],
             )  # fmt: skip
         if j < 0:
             continue
         # faces between rows j - 1 and j
-        south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], highs[was * SIDE :]
+        south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], sides[was * SIDE + HIGH :]
         l, r = (under, low) if fifth else (before, here)  # where speeds are looked at
-        put_fluxes(
-            g, n, under, under[NORTH:], under[EAST:], low, low[NORTH:], low[EAST:],
-            l[NORTH:], l[WAVE:], r[NORTH:], r[WAVE:], north,
-        )  # fmt: skip
+        put_fluxes(g, n, NORTH, EAST, under, low, l, r, north)
         if flow_y.size > 0:
             copy(north, flow_y[j * nx + first : j * nx + last])
         if j == 0:
@@ -157,23 +156,21 @@ def column_rates(
         # row j - 1 : faces along it, and its rates
         whole = (n + 9) // 8 * 8  # more than is looked at, so that nothing is left over of a vector
         cell = ring[place(j - 1, -1) :]
-        put_limited(scheme, limiter, whole, ring[place(j - 1, -2) :], cell, before, west, east, push_x)
+        put_limited(scheme, limiter, whole, ring[place(j - 1, -2) :], cell, before, ends)
         if fifth:
             put_smooth(
                 g, scheme, ring[place(j - 1, -3) :], ring[place(j - 1, -2) :], cell, before, ring[place(j - 1, 1) :],
-                west, east, push_x, deep[:whole],
+                ends, deep[:whole],
             )  # fmt: skip
-        l, r = (east, west[1:]) if fifth else (cell, before)
-        put_fluxes(
-            g, (n + 8) // 8 * 8, east, east[EAST:], east[NORTH:], west[1:], west[EAST + 1 :], west[NORTH + 1 :],
-            l[EAST:], l[WAVE:], r[EAST:], r[WAVE:], along,
-        )  # fmt: skip
+        left, right = ends[HIGH:], ends[1:]
+        l, r = (left, right) if fifth else (cell, before)
+        put_fluxes(g, (n + 8) // 8 * 8, EAST, NORTH, left, right, l, r, along)
         if flow_x.size > 0:
             at = (j - 1) * (nx + 1)
             copy(along, flow_x[at + first : at + last + 1])
         a, z = (j - 1) * nx + first, (j - 1) * nx + last
         put_rates(
-            g, kx[first:last], ky[j - 1], push_x[1:], pushes[was * STRIDE :], along, south, north,
+            g, kx[first:last], ky[j - 1], ends[PUSH + 1 :], sides[was * SIDE + PUSH :], along, south, north,
             rate_h[a:z], rate_x[a:z], rate_y[a:z],
         )  # fmt: skip
     most = 0.0

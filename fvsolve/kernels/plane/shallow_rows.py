@@ -1,13 +1,14 @@
 """Rows of shallow water: cells with their ghosts, limited values at faces, fluxes, rates. Knows no grid.
 
 A block is the view of rows that lie STRIDE apart, a constant: so the compiler sees that they do not overlap. Of cells:
-depth, surface, both velocities, wave speed and unit flows; of values at faces the first five of these; of fluxes that
-of depth, of normal momentum less the pressure on the side before and after, of momentum along the faces.
+depth, surface, both velocities, wave speed and unit flows; of sides the first five of these at the faces before and
+after, and depth times what the surface rises across the cell [m2]; of fluxes that of depth, of normal momentum less the
+pressure on the side before and after, of momentum along the faces.
 """
 
 from math import sqrt
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central
 from fvsolve.kernels.records import MINMOD, UPWIND, VAN_LEER
 
@@ -18,11 +19,12 @@ MOST = 1024  # cells of a row at a time
 GHOSTS = 8  # three are needed; with eight the cells of a row begin where a cache line does
 STRIDE = 1048  # an odd number of cache lines, so that rows do not push each other out
 DEPTH, SURFACE, EAST, NORTH, WAVE, FLOW_EAST, FLOW_NORTH = (k * STRIDE for k in range(7))
+LOW, HIGH, PUSH = (k * STRIDE for k in (0, 5, 10))
 MASS, BEFORE, AFTER, ALONG = (k * STRIDE for k in range(4))
-FIELDS = 7
+FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
 
 
-@njit
+@inner
 def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, cells, top):
     """Depth, surface, velocities and wave speed of a row; top[i] becomes the greatest rate of its column so far.
 
@@ -97,29 +99,27 @@ def central_halves(a, b, c, d):
     return 0.5 * slope_monotonized_central(a, b), 0.5 * slope_monotonized_central(c, d)
 
 
-@njit
-def put_limited(scheme, limiter, n, before, here, after, low, high, push):
-    """Values at both faces of n cells, from these and their neighbours: themselves, or limited.
+@inner
+def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
+    """Values at both faces of cell i and what its surface rises."""
+    sides[i], sides[i + SURFACE], sides[i + EAST], sides[i + NORTH] = hl, el, ul, vl
+    sides[i + HIGH], sides[i + (HIGH + SURFACE)], sides[i + (HIGH + EAST)], sides[i + (HIGH + NORTH)] = hr, er, ur, vr
+    sides[i + PUSH] = push
 
-    push : float64[n]  depth times what the surface rises across the cell [m2]
-    """
+
+@njit
+def put_limited(scheme, limiter, n, before, here, after, sides):
+    """Sides of n cells, from these and their neighbours: themselves, or limited."""
     if scheme == UPWIND:
         for i in range(n):
-            low[i], low[i + SURFACE], low[i + EAST], low[i + NORTH] = (
-                here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH],
-            )  # fmt: skip
-            high[i], high[i + SURFACE], high[i + EAST], high[i + NORTH] = (
-                here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH],
-            )  # fmt: skip
-            push[i] = 0.0
+            h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
+            put_side(i, h, e, u, v, h, e, u, v, 0.0, sides)
     elif limiter == MINMOD:
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
             a, b = minmod_halves(h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
             c, d = minmod_halves(u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v)
-            low[i], low[i + SURFACE], low[i + EAST], low[i + NORTH] = h - a, e - b, u - c, v - d
-            high[i], high[i + SURFACE], high[i + EAST], high[i + NORTH] = h + a, e + b, u + c, v + d
-            push[i] = h * (2.0 * b)
+            put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
     elif limiter == VAN_LEER:
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
@@ -127,9 +127,7 @@ def put_limited(scheme, limiter, n, before, here, after, low, high, push):
             c, d = van_leer_halves(
                 u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
             )
-            low[i], low[i + SURFACE], low[i + EAST], low[i + NORTH] = h - a, e - b, u - c, v - d
-            high[i], high[i + SURFACE], high[i + EAST], high[i + NORTH] = h + a, e + b, u + c, v + d
-            push[i] = h * (2.0 * b)
+            put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
     else:
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
@@ -137,36 +135,35 @@ def put_limited(scheme, limiter, n, before, here, after, low, high, push):
             c, d = central_halves(
                 u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
             )
-            low[i], low[i + SURFACE], low[i + EAST], low[i + NORTH] = h - a, e - b, u - c, v - d
-            high[i], high[i + SURFACE], high[i + EAST], high[i + NORTH] = h + a, e + b, u + c, v + d
-            push[i] = h * (2.0 * b)
+            put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
 
 
-@njit
-def put_fluxes(g, n, left, nl, tl, right, nr, tr, ul, cl, ur, cr, f):
+@inner
+def put_fluxes(g, n, normal, along, left, right, l, r, f):
     """Through a row of n faces (HLLC); momentum along them goes with the mass, as the contact carries it.
 
-    left, right : values on either side; n, t : their velocities normal to the faces and along them
-    u, c : normal velocities and wave speeds between which those of the face lie
+    normal, along : EAST and NORTH, or the other way round
+    left, right : values on either side; l, r : cells between whose velocities and wave speeds those of the face lie
     """
     half = 0.5 * g
     for i in range(n):
         hl, el, hr, er = left[i], left[i + SURFACE], right[i], right[i + SURFACE]
+        nl, nr, tl, tr = left[i + normal], right[i + normal], left[i + along], right[i + along]
         bed = max(el - hl, er - hr)
         a, b = max(0.0, el - bed), max(0.0, er - bed)
-        wave, ua, ub = max(cl[i], cr[i]), ul[i], ur[i]
+        wave, ua, ub = max(l[i + WAVE], r[i + WAVE]), l[i + normal], r[i + normal]
         low, high = min(min(ua, ub) - wave, 0.0), max(max(ua, ub) + wave, 0.0)
         both = 1.0 / (high - low + TINY)
         wa, wb, mix = high * both, -(low * both), high * low * both
-        qa, qb = a * nl[i], b * nr[i]
+        qa, qb = a * nl, b * nr
         mass = (wa * qa + wb * qb) + mix * (b - a)
-        flow = (wa * (qa * nl[i]) + wb * (qb * nr[i])) + mix * (qb - qa)
+        flow = (wa * (qa * nl) + wb * (qb * nr)) + mix * (qb - qa)
         rise = half * ((b - a) * (b + a))
         f[i], f[i + BEFORE], f[i + AFTER] = mass, flow + wb * rise, flow - wa * rise
-        f[i + ALONG] = mass * (tl[i] if mass > 0.0 else tr[i])
+        f[i + ALONG] = mass * (tl if mass > 0.0 else tr)
 
 
-@njit
+@inner
 def put_rates(g, kx, ky, push_x, push_y, x, south, north, dh, dx, dy):
     """Rates of a row: what comes in less what goes out, and the push of surface and pressure."""
     for i in range(dh.size):

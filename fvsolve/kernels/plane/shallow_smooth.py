@@ -8,7 +8,7 @@ third differences of either add to it with the second of the other.
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.shallow_rows import EAST, FLOW_EAST, NORTH, STRIDE, SURFACE, THIN, WAVE
+from fvsolve.kernels.plane.shallow_rows import EAST, FLOW_EAST, HIGH, NORTH, PUSH, STRIDE, SURFACE, THIN, WAVE
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import WENO5
 
@@ -67,8 +67,9 @@ def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
 
 
 @njit
-def put_smooth(g, scheme, p, q, r, s, t, low, high, push, deep):
+def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
     """Fifth-order values at both faces of a row of cells r over limited ones, from two on either side."""
+    low, high = sides, sides[HIGH:]
     put_deep(p, q, r, s, t, deep)
     for f in range(4):
         at = f * STRIDE
@@ -76,7 +77,8 @@ def put_smooth(g, scheme, p, q, r, s, t, low, high, push, deep):
         put_fifth(scheme, p[o:], q[o:], r[o:], s[o:], t[o:], deep, low[at:], high[at:])
     e = SURFACE
     put_push(
-        r, deep, low, high, low[e:], high[e:], p, q, s, t, p[e:], q[e:], r[e:], s[e:], t[e:], push[: deep.size]
+        r, deep, low, high, low[e:], high[e:], p, q, s, t, p[e:], q[e:], r[e:], s[e:], t[e:],
+        sides[PUSH : PUSH + deep.size],
     )  # fmt: skip
     put_velocities(g, deep, low)
     put_velocities(g, deep, high)
