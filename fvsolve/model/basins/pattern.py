@@ -19,10 +19,14 @@ def inside(basin) -> tuple[np.ndarray, np.ndarray]:
 
 
 def carried(basin) -> tuple[np.ndarray, np.ndarray]:
-    """The same of amounts that a given velocity carries, each on itself; what is held to bounds looks further."""
+    """The same of amounts that a given velocity carries, each on itself.
+
+    Fifth order on grids looks along its faces too, four cells from a side; what is held to bounds looks further.
+    """
     near, at = neighbours(basin), int(basin.row["carried"])
-    if basin.row["scheme"] == rec.WENO5:
-        near, box = near @ near, eye_array(basin.n, dtype=bool)
+    if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
+        near = near @ near if basin.row["scheme"] == rec.WENO5 else near
+        box = eye_array(basin.n, dtype=bool)
         for ring in rings(basin):
             box = box @ ring @ ring @ ring @ ring
         near = near + box
