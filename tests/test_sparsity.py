@@ -75,6 +75,13 @@ def test_shipped_cases_keep_to_their_pattern(path):
         assert stray(model, t, random_state(model, rng)) < 1e-7
 
 
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
+def test_what_is_carried_keeps_to_its_pattern_beside_sides_and_corners_too(scheme):
+    settings = {"nodes.sheet.cells": [14, 12], "numerics.scheme": scheme}
+    model, rng = fvsolve.build(fvsolve.load("swirl", settings)), np.random.default_rng(0)
+    assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
+
+
 def test_a_pipe_couples_no_more_than_its_scheme_reads():
     """Upwind: a cell of either wave reads itself, the one it comes from and, with friction, its other wave."""
     counts = []
