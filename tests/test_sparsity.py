@@ -78,7 +78,7 @@ def test_shipped_cases_keep_to_their_pattern(path):
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
 def test_what_is_carried_keeps_to_its_pattern_beside_sides_and_corners_too(scheme):
     settings = {"nodes.sheet.cells": [14, 12], "numerics.scheme": scheme}
-    model, rng = fvsolve.build(fvsolve.load("swirl", settings)), np.random.default_rng(0)
+    model, rng = fvsolve.build(fvsolve.load(CASES[0].parent / "swirl.toml", settings)), np.random.default_rng(0)
     assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
 
 
