@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.sections import Numerics, Output
+from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
-from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -139,18 +138,9 @@ def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     return found
 
 
-def misfits(
-    nodes: dict[str, Any], links: dict[str, Any], meshes: dict, numerics: Numerics, fluid: Any, scalars: dict
-) -> Found:
+def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any) -> Found:
     """Faults of patches, and of what basins do not go with."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
-    method = METHODS.get(numerics.method or "")
-    implicit = numerics.method == AUTO or (method is not None and not method.explicit)
-    if implicit and any(_explicit(basin, meshes.get(name), scalars) for name, basin in found.items()):
-        what = (
-            f"{show(numerics.method)} is implicit; scalars in basins are stepped by explicit methods, such as ssp-rk2"
-        )
-        yield ("numerics", "method"), f"{what}, unless they neither decay nor pass the boundary of a given velocity"
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)
@@ -189,10 +179,3 @@ def misfits(
                     shape.at(x, y)
             except ValueError as error:
                 yield (*key, *below), str(error)
-
-
-def _explicit(basin: Basin, mesh: Mesh | None, scalars: dict) -> bool:
-    """Whether scalars in a basin want an explicit method."""
-    closed = mesh is not None and not patch_names(mesh)
-    still = basin.physics == "transport" and closed and not any(scalar.decay for scalar in scalars.values())
-    return bool(scalars) and not still

@@ -113,7 +113,7 @@ class _Reader:
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
-            self.add(basins.misfits(*parts.values(), meshes, numerics, properties, carried))
+            self.add(basins.misfits(*parts.values(), meshes, properties))
             self.add(check.claims(expect, numerics))
             numerics = numerics.filled(has_cells)
         self.add(scalars.misfits(carried, *parts.values(), properties))

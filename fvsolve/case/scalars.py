@@ -42,8 +42,8 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown(scalar, scalars)
-                    elif part.physics != "transport":
-                        yield place, "comes with what links bring; it goes with a given velocity alone"
+                    elif part.physics != "transport" and one.boundary != "open":
+                        yield place, 'comes with what links bring; it goes with a given velocity or boundary = "open"'
             if scalars and part.kind in HOLDERS:
                 article = "an" if part.kind[0] in "aeiou" else "a"
                 yield (group, name), f"is {article} {part.kind}; {HOLDERS[part.kind]}"

@@ -15,7 +15,6 @@ from fvsolve.kernels.records import (
     I_PROFILE,
     I_SETTINGS,
     LEVEL,
-    PATCH,
     PIPE_FLOW,
     PIPE_PRESSURE,
     PRESSURE,
@@ -187,7 +186,7 @@ def record_nodes(t, out, tables, values):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
-        if (nodes[i]["kind"] == TANK or nodes[i]["kind"] == PATCH) and out[layout["supply"] + i] != 0.0:
+        if nodes[i]["kind"] == TANK and out[layout["supply"] + i] != 0.0:
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
                 marks[at] = t

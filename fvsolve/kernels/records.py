@@ -345,6 +345,7 @@ BASIN = np.dtype(
         ("density", "f8"),  # of a liquid at rest [kg/m3]
         ("small", "f8"),  # what is too small to mean anything, squared
         ("carried", "i8"),  # first state of scalars, depth times value, one after the other; -1 for none
+        ("lost", "i8"),  # first of its cells among the losses of a scalar
         ("flows", "i8"),  # flows through faces: of columns, then of rows, or of a mesh; -1 where nobody asks
         ("outside", "i8"),  # of each scalar, values beyond the boundary
         ("toil", "i8"),  # what scalars are carried in
@@ -373,6 +374,7 @@ PATCHES = np.dtype(
         ("faces", "i8"),  # how many these are
         ("length", "f8"),  # of these [m]
         ("normals", "i8"),  # in `plane`: outward normals along x, along y, and length over area of cells, of each
+        ("open", "i8"),  # 1 where it is no wall and no link joins: what passes is the boundary's
         ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
     ],
     align=True,

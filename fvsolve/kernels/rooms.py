@@ -75,6 +75,7 @@ ROOMS = {
     ),
     "patches": Room(
         before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
+        record="plane.patches: record_patches",
         observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
     "patches, barotropic": Room(observe="plane.observe: observe_dense_flows"),

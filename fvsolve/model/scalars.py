@@ -14,7 +14,7 @@ STORES = (rec.TANK, rec.CHAMBER)
 
 def lower_scalars(scene) -> None:
     """Fill the table of scalars, states for their amounts and schedules for their values."""
-    case, pipes, nodes = scene.case, scene.pipe_table, scene.node_table
+    case, pipes, nodes, basins = scene.case, scene.pipe_table, scene.node_table, scene.basin_table
     scene.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
     for row, (name, scalar) in zip(scene.scalar_table, case.scalars.items(), strict=True):
         for key in ("diffusivity", "decay", "ambient", "initial"):
@@ -32,7 +32,8 @@ def lower_scalars(scene) -> None:
         row["least"], row["greatest"] = bounds(case, name)
         if scalar.decay > 0.0:
             row["loss"] = sum(scene.scalar_table["losses"])
-            row["losses"] = 1 if explicit(case.numerics.method) else scene.size - row["y"]
+            row["losses"] = 1 if explicit(case.numerics.method) else scene.size - row["y"] + sum(basins["n"])
+        basins["lost"] = scene.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
     if len(case.scalars):
         pipes["center"] = scene.cells + pipes["cell"]
 

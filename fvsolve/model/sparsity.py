@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import pattern
 from fvsolve.steady import union
@@ -27,8 +26,6 @@ def sparsity(model) -> csc_array:
     """bool[n + ledger, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
     from fvsolve.model.sparsity_scalars import scalar_pairs
 
-    if any(basin.scalars and basin.part.physics != "transport" for basin in model.basins):
-        raise FvsolveError("scalars in a free surface are stepped by explicit methods and cannot be linearised yet")
     n, couplings = model.y_size, Couplings(model)
     pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
@@ -88,7 +85,7 @@ class Couplings:
             yield from self.beyond(pipe)
             yield from self.remembered(pipe)
         for basin in self.basins:
-            yield pattern.carried(basin) if basin.part.physics == "transport" else pattern.inside(basin)
+            yield pattern.inside(basin)
             if basin.row["open"] >= 0:
                 yield every(states(self.size + basin.row["open"]), pattern.of_cells(basin, pattern.at_openings(basin)))
         yield from self.stored()

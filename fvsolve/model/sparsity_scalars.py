@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.basins import pattern
 from fvsolve.model.scalars import STORES
 from fvsolve.model.sparsity import Pairs, ends_of, every, states
 from fvsolve.steady import union
@@ -19,7 +20,7 @@ class Carriage:
 
     def __init__(self, couplings, model, q: int) -> None:
         self.of, self.row = couplings, model.tables[rec.I_SCALARS][q]
-        of, nodes = couplings, len(couplings.nodes)
+        self.q, of, nodes = q, couplings, len(couplings.nodes)
         self.ledger = of.size + nodes * (1 + q)
         self.loss = of.size + nodes * (1 + len(model.tables[rec.I_SCALARS])) + self.row["loss"]
         self.places = model.tables[rec.I_INTEGERS][self.row["places"] : self.row["places"] + nodes]
@@ -37,8 +38,16 @@ class Carriage:
         self.values = self.mixed()
 
     def own(self, i: int) -> list:
-        """States that set the value of a node which stores."""
+        """States that set the value of a node which stores, or of a patch."""
+        if i in self.of.patches:
+            return [self.behind(i), self.of.behind(i, 1)]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
+
+    def behind(self, i: int) -> np.ndarray:
+        """Amounts in the cells behind a patch."""
+        row = self.of.patches[i]
+        cells = self.of.integers[row["first"] : row["first"] + row["count"]]
+        return pattern.amounts(self.of.basins[row["basin"]], self.q, cells)
 
     def edge(self, pipe, right: int) -> list[np.ndarray]:
         """Amounts and waves of the cells at an end of a pipe that its value there is made of."""
@@ -67,7 +76,12 @@ class Carriage:
             brought[i].append(self.values[j])
             brought[j].append(self.values[i])
         for i, felt in enumerate(brought):
-            yield every(states(*([self.places[i]] if self.stores[i] else []), self.ledger + i), states(*felt))
+            gets = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
+            yield every(states(*gets, self.ledger + i), states(*felt))
+        if self.q == 0:
+            yield from map(pattern.carried, self.of.basins)
+        for basin in self.of.basins:
+            yield from self.passing(basin)
         if self.row["losses"] > 0:
             yield from self.lost()
         for pipe in self.of.pipes:
@@ -75,6 +89,15 @@ class Carriage:
             for right, i in enumerate(ends_of(pipe)):
                 yield every(self.edge(pipe, right)[0], states(self.values[i]))
                 yield every(self.close(pipe, right), self.read(pipe, right, i))
+
+    def passing(self, basin) -> Iterator[Pairs]:
+        """What passes the open boundary of a basin, booked to its patches, on the cells there."""
+        nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
+        if basin.row["open"] >= 0:
+            behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
+            cells = pattern.about(pattern.looked_at(basin), np.concatenate(behind))
+            felt = states(pattern.amounts(basin, self.q, cells), pattern.of_cells(basin, cells))
+            yield every(self.ledger + np.array(nodes), felt)
 
     def lost(self) -> Iterator[Pairs]:
         """What decays, on the amounts and masses that it decays from: one row for all, or one a state."""
@@ -87,6 +110,10 @@ class Carriage:
         for i in np.flatnonzero(self.stores):
             felt = states(*self.own(i))
             yield every(np.atleast_1d(pick(self.places[i] - self.row["y"])), felt)
+        for basin in self.of.basins:
+            cells = np.arange(basin.n)
+            for first in (pattern.amounts(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):
+                yield pick(basin.row["lost"] + cells), first + cells
 
     def inside(self, pipe) -> Iterator[Pairs]:
         """Cells on their neighbours: amounts, masses, and the flows between them."""

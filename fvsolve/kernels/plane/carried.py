@@ -207,15 +207,14 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
     if basin["open"] >= 0:
         book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
     if scalar["decay"] > 0.0:
-        area, lost = tables[I_PLANE][basin["area"] : basin["area"] + n], 0.0
+        area = tables[I_PLANE][basin["area"] : basin["area"] + n]
         for i in range(n):
             high = depth[i] if depth.size > 0 else 1.0
-            lost += area[i] * (s[i] - high * scalar["ambient"])
+            lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
         scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
-        lose(out, tables, q, 0, per * scalar["decay"] * lost)
         out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
     for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
-        if patches[p]["basin"] == b:
+        if patches[p]["basin"] == b and patches[p]["open"] == 0:
             bring(tables, patches[p], basin, q, y, rate, out)
 
 
@@ -228,7 +227,7 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
         gained += plane[basin["area"] + i] * rate[i]
     last, most = basin["open"], 0.0
     for p in range(patches.size):
-        if patches[p]["basin"] != b:
+        if patches[p]["basin"] != b or patches[p]["open"] == 0:
             continue
         into, away = 0.0, 0.0
         for m in range(patches[p]["faces"]):

@@ -9,8 +9,10 @@ from fvsolve.kernels.records import (
     I_BASINS,
     I_INTEGERS,
     I_LAYOUT,
+    I_MARKS,
     I_NODES,
     I_PATCHES,
+    I_PIPES,
     I_PLANE,
     I_SETTINGS,
     I_VALVES,
@@ -74,6 +76,18 @@ def book_open(tables, basin, per, dydt, out):
         for i in range(n):
             gained += area[i] * rate[i]
         out[tables[I_LAYOUT][0]["supply"] + basin["open"]] += per * gained
+
+
+@njit
+def record_patches(t, y, out, handle, values):
+    """Mark where a link asked for more than there was; what passes an open boundary is booked, and no mark."""
+    tables = open_tables(handle)
+    patches, marks, nodes = tables[I_PATCHES], tables[I_MARKS], tables[I_NODES].size
+    for k in range(patches.size):
+        at = tables[I_PIPES].size + nodes + patches[k]["node"]
+        made_up = patches[k]["open"] == 0 and out[tables[I_LAYOUT][0]["supply"] + patches[k]["node"]] > 0.0
+        if made_up and marks[at] != marks[at]:
+            marks[at] = t
 
 
 @njit

@@ -223,7 +223,9 @@ class Basin:
         length = self.mesh.length[own]
         row["length"] = length.sum()
         row["normals"] = scene.to_plane(np.array([*self.mesh.normal[own].T, length / self.mesh.area[behind_faces]]))
-        given = self.part.patches[patch].scalars if patch in self.part.patches else {}
+        stated = self.part.patches.get(patch)
+        row["open"] = self.part.physics == "transport" or (stated is not None and self.reflection(stated) != 1.0)
+        given = stated.scalars if stated is not None else {}
         row["values"] = len(scene.integers)
         scene.integers += [scene.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
 

@@ -19,27 +19,45 @@ def inside(basin) -> tuple[np.ndarray, np.ndarray]:
 
 
 def carried(basin) -> tuple[np.ndarray, np.ndarray]:
-    """The same of amounts that a given velocity carries, each on itself.
+    """The same of amounts of scalars: each on itself, and all on what its own water does, where there is any."""
+    near, many = looked_at(basin), len(basin.scalars)
+    found = kron(eye_array(many, dtype=bool), near).tocoo()
+    moved = kron(coo_array(np.ones((many, len(basin.quantities)), dtype=bool)), near).tocoo()
+    rows, first = np.concatenate([found.row, moved.row]), int(basin.row["carried"])
+    columns = np.concatenate([first + found.col.astype(np.int64), int(basin.row["y"]) + moved.col.astype(np.int64)])
+    return first + rows.astype(np.int64), columns
+
+
+def looked_at(basin) -> csr_array:
+    """bool[n, n]: cells that the rate of an amount looks at.
 
     Fifth order on grids looks along its faces too, four cells from a side; what is held to bounds looks further.
     """
-    near, at = neighbours(basin), int(basin.row["carried"])
+    near = neighbours(basin)
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
         near = near @ near if basin.row["scheme"] == rec.WENO5 else near
         box = eye_array(basin.n, dtype=bool)
         for ring in rings(basin):
             box = box @ ring @ ring @ ring @ ring
         near = near + box
-    found = kron(eye_array(len(basin.scalars), dtype=bool), csr_array(near, dtype=bool)).tocoo()
-    return at + found.row.astype(np.int64), at + found.col.astype(np.int64)
+    return csr_array(near, dtype=bool)
+
+
+def amounts(basin, q: int, cells: np.ndarray) -> np.ndarray:
+    """States of the amounts of scalar q in cells."""
+    return int(basin.row["carried"]) + q * basin.n + cells
 
 
 def at_openings(basin) -> np.ndarray:
     """Cells that what passes the open boundary hangs on."""
-    mesh, near = basin.mesh, neighbours(basin)
     patches = (name for name, patch in basin.part.patches.items() if basin.reflection(patch) != 1.0)
-    behind = np.concatenate([mesh.left[mesh.patch(name)] for name in patches] or [np.zeros(0, np.int64)])
-    return np.flatnonzero(near[:, np.unique(behind)].sum(axis=1))
+    behind = [basin.mesh.left[basin.mesh.patch(name)] for name in patches]
+    return about(neighbours(basin), np.concatenate(behind or [np.zeros(0, np.int64)]))
+
+
+def about(near: csr_array, cells: np.ndarray) -> np.ndarray:
+    """Cells that look at some cells, and those."""
+    return np.flatnonzero(near[:, np.unique(cells)].sum(axis=1))
 
 
 def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
