@@ -63,21 +63,15 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         return functools.partial(njit, **options)
     if _disabled():
         return function
-    numba = _numba()
     home = Path(function.__code__.co_filename).resolve()
     cache = home in _sources() or home.parent == written_folder().resolve()
     options = {"error_model": "numpy", "cache": cache, "_nrt": False} | options
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_code_folder()) if options["cache"] else before
-    try:
-        return numba.njit(**options)(function)
-    finally:
-        numba.config.CACHE_DIR = before
+    return _dispatcher()(function, **options)
 
 
 def inner(function: Callable) -> Callable:
-    """`njit` for what compiled code alone calls, from one place: arrays cost nothing to pass, no door to Python."""
-    return njit(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """`njit` for what compiled code calls from one place: arrays cost nothing to pass."""
+    return njit(function, forceinline=True)
 
 
 class Argument:
@@ -146,6 +140,48 @@ def _numba():
 
     warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
     return numba
+
+
+@functools.cache
+def _dispatcher() -> type:
+    """Numba's class of compiled functions, but that to compiled code each is another one, without a door to Python.
+
+    Numba gives every function the two doors by which Python and C call it, also those that only other compiled
+    functions call; with twenty arrays to unpack a door is more code than the function.
+    """
+    numba = _numba()
+    from numba.core.registry import CPUDispatcher
+
+    class Dispatcher(CPUDispatcher):
+        def __init__(self, function: Callable, inside: str = "", **options: Any) -> None:
+            self.options = options
+            super().__init__(function, targetoptions={"nopython": True, "boundscheck": None} | without(options))
+            if options["cache"]:
+                before = numba.config.CACHE_DIR
+                numba.config.CACHE_DIR = str(_code_folder() / inside)
+                try:
+                    self.enable_caching()
+                finally:
+                    numba.config.CACHE_DIR = before
+
+        @functools.cached_property
+        def within(self) -> CPUDispatcher:
+            """What compiled code calls."""
+            bare = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+            return type(self)(self.py_func, "within", **self.options | bare)
+
+        @property
+        def _numba_type_(self):
+            bare = "no_cpython_wrapper" in self.options
+            return numba.types.Dispatcher(self if bare else self.within)
+
+        def _reduce_class(self) -> type:  # cache files name functions that are arguments: as numba's own
+            return CPUDispatcher
+
+    def without(options: dict) -> dict:
+        return {name: value for name, value in options.items() if name != "cache"}
+
+    return Dispatcher
 
 
 @functools.cache
