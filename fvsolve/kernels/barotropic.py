@@ -21,7 +21,7 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
@@ -45,7 +45,6 @@ from fvsolve.kernels.records import (
     VALVE_FLOW,
     WHERE,
 )
-from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.tanks import tank_level
 
 
@@ -106,7 +105,6 @@ def rhs_barotropic(t, y, dydt, out, handle):
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
     out[STATUS], out[WHERE] = OK, -1.0
-    open_scheduled(t, out, tables)
     waves_inside(y, out, tables)
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
@@ -115,7 +113,7 @@ def rhs_barotropic(t, y, dydt, out, handle):
     run(HOLD, t, y, dydt, out, handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return

@@ -13,7 +13,7 @@ from fvsolve.kernels.cavitating_nodes import balance_junctions, close_nodes_cavi
 from fvsolve.kernels.density import local_speed, pressure_of_mass, thrust
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_volume
-from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import (
     I_FLOATS,
@@ -29,7 +29,6 @@ from fvsolve.kernels.records import (
     UPWIND,
     WHERE,
 )
-from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.riemann import face_flux
 
 DRY = 1e-8  # of a pipe's content at the reference: what a cell holds below it gets no velocity of its own
@@ -154,7 +153,6 @@ def rhs_cavitating(t, y, dydt, out, handle):
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
     out[STATUS], out[WHERE] = OK, -1.0
-    open_scheduled(t, out, tables)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         end_states(st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch)
@@ -166,7 +164,7 @@ def rhs_cavitating(t, y, dydt, out, handle):
     net_flows(out, tables)
     balance_junctions(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return

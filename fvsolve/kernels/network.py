@@ -32,7 +32,7 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
-from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
+from fvsolve.kernels.restrictions import conductance, head_drop, restriction_slope
 
 
 @njit(forceinline=True)
@@ -130,13 +130,22 @@ def stored_rates(y, dydt, out, tables):
 
 
 @njit(forceinline=True)
-def greatest_rate(out, tables):
-    """Greatest rate of the scene [1/s]: waves over cells, and stored masses against what touches them."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+def quickest_node(out, tables):
+    """Greatest rate of waves over cells, and of stored masses against the pipes that touch them [1/s]."""
+    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
     rate = tables[I_SETTINGS][0]["rate"]
     for i in range(nodes.size):
         if nodes[i]["kind"] != FIXED and nodes[i]["kind"] != JUNCTION:
             rate = max(rate, stiffness_of(nodes, layout, out, i) * nodes[i]["admittance"])
+    return rate
+
+
+@njit
+def quickest_valve(t, y, dydt, out, handle):
+    """Let steps see how quickly stored masses answer through valves."""
+    tables = open_tables(handle)
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    rate = out[RATE]
     for k in range(valves.size):
         valve = valves[k]
         i, j = valve["from_node"], valve["to_node"]
@@ -164,7 +173,7 @@ def greatest_rate(out, tables):
                 width = valve["transition"] * valve["transition"] / g
                 if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
-    return rate
+    out[RATE] = rate
 
 
 @njit
@@ -173,13 +182,12 @@ def rhs_linear(t, y, dydt, out, handle):
     tables = open_tables(handle)
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     out[STATUS], out[WHERE] = OK, -1.0
-    open_scheduled(t, out, tables)
     waves_out(y, out, tables)
     close_nodes(t, y, dydt, out, handle)
     waves_in(out, tables)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return
