@@ -45,6 +45,7 @@ from fvsolve.kernels.records import (
     VALVE_FLOW,
     WHERE,
 )
+from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.tanks import tank_level
 
 
@@ -105,6 +106,7 @@ def rhs_barotropic(t, y, dydt, out, handle):
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     waves_inside(y, out, tables)
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)

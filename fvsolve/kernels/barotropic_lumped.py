@@ -9,6 +9,7 @@ from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
+from fvsolve.kernels.restrictions import open_scheduled
 
 
 @njit
@@ -16,6 +17,7 @@ def rhs_lumped_barotropic(t, y, dydt, out, handle):
     """`rhs_barotropic` of a scene without pipes."""
     tables = open_tables(handle)
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     clear_net(out, tables)
     stored_pressures_barotropic(t, y, out, tables)
     run(INFLOWS, t, y, dydt, out, handle)

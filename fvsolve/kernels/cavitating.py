@@ -29,6 +29,7 @@ from fvsolve.kernels.records import (
     UPWIND,
     WHERE,
 )
+from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.riemann import face_flux
 
 DRY = 1e-8  # of a pipe's content at the reference: what a cell holds below it gets no velocity of its own
@@ -153,6 +154,7 @@ def rhs_cavitating(t, y, dydt, out, handle):
     st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         end_states(st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch)

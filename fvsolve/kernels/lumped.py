@@ -6,6 +6,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.records import I_SETTINGS, OK, RATE, STATUS, WHERE
+from fvsolve.kernels.restrictions import open_scheduled
 
 
 @njit
@@ -13,6 +14,7 @@ def rhs_lumped_linear(t, y, dydt, out, handle):
     """`rhs_linear` of a scene without pipes."""
     tables = open_tables(handle)
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     clear_net(out, tables)
     close_nodes(t, y, dydt, out, handle)
     net_flows(out, tables)

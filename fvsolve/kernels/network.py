@@ -32,7 +32,7 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
-from fvsolve.kernels.restrictions import conductance, head_drop, restriction_slope
+from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 
 
 @njit(forceinline=True)
@@ -182,6 +182,7 @@ def rhs_linear(t, y, dydt, out, handle):
     tables = open_tables(handle)
     settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
     out[STATUS], out[WHERE] = OK, -1.0
+    open_scheduled(t, out, tables)
     waves_out(y, out, tables)
     close_nodes(t, y, dydt, out, handle)
     waves_in(out, tables)

@@ -74,10 +74,9 @@ def side_of(out, layout, nodes, i):
     return out[layout["net"] + i] / nodes[i]["admittance"], 1.0 / nodes[i]["admittance"]
 
 
-@njit
-def close_single(t, y, dydt, out, handle):
+@njit(forceinline=True)
+def close_single(out, tables):
     """Valves with at most one node without storage at each end, that no other valve touches: closed roots."""
-    tables = open_tables(handle)
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     for k in range(valves.size):
         valve = valves[k]
@@ -108,5 +107,6 @@ def close_nodes(t, y, dydt, out, handle):
     junction_flows(t, out, tables)
     run(INFLOWS, t, y, dydt, out, handle)
     close_alone(out, tables)
+    close_single(out, tables)
     run(CLUSTERS, t, y, dydt, out, handle)
     run(HOLD, t, y, dydt, out, handle)

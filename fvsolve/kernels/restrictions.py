@@ -6,7 +6,6 @@ from fvsolve.jit import njit
 from fvsolve.kernels.curves import curve_step
 from fvsolve.kernels.density import density, enthalpy
 from fvsolve.kernels.emitters import emitter_slope, emitter_step
-from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
     CURVE,
     I_ARMED,
@@ -24,10 +23,9 @@ from fvsolve.kernels.records import (
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, valve_conductance, valve_step
 
 
-@njit
-def open_scheduled(t, y, dydt, out, handle):
+@njit(forceinline=True)
+def open_scheduled(t, out, tables):
     """Conductances of the restrictions that no device opens and shuts, into out[conductance]."""
-    tables = open_tables(handle)
     valves, at = tables[I_VALVES], tables[I_LAYOUT][0]["conductance"]
     for k in range(valves.size):
         if valves[k]["device"] < 0:

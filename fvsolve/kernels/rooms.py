@@ -25,7 +25,8 @@ class Room:
     """Functions as `module: function`, "" for none.
 
     before : sets what the nodes are closed with; core : closes them; after : adds to rates; of the core's own parts,
-    clusters : of nodes that valves join; inflows, hold, move : of rigid columns; brake : rates that steps must see
+    clusters : of nodes that several valves join; inflows, hold, move : of rigid columns; brake : rates that steps
+    have to see
     observe : reads probes; record : notes an accepted state; events : event functions
     """
 
@@ -61,13 +62,11 @@ FLUIDS = {  # (family of the density law, whether there are pipes)
     ),
 }  # fmt: skip
 ALONE = {"linear": Room(core="lumped: rhs_alone", **LINEAR), "barotropic": Room(core="lumped: rhs_alone", **BAROTROPIC)}
-VALVES = {"before": "restrictions: open_scheduled", "brake": "network: quickest_valve"}
 MEMORY = {"power": "unsteady.energy: add_power", "stored": "unsteady.energy: add_stored"}
 COLUMNS = {"inflows": "columns: column_inflows", "brake": "columns: quickest_column"}
 ROOMS = {
     "pipes": Room(record="observer: record_pipes"),
-    "valves": Room(clusters="nodes: close_single", **VALVES),
-    "valves, barotropic": Room(**VALVES),
+    "valves": Room(brake="network: quickest_valve"),
     "clusters": Room(clusters="clusters: close_clusters"),
     "columns": Room(hold="columns: hold_columns", move="columns: column_rates", **COLUMNS),
     "columns, barotropic": Room(
@@ -139,7 +138,7 @@ class Scene:
         family = "linear" if linear else "cavitating" if self.cavities and self.pipes else "barotropic"
         yield ALONE[family] if self.alone else FLUIDS[family, self.pipes]
         if self.valves:
-            yield ROOMS["valves" if linear else "valves, barotropic"]
+            yield ROOMS["valves"]
         if self.clusters and linear:
             yield ROOMS["clusters"]
         if self.columns:
