@@ -149,7 +149,7 @@ def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
 
 
 def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
-    network, fifth = {"restrictions", "curves", "nodes", "patches", "mixing", "limiters"}, {"fifth_order", "bounds"}
+    network, fifth = {"restrictions", "curves", "nodes", "patches", "limiters"}, {"fifth_order", "bounds"}
     muscl, weno5 = (files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s)))) for s in ("muscl", "weno5"))
     assert muscl & (network | fifth) == {"limiters"}
     assert weno5 & (network | fifth) == fifth | {"limiters"}
