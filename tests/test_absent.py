@@ -116,6 +116,45 @@ def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
     assert one.functions.rhs is not other.functions.rhs
 
 
+POOLS = {
+    "transport": {"velocity": {"expression": "swirl", "size": 2.0}, "scalars": {"dye": "1 + x"}},
+    "free-surface": {"level": 1.0, "start": {"level": "1 + 0.1*x"}},
+    "liquid": {"pressure": 1e6, "thickness": 1.0, "start": {"pressure": "1e6 + 1e5*x"}},
+}
+PATCHES = {"sea": {"side": "east", "boundary": "open"}, "gate": {"side": "west"}}
+
+
+def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
+    """A basin with a scalar, where it may have one; alone, or beside links through which it gets nothing."""
+    shape = {"type": "basin", "physics": physics, "size": [2.0, 2.0], "cells": [8, 8]} | POOLS[physics]
+    shape |= {} if physics == "transport" else {"patches": PATCHES}
+    nodes, joined = {"pool": shape}, {}
+    if links:
+        nodes |= {"a": reservoir(2e5), "b": reservoir(1e5)}
+        joined = {"hole": valve("a", "b", 0.01)}
+        if physics != "transport":
+            joined |= {"shut": valve("pool.gate", "a", 0.01, opening=0.0)}
+    case = scene(nodes, joined, 1e-3, numerics, fluid={**WATER, "law": law})
+    return case if physics == "liquid" else case | {"scalars": {"dye": {}}}
+
+
+@pytest.mark.parametrize(("physics", "law"), [("transport", "linear"), ("free-surface", "linear"), ("liquid", "log")])
+def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
+    alone, both = (fvsolve.build(fvsolve.load(pool(physics, links, law))) for links in (False, True))
+    assert alone.functions.scene.alone and not both.functions.scene.alone
+    y = fvsolve.initial_state(alone).y
+    y += 1e-3 * np.cos(np.arange(y.size)) * np.abs(y).max()
+    assert alone.state_names == both.state_names and np.abs(alone.rhs(0.0, y)).max() > 0.0
+    assert np.array_equal(alone.rhs(0.0, y), both.rhs(0.0, y))
+
+
+def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
+    network, fifth = {"restrictions", "curves", "nodes", "patches", "limiters"}, {"fifth_order", "bounds"}
+    muscl, weno5 = (files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s)))) for s in ("muscl", "weno5"))
+    assert muscl & (network | fifth) == {"limiters"}
+    assert weno5 & (network | fifth) == fifth | {"limiters"}
+
+
 def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
     loop = Loop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)

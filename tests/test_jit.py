@@ -73,6 +73,16 @@ def test_second_process_hits_the_cache_and_an_edit_elsewhere_is_noticed(package)
     assert not list(package.rglob("*.nb?")), "compiled code belongs in the cache folder"
 
 
+def test_python_and_compiled_code_may_call_the_same_function(package):
+    """What compiled code alone has called has no door to Python, and gets one when Python calls it."""
+    code = """
+from fvsolve.steppers.loop import law, loop
+print(loop(4), len(law.overloads), len(law.within.overloads), law(1.0), len(law.overloads))
+"""
+    assert python(package, code) == ["12.0", "0", "1", "2.0", "1"]
+    assert python(package, code) == ["12.0", "0", "0", "2.0", "1"]
+
+
 def test_old_generations_are_deleted_and_the_newest_few_kept(package):
     for generation in range(6):
         (package / "units.py").write_text(f"GENERATION = {generation}\n")

@@ -21,7 +21,7 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
@@ -115,7 +115,7 @@ def rhs_barotropic(t, y, dydt, out, handle):
     run(HOLD, t, y, dydt, out, handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return

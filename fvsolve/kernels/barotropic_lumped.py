@@ -7,7 +7,7 @@ from fvsolve.kernels.barotropic_nodes import (
 )
 from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
 from fvsolve.kernels.restrictions import open_scheduled
 
@@ -25,7 +25,7 @@ def rhs_lumped_barotropic(t, y, dydt, out, handle):
     run(HOLD, t, y, dydt, out, handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size > 0:
         run(MOVE, t, y, dydt, out, handle)

@@ -13,7 +13,7 @@ from fvsolve.kernels.cavitating_nodes import balance_junctions, close_nodes_cavi
 from fvsolve.kernels.density import local_speed, pressure_of_mass, thrust
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_volume
-from fvsolve.kernels.network import clear_net, greatest_rate, net_flows, stored_rates
+from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import (
     I_FLOATS,
@@ -166,7 +166,7 @@ def rhs_cavitating(t, y, dydt, out, handle):
     net_flows(out, tables)
     balance_junctions(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return

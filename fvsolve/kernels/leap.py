@@ -70,6 +70,6 @@ def leap_linear(t, h, y, y_new, out, handle, values):
             bad += leap_block(t, h, pipe, which, i, r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j], tables)
     run(RHS, t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)
-    record_nodes(t, out, tables, values)
+    record_nodes(t, y_new, out, handle, values)
     if bad > 0:
         out[STATUS] = NOT_FINITE

@@ -130,13 +130,22 @@ def stored_rates(y, dydt, out, tables):
 
 
 @njit(forceinline=True)
-def greatest_rate(out, tables):
-    """Greatest rate of the scene [1/s]: waves over cells, and stored masses against what touches them."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+def quickest_node(out, tables):
+    """Greatest rate of waves over cells, and of stored masses against the pipes that touch them [1/s]."""
+    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
     rate = tables[I_SETTINGS][0]["rate"]
     for i in range(nodes.size):
         if nodes[i]["kind"] != FIXED and nodes[i]["kind"] != JUNCTION:
             rate = max(rate, stiffness_of(nodes, layout, out, i) * nodes[i]["admittance"])
+    return rate
+
+
+@njit
+def quickest_valve(t, y, dydt, out, handle):
+    """Let steps see how quickly stored masses answer through valves."""
+    tables = open_tables(handle)
+    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    rate = out[RATE]
     for k in range(valves.size):
         valve = valves[k]
         i, j = valve["from_node"], valve["to_node"]
@@ -164,7 +173,7 @@ def greatest_rate(out, tables):
                 width = valve["transition"] * valve["transition"] / g
                 if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
-    return rate
+    out[RATE] = rate
 
 
 @njit
@@ -179,7 +188,7 @@ def rhs_linear(t, y, dydt, out, handle):
     waves_in(out, tables)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
-    out[RATE] = greatest_rate(out, tables)
+    out[RATE] = quickest_node(out, tables)
     run(BRAKE, t, y, dydt, out, handle)
     if dydt.size == 0:
         return

@@ -162,22 +162,22 @@ def record_pipe(t, r, l, pipe, which, tables):
 
 
 @njit
-def record_all(t, y, out, handle, values):
-    """Extremes of probes, envelopes of pipes and first times of marks, after every accepted step.
-
-    marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
-    """
+def record_pipes(t, y, out, handle, values):
+    """Envelopes of pipes, and when they first fall below vapour pressure, after every accepted step."""
     tables = open_tables(handle)
     pipes = tables[I_PIPES]
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
         record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
-    record_nodes(t, out, tables, values)
 
 
 @njit
-def record_nodes(t, out, tables, values):
-    """`record_all` but for the cells."""
+def record_nodes(t, y, out, handle, values):
+    """Extremes of probes and first times of marks, after every accepted step and its pipes.
+
+    marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
+    """
+    tables = open_tables(handle)
     pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
     marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
     for k in range(values.size):

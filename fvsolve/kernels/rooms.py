@@ -25,7 +25,8 @@ class Room:
     """Functions as `module: function`, "" for none.
 
     before : sets what the nodes are closed with; core : closes them; after : adds to rates; of the core's own parts,
-    clusters : of nodes that several valves join; inflows, hold, move, brake : of rigid columns
+    clusters : of nodes that several valves join; inflows, hold, move : of rigid columns; brake : rates that steps
+    have to see
     observe : reads probes; record : notes an accepted state; events : event functions
     """
 
@@ -60,9 +61,12 @@ FLUIDS = {  # (family of the density law, whether there are pipes)
         core="cavitating: rhs_cavitating", record="cavitating: record_cavities", **BAROTROPIC
     ),
 }  # fmt: skip
+ALONE = {"linear": Room(core="lumped: rhs_alone", **LINEAR), "barotropic": Room(core="lumped: rhs_alone", **BAROTROPIC)}
 MEMORY = {"power": "unsteady.energy: add_power", "stored": "unsteady.energy: add_stored"}
 COLUMNS = {"inflows": "columns: column_inflows", "brake": "columns: quickest_column"}
 ROOMS = {
+    "pipes": Room(record="observer: record_pipes"),
+    "valves": Room(brake="network: quickest_valve"),
     "clusters": Room(clusters="clusters: close_clusters"),
     "columns": Room(hold="columns: hold_columns", move="columns: column_rates", **COLUMNS),
     "columns, barotropic": Room(
@@ -73,20 +77,28 @@ ROOMS = {
         before="mechanics: chambers", after="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
+    "basins": Room(
+        observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
+    ),
     "patches": Room(
         before="plane.patches: patch_pressures", after="plane.patches: patch_flows",
         record="plane.patches: record_patches",
-        observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
+    "inflows": Room(brake="plane.patches: quickest_inflow"),
     "patches, barotropic": Room(observe="plane.observe: observe_dense_flows"),
     "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
-    "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
+    "scalars": Room(after="scalars: clear_losses", observe="scalars: observe_scalars"),
+    "leaving": Room(after="scalars: leave_pipes"),
+    "mixed": Room(after="scalars: mix_scalars"),
+    "carried": Room(after="scalars: carry_in_pipes"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Room(after="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
 GRIDS, MESHES = (SHALLOW_GRID, CARRIED_GRID), (SHALLOW_FACES, CARRIED_FACES)
-CARRIED = {  # scalars in basins: on grids by second and fifth order, on other meshes
-    "grids": Room(after="plane.carried: carry_on_grids"), "fifth": Room(after="plane.carried: carry_by_fifth"),
+CARRIED = {  # scalars in basins: on grids, what fifth order adds there, and what spreads; on other meshes
+    "grids": Room(after="plane.carried_grids: carry_on_grids"),
+    "fifth": Room(after="plane.carried_grids: add_on_grids"),
+    "spread": Room(after="plane.carried_grids: spread_on_grids"),
     "meshes": Room(after="plane.carried_faces: carry_on_meshes"), "all": Room(after="plane.carried: settle_amounts"),
 }  # fmt: skip
 BASINS = {  # kind of basin
@@ -96,7 +108,7 @@ BASINS = {  # kind of basin
     LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
     LIQUID_FACES: Room(after="plane.rooms: liquid_meshes"),
 }
-ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
+ALWAYS = Room(record="observer: record_nodes", events="observer: tank_events")
 
 
 @dataclass(frozen=True)
@@ -104,7 +116,8 @@ class Scene:
     """What decides which functions a scene is made of.
 
     law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are
-    fifth : order of what carries scalars on grids
+    fifth : order of what carries scalars on grids; spread : whether any scalar does
+    alone : whether there is nothing but basins, and no link
     """
 
     law: str
@@ -118,12 +131,17 @@ class Scene:
     basins: tuple[int, ...] = ()
     scalars: bool = False
     fifth: bool = False
+    spread: bool = False
+    valves: bool = False
+    alone: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
         linear = self.law == "linear"
         family = "linear" if linear else "cavitating" if self.cavities and self.pipes else "barotropic"
-        yield FLUIDS[family, self.pipes]
+        yield ALONE[family] if self.alone else FLUIDS[family, self.pipes]
+        if self.valves:
+            yield ROOMS["valves"]
         if self.clusters and linear:
             yield ROOMS["clusters"]
         if self.columns:
@@ -137,19 +155,30 @@ class Scene:
             yield ROOMS["memory" if linear else "memory, barotropic"]
         for kind in self.basins:
             yield BASINS.get(kind, Room())
+        flowing = any(kind not in (CARRIED_GRID, CARRIED_FACES) for kind in self.basins)
         if self.basins:
-            yield ROOMS["patches"]
+            yield ROOMS["basins"]
             yield Room() if linear else ROOMS["patches, barotropic"]
+        if flowing:
+            yield ROOMS["patches"]
+            yield ROOMS["inflows"] if self.valves else Room()
         if self.scalars:  # carried by the flow that rates of waves now have
             yield ROOMS["values"] if self.basins else Room()
             yield ROOMS["scalars"]
+            yield ROOMS["leaving"] if self.pipes else Room()
+            yield ROOMS["mixed"] if flowing or not self.alone else Room()
+            yield ROOMS["carried"] if self.pipes else Room()
             yield from self.carried()
+        if self.pipes:
+            yield ROOMS["pipes"]
         yield ALWAYS
 
     def carried(self) -> Iterator[Room]:
         """Rooms of scalars in basins."""
         if any(kind in GRIDS for kind in self.basins):
-            yield CARRIED["fifth" if self.fifth else "grids"]
+            yield CARRIED["grids"]
+            yield CARRIED["fifth"] if self.fifth else Room()
+            yield CARRIED["spread"] if self.spread else Room()
         if any(kind in MESHES for kind in self.basins):
             yield CARRIED["meshes"]
         if self.basins:

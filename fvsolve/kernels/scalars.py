@@ -155,19 +155,37 @@ def carry_in_pipe(y, dydt, out, tables, p):
 
 
 @njit
-def carry_scalars(t, y, dydt, out, handle):
-    """Values at all nodes, what links bring there, and rates of all amounts, where rates are asked for."""
+def clear_losses(t, y, dydt, out, handle):
+    """No scalar has lost anything yet."""
     tables = open_tables(handle)
-    loss = tables[I_LAYOUT][0]["loss"]
     for q in range(tables[I_SCALARS].size):
         if tables[I_SCALARS][q]["losses"] > 0:
-            out[loss + tables[I_SCALARS][q]["loss"]] = 0.0
+            out[tables[I_LAYOUT][0]["loss"] + tables[I_SCALARS][q]["loss"]] = 0.0
+
+
+@njit
+def leave_pipes(t, y, dydt, out, handle):
+    """Values with which water leaves all pipes."""
+    tables = open_tables(handle)
+    for q in range(tables[I_SCALARS].size):
         leaving_values(y, out, tables, q)
+
+
+@njit
+def mix_scalars(t, y, dydt, out, handle):
+    """Values at all nodes and what links bring there; rates of what nodes store, where rates are asked for."""
+    tables = open_tables(handle)
+    for q in range(tables[I_SCALARS].size):
         mix(t, y, out, tables, q)
         exchange(t, y, dydt, out, tables, q)
-    if dydt.size > 0:
-        for p in range(tables[I_PIPES].size):
-            carry_in_pipe(y, dydt, out, tables, p)
+
+
+@njit
+def carry_in_pipes(t, y, dydt, out, handle):
+    """Rates of all amounts in pipes, where rates are asked for."""
+    tables = open_tables(handle)
+    for p in range(tables[I_PIPES].size if dydt.size > 0 else 0):
+        carry_in_pipe(y, dydt, out, tables, p)
 
 
 @njit

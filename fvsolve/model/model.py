@@ -127,8 +127,11 @@ class Model:
         law, many = self.case.fluid.law, [len(table) > 0 for table in self.tables]
         there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
         basins = tuple(int(kind) for kind in np.unique(self.tables[rec.I_BASINS]["kind"]))
-        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins,
-                      many[rec.I_SCALARS], self.case.numerics.scheme in FIFTH)  # fmt: skip
+        spread, valves = bool(self.tables[rec.I_SCALARS]["diffusivity"].any()), many[rec.I_VALVES]
+        patches = (self.tables[rec.I_NODES]["kind"] == rec.PATCH).all()
+        alone = bool(basins and patches) and not (self.cells or valves or kinds or any(there))
+        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many[rec.I_SCALARS],
+                      self.case.numerics.scheme in FIFTH, spread, valves, alone)  # fmt: skip
         return functions(scene)
 
     @property

@@ -32,7 +32,6 @@ class Carried:
         self.flow_x, self.flow_y, self.depth, self.bounds = flow_x, flow_y, depth, bounds
         self.outside = np.broadcast_to(outside, 2 * (self.nx + self.ny)).astype(float).copy()
         self.scheme, self.limiter = SCHEMES[scheme]
-        self.function = advection.grid_advection_fifth if scheme.endswith("5") else advection.grid_advection
         self.work = np.full(advection.advection_work(self.scheme, self.nx, self.ny), np.nan)
         self.other = np.full(diffusion.diffusion_work(self.nx, self.ny), np.nan)
         size = self.nx, self.ny, self.kx, self.ky
@@ -41,8 +40,9 @@ class Carried:
     def rates(self, s, factor=1.0):
         size, rate = (self.nx, self.ny, self.kx, self.ky), np.empty_like(s)
         flows = factor, self.flow_x, self.flow_y, self.depth, self.outside
-        more = *self.bounds, self.fastest
-        self.function(self.scheme, self.limiter, *size, *flows, *more, s, self.work, rate)
+        advection.grid_advection(self.scheme, self.limiter, *size, *flows, s, self.work, rate)
+        if self.scheme in (rec.LINEAR, rec.WENO5):
+            advection.add_fifth_order(self.scheme, *size, *flows, *self.bounds, self.fastest, s, self.work, rate)
         if self.diffusivity:
             diffusion.grid_diffusion(*size, self.diffusivity, *flows, s, self.other, rate)
         return rate

@@ -48,7 +48,6 @@ def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
     return most
 
 
-@njit
 def advection_work(scheme, nx, ny):
     """Floats that rates of a scheme are worked out in."""
     if scheme == UPWIND or scheme == MUSCL:
@@ -58,37 +57,36 @@ def advection_work(scheme, nx, ny):
 
 
 @njit
-def grid_advection(
-    scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most, fastest, s, work, rate
-):
-    """Rates of the amounts `s` that factor times the flows carry, by upwind or muscl.
+def grid_advection(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, s, work, rate):
+    """Rates of the amounts `s` that factor times the flows carry, by muscl or, any other scheme, by upwind.
 
-    scheme : UPWIND or MUSCL; the other function's LINEAR, which is upwind5, or WENO5
     kx : float64[nx], ky : float64[ny]  1 / widths and heights [1/m]; factor : on all flows, of either sign
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  through the faces, row by row, per depth [m2/s] or,
     with depths, whole [m3/s]
     depth : float64[nx ny], empty where s is the value; outside : float64[ring]  values that come in with the flow
-    least, most : bounds that weno5 keeps, infinite for none; fastest : what `grid_fastest` says of the flows [1/s]
     work : float64[advection_work(scheme, nx, ny)]; s, rate : float64[nx ny]
     """
-    c, rest = s, work[nx * ny :]
+    c, rest, first = s, work[nx * ny :], scheme if scheme == MUSCL else UPWIND
     if depth.size > 0:
         put_values(s, depth, work[: nx * ny])
         c = work[: nx * ny]
-    second_order_rates(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate)
+    second_order_rates(first, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate)
 
 
 @njit
-def grid_advection_fifth(
-    scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most, fastest, s, work, rate
+def add_fifth_order(
+    scheme, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most, fastest, s, work, rate
 ):
-    """The same by upwind5 or weno5; a function of its own, that only those who use it compile."""
+    """Add to rates by upwind what those by upwind5 or weno5 have beyond them.
+
+    scheme : LINEAR, which is upwind5, or WENO5; least, most : bounds that weno5 keeps, infinite for none
+    fastest : what `grid_fastest` says of the flows [1/s]; the others as of `grid_advection`
+    """
     c, rest, mx, my = s, work[nx * ny :], (nx + 1) * ny, nx * (ny + 1)
     if depth.size > 0:
         put_values(s, depth, work[: nx * ny])
         c = work[: nx * ny]
     ax, ay, rest = rest[:mx], rest[mx : mx + my], rest[mx + my :]
-    second_order_rates(UPWIND, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate)
     grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, rest, ax, ay)
     pace = abs(factor) * fastest
     if scheme == WENO5 and pace > 0.0 and (least > -INFINITE or most < INFINITE):

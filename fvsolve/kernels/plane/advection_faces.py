@@ -121,7 +121,6 @@ def put_rates(c, w, rate):
         rate[i] = w[_RATE + i] - c[i] * w[_DIVERGENCE + i]
 
 
-@njit
 def work_size(integers):
     """Floats that `advection_rates` works in."""
     return 8 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK

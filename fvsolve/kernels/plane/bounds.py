@@ -42,7 +42,6 @@ def cut(factor, up, down, up_then, down_then, excess):
         excess[i] *= forth if factor * excess[i] > 0.0 else back
 
 
-@njit
 def bound_work(nx, ny):
     """Floats that `bound` works in."""
     return 2 * (nx + 2) * (ny + 2)

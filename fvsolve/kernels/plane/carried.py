@@ -8,10 +8,9 @@ from math import cos, pi
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
-from fvsolve.kernels.plane.advection import INFINITE, THIN, grid_advection, grid_advection_fifth, grid_fastest
-from fvsolve.kernels.plane.diffusion import grid_diffusion, scalar_sources
+from fvsolve.kernels.plane.advection import THIN
+from fvsolve.kernels.plane.diffusion import scalar_sources
 from fvsolve.kernels.records import (
-    CARRIED_GRID,
     CELL_SCALAR,
     I_BASINS,
     I_FLOATS,
@@ -25,7 +24,6 @@ from fvsolve.kernels.records import (
     I_SETTINGS,
     RATE,
     SHALLOW_FACES,
-    SHALLOW_GRID,
 )
 from fvsolve.kernels.schedules import schedule_value
 
@@ -101,7 +99,7 @@ def flow_in(plane, basin, k):
 
 @njit
 def made_ready(t, tables, b, y):
-    """Depths and values beyond the boundary of a basin, for its scalars; returns the factor on its flows."""
+    """Depths and values beyond the boundary of a basin, for its scalars."""
     plane, basin, patches = tables[I_PLANE], tables[I_BASINS][b], tables[I_PATCHES]
     n, o, at = basin["n"], basin["y"], basin["plan"]
     if basin["kind"] <= SHALLOW_FACES:
@@ -111,6 +109,11 @@ def made_ready(t, tables, b, y):
     for p in range(patches.size):
         for q in range(tables[I_SCALARS].size if patches[p]["basin"] == b else 0):
             put_outside(t, tables, patches[p], basin, q)
+
+
+@njit
+def turned(t, basin):
+    """The factor on the flows of a basin, which may turn back and forth."""
     return cos(pi * t / basin["period"]) if basin["period"] > 0.0 else 1.0
 
 
@@ -121,83 +124,20 @@ def deep(basin):
 
 
 @njit
-def carry_on_grids(t, y, dydt, out, handle):
-    """Rates of all amounts on grids by upwind and muscl."""
-    tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
-        if basin["kind"] != SHALLOW_GRID and basin["kind"] != CARRIED_GRID:
-            continue
-        factor, n = made_ready(t, tables, b, y), basin["n"]
-        depth = plane[basin["toil"] : basin["toil"] + deep(basin)]
-        nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
-        kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
-        flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
-        out[RATE] = max(out[RATE], basin["fastest"])  # at full speed: while it turns back it gets quicker in a step
-        for q in range(tables[I_SCALARS].size):
-            at, ring = basin["carried"] + q * n, o + q * basin["outer"]
-            grid_advection(
-                basin["scheme"], basin["limiter"], nx, ny, kx, ky, factor, flow_x, flow_y, depth,
-                plane[ring : ring + basin["outer"]], -INFINITE, INFINITE, 1.0, y[at : at + n], work, dydt[at : at + n],
-            )  # fmt: skip
-
-
-@njit
-def carry_by_fifth(t, y, dydt, out, handle):
-    """Rates of all amounts on grids by upwind5 and weno5, which keeps the bounds of what there can be."""
-    tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
-        if basin["kind"] != SHALLOW_GRID and basin["kind"] != CARRIED_GRID:
-            continue
-        factor, n = made_ready(t, tables, b, y), basin["n"]
-        depth = plane[basin["toil"] : basin["toil"] + deep(basin)]
-        nx, ny, k, f, o = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["outside"]
-        kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
-        flow_x, flow_y = plane[f : f + ny * (nx + 1)], plane[f + ny * (nx + 1) :][: (ny + 1) * nx]
-        out[RATE] = max(out[RATE], basin["fastest"])  # at full speed: while it turns back it gets quicker in a step
-        fastest = basin["fastest"]
-        if depth.size > 0:
-            fastest = grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work)
-        for q in range(tables[I_SCALARS].size):
-            at, ring, scalar = basin["carried"] + q * n, o + q * basin["outer"], tables[I_SCALARS][q]
-            grid_advection_fifth(
-                basin["scheme"], basin["limiter"], nx, ny, kx, ky, factor, flow_x, flow_y, depth,
-                plane[ring : ring + basin["outer"]], scalar["least"], scalar["greatest"], fastest, y[at : at + n],
-                work, dydt[at : at + n],
-            )  # fmt: skip
-
-
-@njit
 def settle_amounts(t, y, dydt, out, handle):
-    """Add what spreads, decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
+    """Add what decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
     tables = open_tables(handle)
-    plane, scalars = tables[I_PLANE], tables[I_SCALARS]
+    plane = tables[I_PLANE]
     for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
         basin = tables[I_BASINS][b]
-        n, grid = basin["n"], basin["kind"] == SHALLOW_GRID or basin["kind"] == CARRIED_GRID
-        per, factor, depth = tables[I_SETTINGS][0]["rho"], 1.0, plane[basin["toil"] : basin["toil"] + deep(basin)]
+        n, depth = basin["n"], plane[basin["toil"] : basin["toil"] + deep(basin)]
+        per = tables[I_SETTINGS][0]["rho"]
         if basin["kind"] > SHALLOW_FACES:
             per = basin["density"] * basin["thickness"]
-        if basin["period"] > 0.0:
-            factor = cos(pi * t / basin["period"])
-        for q in range(scalars.size if basin["carried"] >= 0 else 0):
+        for q in range(tables[I_SCALARS].size if basin["carried"] >= 0 else 0):
             at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
-            s, rate, outside = y[at : at + n], dydt[at : at + n], plane[ring : ring + basin["outer"]]
-            if grid and scalars[q]["diffusivity"] > 0.0:
-                nx, ny, k, f = basin["nx"], basin["ny"], basin["spacing"], basin["flows"]
-                kx, ky, work = plane[k : k + nx], plane[k + nx : k + nx + ny], plane[basin["toil"] + n :]
-                flow_x, flow_y = (
-                    plane[f : f + ny * (nx + 1)],
-                    plane[f + ny * (nx + 1) : f + ny * (nx + 1) + (ny + 1) * nx],
-                )
-                spreads = grid_diffusion(
-                    nx, ny, kx, ky, scalars[q]["diffusivity"], factor, flow_x, flow_y, depth, outside, s, work, rate,
-                )  # fmt: skip
-                out[RATE] = max(out[RATE], basin["fastest"] + spreads)
-            settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out)
+            outside, s, rate = plane[ring : ring + basin["outer"]], y[at : at + n], dydt[at : at + n]
+            settle(tables, b, basin, q, turned(t, basin), per, depth, outside, y, s, rate, out)
 
 
 @njit

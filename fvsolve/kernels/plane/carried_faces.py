@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.advection_faces import advection_rates
-from fvsolve.kernels.plane.carried import deep, made_ready
+from fvsolve.kernels.plane.carried import deep, made_ready, turned
 from fvsolve.kernels.records import (
     CARRIED_FACES,
     I_BASINS,
@@ -25,7 +25,8 @@ def carry_on_meshes(t, y, dydt, out, handle):
         if basin["kind"] != SHALLOW_FACES and basin["kind"] != CARRIED_FACES:
             continue
         n, flow = basin["n"], plane[basin["flows"] : basin["flows"] + basin["faces"]]
-        factor, depth = made_ready(t, tables, b, y), plane[basin["toil"] : basin["toil"] + deep(basin)]
+        made_ready(t, tables, b, y)
+        factor, depth = turned(t, basin), plane[basin["toil"] : basin["toil"] + deep(basin)]
         for q in range(scalars.size):
             o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
             quickest = advection_rates(

@@ -37,7 +37,6 @@ def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
         top[i] = quick if quick > top[i] else top[i]
 
 
-@njit
 def diffusion_work(nx, ny):
     """Floats that `grid_diffusion` works in."""
     return nx * ny + 8 * nx + 3
@@ -102,7 +101,7 @@ def enters(come, excess, slender, diffusivity, outside, depth, s):
 def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, ax, ay, s, ring):
     """What comes in through every face of the boundary, float64[ring], carried and by diffusion [m2/s times a value].
 
-    ax, ay : the excesses that `grid_advection_fifth` leaves, work[n:] in the order of flow_x and then of flow_y;
+    ax, ay : the excesses that `add_fifth_order` leaves, work[n:] in the order of flow_x and then of flow_y;
     empty for the others, and gone where the diffusion was given the same work. The sum is that of rates times areas.
     """
     m, last = nx + 1, ny * nx

@@ -123,7 +123,6 @@ def pad_line(v, n, to):
     to[n + 2], to[n + 3] = ghosts(n, False, 0.0, to, n + 1, -1)
 
 
-@njit
 def grid_excesses_work(nx, ny):
     """Floats that `grid_excesses` works in."""
     return (nx + 6) * (ny + 6) + 2 * (nx + 1) * (ny + 4) + nx * (ny + 1) + 2 * (nx + 4)

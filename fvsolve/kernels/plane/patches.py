@@ -95,7 +95,6 @@ def patch_flows(t, y, dydt, out, handle):
     """Add what the patches bring or take to the rates of the cells behind them."""
     tables = open_tables(handle)
     layout = tables[I_LAYOUT][0]
-    quickest_inflow(tables, out)
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         asked = out[layout["net"] + patch["node"]]
@@ -126,8 +125,9 @@ def give_way(plane, patch, m, push, dydt, x, y):
 
 
 @njit
-def quickest_inflow(tables, out):
+def quickest_inflow(t, y, dydt, out, handle):
     """Let steps see what is about to come: waves as quick as the head before a gate makes them, over a dry bed too."""
+    tables = open_tables(handle)
     st, valves, patches = tables[I_SETTINGS][0], tables[I_VALVES], tables[I_PATCHES]
     for k in range(valves.size):
         drop = head_drop(tables, out, k)[1]

@@ -101,7 +101,6 @@ def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, 
             rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
 
 
-@njit
 def second_order_work(nx, ny):
     """Floats that `second_order_rates` works in."""
     return 7 * nx + 4

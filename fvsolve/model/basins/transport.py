@@ -6,7 +6,6 @@ import numpy as np
 
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane.advection import grid_fastest
 from fvsolve.model.basins.basin import Basin
 from fvsolve.model.velocity import face_flows, grid_flows
 
@@ -24,9 +23,9 @@ class Transport(Basin, physics="transport"):
             flow_x, flow_y = grid_flows(mesh, flows)
             row["flows"] = scene.to_plane(np.concatenate([flow_x, flow_y]))
             kx, ky = 1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)
-            row["fastest"] = grid_fastest(
-                grid.nx, grid.ny, kx, ky, flow_x, flow_y, np.zeros(0), np.zeros(max(grid.nx, self.n))
-            )
+            along, across = abs(flow_x).reshape(grid.ny, -1), abs(flow_y).reshape(-1, grid.nx)
+            through = np.maximum(along[:, 1:], along[:, :-1]) + np.maximum(across[1:], across[:-1])
+            row["fastest"] = (kx * ky[:, None] * through).max()
         else:
             row["flows"], inner = scene.to_plane(flows), mesh.inner
             through = np.bincount(mesh.left, np.abs(flows), self.n)
