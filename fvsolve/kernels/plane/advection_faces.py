@@ -162,7 +162,7 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
                 value, face = c[place(edges[q], ring)], f - b + number[q]
                 enters = factor * flow[face] < 0.0
                 shown[q] = outside[number[q]] if enters else value
-                shown[b + q] = 2.0 * shown[q] - value
+                shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
             if limited:
                 put_sides(sided, floats, integers, c, wide_by, free, bounds, here, w, cs)
             if spreads:

@@ -46,7 +46,8 @@ def diffusion_work(nx, ny):
 def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
     """Add the rates of diffusion [m2/s], and return the greatest rate 2 D (kx^2 + ky^2) of a cell [1/s].
 
-    No flux at the boundary but where factor times the flow comes in: there the value `outside` holds on the face.
+    No flux at the boundary but where factor times a given flow comes in: there the value `outside` holds on the face.
+    (That of water, with depths, may hardly move there: a value held at one sign and not at the other would be a jump.)
     Arguments as of `grid_advection`; work : float64[diffusion_work(nx, ny)]
     """
     c, rest = s, work[nx * ny :]
@@ -55,11 +56,10 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         c = work[: nx * ny]
     p, wx, rest = rest[: nx + 2], rest[nx + 2 : 2 * nx + 3], rest[2 * nx + 3 :]
     rows, beyond, top = rest[: 2 * nx], rest[2 * nx : 4 * nx], rest[4 * nx : 5 * nx]
-    below, above, last, most = beyond[:nx], beyond[nx:], (ny - 1) * nx, 0.0
+    below, above, most = beyond[:nx], beyond[nx:], 0.0
+    held = 2.0 * diffusivity if depth.size == 0 else 0.0
     for i in range(nx):
-        deep = depth[i] if depth.size > 0 else 1.0
-        come = factor * flow_y[i] > 0.0
-        below[i], rows[i] = outside[2 * ny + i], 2.0 * ky[0] * diffusivity * deep if come else 0.0
+        below[i], rows[i] = outside[2 * ny + i], ky[0] * held if factor * flow_y[i] > 0.0 else 0.0
         above[i], top[i] = outside[2 * ny + nx + i], 0.0
     for j in range(ny):
         a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
@@ -71,17 +71,15 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         conduct(1.0, h, h[1:], inner_w)
         for i in range(nx - 1):
             inner_w[i] *= diffusivity * between(kx[i], kx[i + 1])
-        west, east = (depth[a], depth[z - 1]) if depth.size > 0 else (1.0, 1.0)
-        wx[0] = 2.0 * kx[0] * diffusivity * west if factor * flow_x[f] > 0.0 else 0.0
-        wx[nx] = 2.0 * kx[nx - 1] * diffusivity * east if factor * flow_x[f + nx] < 0.0 else 0.0
+        wx[0] = kx[0] * held if factor * flow_x[f] > 0.0 else 0.0
+        wx[nx] = kx[nx - 1] * held if factor * flow_x[f + nx] < 0.0 else 0.0
         ws, wn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx : ((j + 1) % 2 + 1) * nx]
         south, north = c[a - nx : a] if j > 0 else below, c[z : z + nx] if j < ny - 1 else above
         if j < ny - 1:
             conduct(diffusivity * between(ky[j], ky[j + 1]), h, hn, wn)
         else:
             for i in range(nx):
-                deep = depth[last + i] if depth.size > 0 else 1.0
-                wn[i] = 2.0 * ky[j] * diffusivity * deep if factor * flow_y[z + i] < 0.0 else 0.0
+                wn[i] = ky[j] * held if factor * flow_y[z + i] < 0.0 else 0.0
         spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
     for i in range(nx):
         most = max(most, top[i])
