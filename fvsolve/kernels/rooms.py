@@ -15,6 +15,8 @@ from fvsolve.kernels.records import (
     LIQUID_GRID,
     SHALLOW_FACES,
     SHALLOW_GRID,
+    TABLE_FACES,
+    TABLE_GRID,
 )
 
 HOME = "fvsolve.kernels"
@@ -78,6 +80,9 @@ ROOMS = {
         observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
     "patches, barotropic": Room(observe="plane.observe: observe_dense_flows"),
+    "patches, table": Room(
+        before="plane.table_rooms: table_pressures", observe="plane.table_rooms: observe_pressures"
+    ),
     "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
     "scalars": Room(after="scalars: carry_scalars", observe="scalars: observe_scalars"),
     "memory": Room(after="unsteady.memory: remember_linear", **MEMORY),
@@ -94,6 +99,8 @@ BASINS = {  # kind of basin
     ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
     LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
     LIQUID_FACES: Room(after="plane.rooms: liquid_meshes"),
+    TABLE_GRID: Room(after="plane.table_rooms: table_grids"),
+    TABLE_FACES: Room(after="plane.table_rooms: table_meshes"),
 }
 ALWAYS = Room(record="observer: record_all", events="observer: tank_events")
 
@@ -139,6 +146,7 @@ class Scene:
         if self.basins:
             yield ROOMS["patches"]
             yield Room() if linear else ROOMS["patches, barotropic"]
+            yield ROOMS["patches, table"] if self.law == "table" else Room()
         if self.scalars:  # carried by the flow that rates of waves now have
             yield ROOMS["values"] if self.basins else Room()
             yield ROOMS["scalars"]
