@@ -178,6 +178,21 @@ def test_a_basin_is_relieved_into_the_network_and_all_of_it_is_booked(path, tmp_
     assert -result["pool.out.flow"][-1] == approx(flow, rel=1e-9)
 
 
+@pytest.mark.parametrize("over", [-1e6, 0.0, 2e7])
+def test_the_pressure_of_a_patch_is_that_of_the_cells_behind(over):
+    pool = basin(start={"pressure": over}, patches={"out": {"side": "east"}})
+    nodes, links = {"pool": pool, "end": reservoir(REST)}, {"tap": valve("pool.out", "end", 1e-4)}
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, "initial": "rest"}
+    probes = ["pool.out.pressure", "pool.pressure@2,1"]
+    model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, numerics, probes, 0.1, fluid=FLUID)))
+    assert model.observe(0.0, model.start) == approx([REST + over] * 2, rel=1e-9)
+    own, node = model.basins[0], model.tables[rec.I_NODES][model.node_names.index("pool.out")]
+    stiffness = model.evaluate(0.0, model.start)[1][model.layout["stiffness"] + node["row"]]
+    behind = 0.1 * 16 * own.mesh.area[0]  # [m3]
+    assert stiffness == approx(TRUTH.c(REST + over) ** 2 / behind, rel=1e-5)
+    assert own.of(model.start)[0] == approx(TRUTH.rho(REST + over) - TRUTH.rho(REST), rel=1e-6, abs=1e-6)
+
+
 @pytest.mark.parametrize("holes", [None, HOLE], ids=["grid", "faces"])
 def test_probes_and_frames_have_the_isentropes_pressures(holes):
     places, more = ["1.0625,0.9375", "2.4375,1.1875"], {"holes": holes} if holes else {}
