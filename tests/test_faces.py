@@ -46,10 +46,10 @@ class Field:
         )
         return found, rate
 
-    def liquid(self, law, scheme, y, reflect=NONE, limiter=VAN_LEER):
+    def liquid(self, law, scheme, y, reflect=NONE, limiter=VAN_LEER, table=None):
         work, found = np.full(liquid_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
         return found, liquid_faces.liquid_rates(
-            law, C, RHO, scheme, limiter, self.floats, self.integers, reflect, *y, work, *found
+            law, C, RHO, table, scheme, limiter, self.floats, self.integers, reflect, *y, work, *found
         )
 
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, limiter=VAN_LEER):

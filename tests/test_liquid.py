@@ -48,10 +48,10 @@ class Box:
         )
         return x, y
 
-    def rates(self, state: np.ndarray) -> tuple[np.ndarray, float]:
+    def rates(self, state: np.ndarray, table: np.ndarray | None = None) -> tuple[np.ndarray, float]:
         """(rates, greatest rate); work starts as NaN, so that what is read before it is written shows."""
         kernel = liquid_log if self.log else liquid
-        given = (C, RHO, 1e-18 * C**2) if self.log else (C, 1e-18 * (RHO * C) ** 2)
+        given = (C, RHO, table, 1e-18 * C**2) if self.log else (C, 1e-18 * (RHO * C) ** 2)
         kx, ky = (1.0 / np.diff(e) for e in self.edges())
         reflect = self.reflect
         if isinstance(reflect, float):

@@ -147,8 +147,8 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         if fluid is not None and fluid.law != "linear" and basin.physics == "free-surface":
             what = f"{show(fluid.law)} does not go with a free surface, whose water has one density"
             yield ("fluid", "law"), f'{what}; wanted "linear"'
-        if fluid is not None and fluid.law not in ("linear", "log") and basin.physics == "liquid":
-            yield ("fluid", "law"), f'{show(fluid.law)} does not go with basins; wanted "linear" or "log"'
+        if fluid is not None and fluid.law == "mixture" and basin.physics == "liquid":
+            yield ("fluid", "law"), f'{show(fluid.law)} does not go with basins; wanted "linear", "log" or "table"'
         if name not in meshes:
             continue
         known = patch_names(meshes[name])

@@ -317,8 +317,9 @@ POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8
 NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
 
-SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, LIQUID_GRID, LIQUID_FACES, CARRIED_GRID, CARRIED_FACES = range(7)
-# kinds of basins: physics, and of a liquid on grids law linear or log; grids or meshes of any cells
+SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, LIQUID_GRID, LIQUID_FACES = range(5)
+TABLE_GRID, TABLE_FACES, CARRIED_GRID, CARRIED_FACES = range(5, 9)
+# kinds of basins: physics, and of a liquid law linear (on grids), log or table; grids or meshes of any cells
 
 BASIN = np.dtype(
     [
@@ -343,6 +344,7 @@ BASIN = np.dtype(
         ("thickness", "f8"),  # [m]
         ("speed", "f8"),  # of waves in a liquid at rest [m/s]
         ("density", "f8"),  # of a liquid at rest [kg/m3]
+        ("table", "i8"),  # of its waves under law table, in `plane`
         ("small", "f8"),  # what is too small to mean anything, squared
         ("carried", "i8"),  # first state of scalars, depth times value, one after the other; -1 for none
         ("lost", "i8"),  # first of its cells among the losses of a scalar

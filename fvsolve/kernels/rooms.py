@@ -15,6 +15,8 @@ from fvsolve.kernels.records import (
     LIQUID_GRID,
     SHALLOW_FACES,
     SHALLOW_GRID,
+    TABLE_FACES,
+    TABLE_GRID,
 )
 
 HOME = "fvsolve.kernels"
@@ -86,6 +88,9 @@ ROOMS = {
     ),
     "inflows": Room(brake="plane.patches: quickest_inflow"),
     "patches, barotropic": Room(observe="plane.observe: observe_dense_flows"),
+    "patches, table": Room(
+        before="plane.table_rooms: table_pressures", observe="plane.table_rooms: observe_pressures"
+    ),
     "values": Room(after="plane.carried: patch_values", observe="plane.carried: observe_values"),
     "scalars": Room(after="scalars: clear_losses", observe="scalars: observe_scalars"),
     "leaving": Room(after="scalars: leave_pipes"),
@@ -107,6 +112,8 @@ BASINS = {  # kind of basin
     ACOUSTIC_GRID: Room(after="plane.rooms: acoustic_grids"),
     LIQUID_GRID: Room(after="plane.rooms: liquid_grids"),
     LIQUID_FACES: Room(after="plane.rooms: liquid_meshes"),
+    TABLE_GRID: Room(after="plane.table_rooms: table_grids"),
+    TABLE_FACES: Room(after="plane.table_rooms: table_meshes"),
 }
 ALWAYS = Room(record="observer: record_nodes", events="observer: tank_events")
 
@@ -162,6 +169,7 @@ class Scene:
         if flowing:
             yield ROOMS["patches"]
             yield ROOMS["inflows"] if self.valves else Room()
+            yield ROOMS["patches, table"] if self.law == "table" else Room()
         if self.scalars:  # carried by the flow that rates of waves now have
             yield ROOMS["values"] if self.basins else Room()
             yield ROOMS["scalars"]

@@ -1,7 +1,8 @@
-"""Pressure waves of a liquid on any mesh, laws `linear` and `log`. Knows cells and their sides; knows no patch.
+"""Pressure waves of a liquid on any mesh, under all its laws. Knows cells and their sides; knows no patch.
 
 States, waves and their fluxes are those of the grid (see `liquid` and `liquid_log`): across a side (w + u) / 2 comes
-from inside and (w - u) / 2 from beyond, with w = c r, u = m under `linear`, w = 2 (c0 - c), u = m / rho under `log`.
+from inside and (w - u) / 2 from beyond, with w = c r, u = m under `linear`, u = m / rho under `log`, where
+w = 2 (c0 - c), and `table`, where it is read.
 """
 
 from math import sqrt
@@ -27,6 +28,7 @@ from fvsolve.kernels.plane.faces import (
     width,
 )
 from fvsolve.kernels.plane.liquid_log import log_sum
+from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
 # rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step
@@ -36,8 +38,14 @@ ROWS = 10
 
 
 @njit
-def put_primitives(law, c0, rho, r, mx, my, w, u, v, c):
+def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
     """w, both velocities (mass-flow densities) and wave speed of a block of cells."""
+    if table is not None:
+        for i in range(r.size):
+            w[i], slope = invariant(table, r[i])
+            volume = 1.0 / (rho + r[i])
+            u[i], v[i], c[i] = volume * mx[i], volume * my[i], (rho + r[i]) * slope
+        return
     if law == LAW_LOG:
         per, twice = 1.0 / rho, 2.0 * c0
         for i in range(r.size):
@@ -89,16 +97,22 @@ def settle_linear(c0, wl, ul, vl, geo, w):
 
 
 @njit
-def settle_log(c0, rho, u0, v0, c, wl, ul, vl, geo, w):
+def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w):
     """The same, the full momentum flux; u0, v0, c : of the cells, for the step."""
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
-        y, u = -per * (forward + backward), forward - backward  # c = c0 (1 + y)
-        mass = rho * u / ((1.0 + y) * (1.0 + y))
-        push = mass * u - 2.0 * bulk * log_sum(y)
+        u = forward - backward
+        if table is not None:
+            r, p = state(table, forward + backward)
+            mass = (rho + r) * u
+            push = mass * u + p
+        else:
+            y = -per * (forward + backward)  # c = c0 (1 + y)
+            mass = rho * u / ((1.0 + y) * (1.0 + y))
+            push = mass * u - 2.0 * bulk * log_sum(y)
         along = mass * (vl[i] * nx - ul[i] * ny if u > 0.0 else w[_V + i] * nx - w[_U + i] * ny)
         w[_RR + i] -= reach * mass
         w[_RX + i] -= reach * (push * nx - along * ny)
@@ -129,10 +143,13 @@ def work_size(integers):
 
 
 @njit
-def liquid_rates(law, c0, rho, scheme, limiter, floats, integers, reflect, r, mx, my, work, rate_r, rate_x, rate_y):
+def liquid_rates(
+    law, c0, rho, table, scheme, limiter, floats, integers, reflect, r, mx, my, work, rate_r, rate_x, rate_y
+):
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
+    table : of `waves` in place of a law, or None
     scheme, limiter : UPWIND, or MUSCL as in `faces.width`
     reflect : float64[b]  share of a wave that comes back, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
@@ -161,7 +178,7 @@ def liquid_rates(law, c0, rho, scheme, limiter, floats, integers, reflect, r, mx
         while sided < need[j]:
             while known < need[sided]:
                 i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
-                put_primitives(law, c0, rho, r[i:k], mx[i:k], my[i:k], p[o:], u[o:], v[o:], c[o:])
+                put_primitives(law, c0, rho, table, r[i:k], mx[i:k], my[i:k], p[o:], u[o:], v[o:], c[o:])
                 known += 1
             if not first_order:
                 k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
@@ -182,8 +199,8 @@ def liquid_rates(law, c0, rho, scheme, limiter, floats, integers, reflect, r, mx
             gather(vs, beyond, w[_V:])
             i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
             show_sides(edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, ps[own:], us[own:], vs[own:], w)
-            if law == LAW_LOG:
-                settle_log(c0, rho, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w)
+            if table is not None or law == LAW_LOG:
+                settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w)
             else:
                 settle_linear(c0, ps[own:], us[own:], vs[own:], geo, w)
         put_rates(w, rate_r[first:last], rate_x[first:last], rate_y[first:last])

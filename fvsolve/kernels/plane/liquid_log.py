@@ -1,4 +1,4 @@
-"""Pressure waves of a liquid on a grid, law `log`, the full momentum flux. Knows rows of cells; knows no patch.
+"""Pressure waves of a liquid on a grid, laws `log` and `table`: the full momentum flux. Knows rows of cells; no patch.
 
 r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho): deviation of
 density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is carried along u + c
@@ -6,6 +6,9 @@ and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed
 that both make at a face is the Riemann problem's with two simple waves (Osher and Solomon 1982), below the speed of
 sound; the velocity along a face comes from the side that the flow comes from. Fifth order is that of the waves:
 products of averages are of second order, with the Mach number for a factor. Sides, rows and slots: see `liquid`.
+
+Under `table` p, c and w = integral of c / rho are read (see `waves`). Whether a table is None is known when a kernel is
+compiled, so that neither law compiles or runs anything of the other's.
 """
 
 from math import sqrt
@@ -30,6 +33,7 @@ from fvsolve.kernels.plane.liquid import (
     side_of,
     value_upwind5,
 )
+from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import LINEAR, MINMOD, UPWIND, VAN_LEER, WENO5
 
@@ -47,8 +51,17 @@ def log_sum(y):
 
 
 @inner
-def put_primitives(c0, rho, kx, ky, r, mx, my, w, u, v, top):
-    """w = 2 (c0 - c) and both velocities of a row [m/s]; top[i] the greatest (|u| + c) kx + (|v| + c) ky so far."""
+def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
+    """w and both velocities of a row [m/s]; top[i] the greatest (|u| + c) kx + (|v| + c) ky so far."""
+    if table is not None:
+        for i in range(w.size):
+            w[i], slope = invariant(table, r[i])
+            c, volume = (rho + r[i]) * slope, 1.0 / (rho + r[i])
+            a, b = volume * mx[i], volume * my[i]
+            rate = (abs(a) + c) * kx[i] + (abs(b) + c) * ky
+            u[i], v[i] = a, b
+            top[i] = rate if rate > top[i] else top[i]
+        return
     per, twice = 1.0 / rho, 2.0 * c0
     for i in range(w.size):
         x = per * r[i]
@@ -98,8 +111,15 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
 
 
 @inner
-def fluxes(c0, rho, forward, backward, along):
+def fluxes(c0, rho, table, forward, backward, along):
     """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them."""
+    if table is not None:
+        for i in range(forward.size):
+            r, p = state(table, forward[i] + backward[i])
+            u = forward[i] - backward[i]
+            mass = (rho + r) * u
+            forward[i], backward[i], along[i] = mass, mass * u + p, mass * along[i]
+        return
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(forward.size):
         y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]  # c = c0 (1 + y)
@@ -134,10 +154,13 @@ def work_size(nx, ny):
 
 
 @njit
-def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, work, rate_r, rate_x, rate_y):
+def grid_rates(
+    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, work, rate_r, rate_x, rate_y
+):
     """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
-    c0, rho : wave speed [m/s] and density [kg/m3] at rest; small : a velocity too small to mean anything, squared
+    c0, rho : wave speed [m/s] and density [kg/m3] at rest
+    table : of `waves`, or None for law `log`; small : a velocity too small to mean anything, squared
     The others are those of `liquid.grid_rates`; work : float64[work_size(nx, ny)]
     """
     wide, f, size = nx + 2 * BEYOND, nx + 1, RING * nx
@@ -156,7 +179,7 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
         while rows < min(max(j + BEYOND, EDGE), ny):
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             u, v = aside[at : at + nx], over[BEYOND : nx + BEYOND]
-            put_primitives(c0, rho, kx, ky[rows], r[a:z], mx[a:z], my[a:z], w, u, v, top)
+            put_primitives(c0, rho, table, kx, ky[rows], r[a:z], mx[a:z], my[a:z], w, u, v, top)
             put_waves(0.5, w, v, up[at : at + nx], down[at : at + nx])
             put_waves(0.5, w, u, east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
             mirror(nx, east, west)
@@ -173,7 +196,7 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
             if to_e != WALLS:
                 fw[nx] = reflect[ny + rows] * fe[nx]
             faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
-            fluxes(c0, rho, fe, fw, ft)
+            fluxes(c0, rho, table, fe, fw, ft)
             settle_row(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
@@ -184,7 +207,7 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
                 q, at = fold(row, ny), (row % RING) * nx
                 a, z, u = q * nx, (q + 1) * nx, aside[at : at + nx]
                 one, other = (down, up) if image(row, ny) else (up, down)
-                put_primitives(c0, rho, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
+                put_primitives(c0, rho, table, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
                 put_waves(0.5, w, v, one[at : at + nx], other[at : at + nx])
             if side == 0 and to_s != WALLS:
                 close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
@@ -203,7 +226,7 @@ def grid_rates(c0, rho, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, 
         faces_carried(
             across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
         )
-        fluxes(c0, rho, gu, gd, gt)
+        fluxes(c0, rho, table, gu, gd, gt)
         if j > 0:
             a, z = (j - 1) * nx, j * nx
             settle_column(

@@ -20,6 +20,7 @@ from fvsolve.kernels.records import (
     I_PLANE,
     I_PROBES,
     I_SETTINGS,
+    LAW_LINEAR,
     LAW_LOG,
     PATCH_FLOW,
     SHALLOW_FACES,
@@ -86,7 +87,7 @@ def velocity(tables, probe, y):
     for m in range(probe["count"]):
         i = tables[I_INTEGERS][probe["cell"] + m]
         share = 1.0 / basin["density"] if basin["kind"] > SHALLOW_FACES else 1.0
-        if tables[I_SETTINGS][0]["law"] == LAW_LOG:
+        if tables[I_SETTINGS][0]["law"] != LAW_LINEAR:
             share = 1.0 / (basin["density"] + y[o + i])
         if basin["kind"] <= SHALLOW_FACES:  # which fades where water is thin
             depth = max(tables[I_PLANE][basin["plan"] + i] + y[basin["y"] + i], 0.0)

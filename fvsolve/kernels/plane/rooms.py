@@ -96,24 +96,28 @@ def acoustic_grids(t, y, dydt, out, handle):
 
 
 @njit
+def full_grid(tables, basin, table, y, dydt, out):
+    """Rates of a liquid with the full momentum flux on a grid, of its waves or, with no table, under law log."""
+    plane = tables[I_PLANE]
+    n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
+    rate = liquid_log.grid_rates(
+        basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], nx, ny,
+        plane[k : k + nx], plane[k + nx : k + nx + ny],
+        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
+        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
+        dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+    )  # fmt: skip
+    book_open(tables, basin, basin["thickness"], dydt, out)
+    out[RATE] = max(out[RATE], rate)
+
+
+@njit
 def liquid_grids(t, y, dydt, out, handle):
     """Rates of a liquid under law log on grids."""
     tables = open_tables(handle)
-    plane = tables[I_PLANE]
     for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
-        if basin["kind"] != LIQUID_GRID:
-            continue
-        n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
-        rate = liquid_log.grid_rates(
-            basin["speed"], basin["density"], basin["small"], basin["scheme"], basin["limiter"], nx, ny,
-            plane[k : k + nx], plane[k + nx : k + nx + ny],
-            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
-            dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
-        )  # fmt: skip
-        book_open(tables, basin, basin["thickness"], dydt, out)
-        out[RATE] = max(out[RATE], rate)
+        if tables[I_BASINS][b]["kind"] == LIQUID_GRID:
+            full_grid(tables, tables[I_BASINS][b], None, y, dydt, out)
 
 
 @njit
@@ -141,21 +145,25 @@ def shallow_meshes(t, y, dydt, out, handle):
 
 
 @njit
+def liquid_mesh(tables, basin, table, y, dydt, out):
+    """Rates of a liquid on a mesh, of its waves or, with no table, under laws linear and log."""
+    plane, integers = tables[I_PLANE], tables[I_INTEGERS]
+    n, o = basin["n"], basin["y"]
+    rate = liquid_faces.liquid_rates(
+        tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
+        plane[basin["mesh"] :],
+        integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
+        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
+        dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+    )  # fmt: skip
+    book_open(tables, basin, basin["thickness"], dydt, out)
+    out[RATE] = max(out[RATE], rate)
+
+
+@njit
 def liquid_meshes(t, y, dydt, out, handle):
     """Rates of a liquid on meshes of any cells, under laws linear and log."""
     tables = open_tables(handle)
-    plane, integers = tables[I_PLANE], tables[I_INTEGERS]
     for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
-        if basin["kind"] != LIQUID_FACES:
-            continue
-        n, o = basin["n"], basin["y"]
-        rate = liquid_faces.liquid_rates(
-            tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], basin["scheme"], basin["limiter"],
-            plane[basin["mesh"] :],
-            integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
-            dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
-        )  # fmt: skip
-        book_open(tables, basin, basin["thickness"], dydt, out)
-        out[RATE] = max(out[RATE], rate)
+        if tables[I_BASINS][b]["kind"] == LIQUID_FACES:
+            liquid_mesh(tables, tables[I_BASINS][b], None, y, dydt, out)

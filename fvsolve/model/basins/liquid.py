@@ -17,7 +17,7 @@ SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
 class Liquid(Basin, physics="liquid"):
     """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
 
-    law linear: p = a^2 (rho - rho0); law log: p = K ln(rho / rho0), with the full momentum flux.
+    law linear: p = a^2 (rho - rho0); laws log, p = K ln(rho / rho0), and table with the full momentum flux.
     """
 
     quantities = ("density", "flow_x", "flow_y")
@@ -26,7 +26,13 @@ class Liquid(Basin, physics="liquid"):
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
         fluid = case.properties
-        self.linear = case.fluid.law == "linear"
+        self.linear, self.waves = case.fluid.law == "linear", None
+        if case.fluid.law == "table":
+            from fvsolve.model.basins.waves import Waves
+
+            self.waves = Waves(fluid, self.part.pressure, self.part.wave_speed)
+            self.density, self.speed = self.waves.density, self.waves.speed
+            return
         strain = (self.part.pressure - fluid.pressure) / fluid.bulk_modulus
         self.density = fluid.density * (1.0 if self.linear else math.exp(strain))
         self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
@@ -45,25 +51,43 @@ class Liquid(Basin, physics="liquid"):
         height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
         row["rest"] = self.part.pressure - self.case.ambient_pressure + height
         row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
+        if self.waves is not None:
+            self.lower_waves(scene, row)
         if self.is_grid:
-            row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.LIQUID_GRID
+            row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.TABLE_GRID if self.waves else rec.LIQUID_GRID
             size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
             row["work"] = scene.to_plane(np.zeros(size))
         else:
-            row["kind"] = rec.LIQUID_FACES
+            row["kind"] = rec.TABLE_FACES if self.waves else rec.LIQUID_FACES
             row["work"] = scene.to_plane(np.zeros(liquid_faces.work_size(self.integers)))
+
+    def lower_waves(self, scene, row) -> None:
+        """The table of its waves; a wall cannot make them quicker than the fluid's own."""
+        if self.waves.speed > (1.0 + 1e-9) * self.waves.own_speed:
+            scene.fault(f"nodes.{self.name}.wave_speed", f"{self.speed:.6g} m/s is faster than sound in the fluid, "
+                        f"{self.waves.own_speed:.6g} m/s; wanted at most that, or another law")  # fmt: skip
+        row["table"] = scene.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
         """Pressure above that at rest [Pa], of deviations of the density."""
         if self.linear:
             return self.speed**2 * deviation
+        if self.waves is not None:
+            return self.waves.pressure(deviation) - self.part.pressure
         return self.density * self.speed**2 * np.log1p(deviation / self.density)
+
+    def deviation(self, pressure: np.ndarray) -> np.ndarray:
+        """Deviations of the density, of pressures above that at rest [Pa]."""
+        if self.linear:
+            return pressure / self.speed**2
+        if self.waves is not None:
+            return self.waves.deviation(self.part.pressure + pressure)
+        return self.density * np.expm1(pressure / (self.density * self.speed**2))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
         if given is not None:
-            pressure, k = self.formula(given.pressure), self.density * self.speed**2
-            found[0] = pressure / self.speed**2 if self.linear else self.density * np.expm1(pressure / k)
+            found[0] = self.deviation(self.formula(given.pressure))
             density = self.density + (0.0 if self.linear else found[0])
             found[1], found[2] = density * self.formula(given.u), density * self.formula(given.v)
         return found

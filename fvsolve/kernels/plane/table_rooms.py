@@ -1,0 +1,71 @@
+"""Liquids under law `table` as rooms of a scene: rates, pressures of patches, probes. Knows no flux."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.plane.patches import mean_deviation
+from fvsolve.kernels.plane.rooms import full_grid, liquid_mesh
+from fvsolve.kernels.plane.waves import pressure
+from fvsolve.kernels.records import (
+    CELL_STATE,
+    I_BASINS,
+    I_FLOATS,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_PATCHES,
+    I_PLANE,
+    I_PROBES,
+    TABLE_FACES,
+    TABLE_GRID,
+)
+
+
+@njit
+def table_grids(t, y, dydt, out, handle):
+    """Rates on grids."""
+    tables = open_tables(handle)
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] == TABLE_GRID:
+            full_grid(tables, basin, tables[I_PLANE][basin["table"] :], y, dydt, out)
+
+
+@njit
+def table_meshes(t, y, dydt, out, handle):
+    """Rates on meshes of any cells."""
+    tables = open_tables(handle)
+    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+        basin = tables[I_BASINS][b]
+        if basin["kind"] == TABLE_FACES:
+            liquid_mesh(tables, basin, tables[I_PLANE][basin["table"] :], y, dydt, out)
+
+
+@njit
+def table_pressures(t, y, dydt, out, handle):
+    """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
+    tables = open_tables(handle)
+    layout = tables[I_LAYOUT][0]
+    for k in range(tables[I_PATCHES].size):
+        patch = tables[I_PATCHES][k]
+        basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
+        table = tables[I_PLANE][basin["table"] :]
+        found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, y))
+        out[layout["pressure"] + patch["node"]] = found
+        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch["area"])
+
+
+@njit
+def observe_pressures(t, y, out, handle, values):
+    """Pressures in cells [Pa]."""
+    tables = open_tables(handle)
+    probes = tables[I_PROBES]
+    for k in range(probes.size):
+        probe = probes[k]
+        if probe["kind"] != CELL_STATE or probe["side"] != 0:
+            continue
+        basin, total = tables[I_BASINS][probe["index"]], 0.0
+        table = tables[I_PLANE][basin["table"] :]
+        for m in range(probe["count"]):
+            r = y[basin["y"] + tables[I_INTEGERS][probe["cell"] + m]]
+            total += tables[I_FLOATS][probe["weights"] + m] * pressure(table, basin["density"], r)[0]
+        values[k] = total + probe["offset"]
