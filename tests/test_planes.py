@@ -132,6 +132,13 @@ def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
     assert abs(ledger["relative"]) < 1e-13 and (ledger["outflow"] > 0.0 or left > 0.0)
 
 
+def test_what_leaves_by_an_open_side_is_no_mark():
+    """It is no tank that spills or runs dry."""
+    pool = water(start=WAVY, patches={"sea": {"side": "east", "boundary": "open"}})
+    result = fvsolve.run(case(pool, 2.0))
+    assert result.ledger["mass"]["by_node"]["pool.sea"] != 0.0 and result.marks == []
+
+
 def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
     """Given velocity 0.5 m/s: what came in at 1 for 2 s stands between 1 m and 2 m of 4 m after 4 s."""
     inlet = {"time": [0.0, 2.0], "value": [1.0, 0.0], "kind": "step"}
@@ -174,6 +181,15 @@ def test_decay_and_diffusion_of_a_still_pool_have_their_closed_form():
     exact = 1.0 + np.cos(k * x) * math.exp(-(diffusivity * k * k + rate) * 3.0)
     assert np.abs(value - exact).max() < 2e-3
     assert abs(fvsolve.run(given).ledger["heat"]["relative"]) < 1e-13
+
+
+def test_the_ledger_of_each_scalar_is_its_own():
+    """Without patches, too: one is 1 everywhere, the other 3 and decays."""
+    given = case(water(), 2.0, scalars={"one": {"initial": 1.0}, "other": {"initial": 3.0, "decay": 0.5}})
+    ledger = fvsolve.run(given).ledger
+    held = 4.0 * 2.0 * RHO
+    assert ledger["one"]["final"] == approx(held) and ledger["other"]["final"] == approx(3.0 * held / math.e, rel=1e-4)
+    assert max(abs(ledger[name]["relative"]) for name in ("one", "other")) < 1e-13
 
 
 def test_a_basin_under_law_log_is_relieved_into_the_network():
