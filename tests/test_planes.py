@@ -270,6 +270,43 @@ def test_a_patch_that_runs_dry_does_not_shorten_steps():
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
+BANK = {"cells": [8, 8], "bed": "0.5*y", "patches": {"out": {"side": "east"}}}  # half of the outlet is above the water
+
+
+def test_a_patch_up_a_bank_stands_at_the_level_of_its_water():
+    """The lake stays at rest to the bit beside a reservoir of its level."""
+    tap = {"tap": valve("pool.out", "sea", 0.05)}
+    given = scene({"pool": basin(level=0.5, **BANK), "sea": lake(0.5)}, tap, 0.1, STEPS, ["pool.out.head"])
+    result = fvsolve.run(given)
+    assert result["pool.out.head"] == approx(0.5, rel=1e-14)
+    assert result.ledger["mass"]["final"] == result.ledger["mass"]["initial"]
+
+
+@pytest.mark.parametrize("path", ["grid", "holes"])
+def test_a_bank_gives_no_water_that_it_has_not(path):
+    """No cell owes any, and the level falls to where the outlet is dry."""
+    pool = basin(level=0.5, manning=0.02, **BANK) | ({"holes": [[0.0, 1.0, 1.0, 2.0]]} if path == "holes" else {})
+    given = scene(
+        {"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": valve("pool.out", "outside", 0.05)}, 60.0, STEPS
+    )
+    model, state = ended(given)
+    depth = model.basins[0].depth + model.basins[0].of(state.y)[0]
+    assert depth.min() >= 0.0 and 0.0 < depth.max() < 0.25
+    assert fvsolve.run(given).ledger["mass"]["final"] == approx(RHO * np.sum(model.basins[0].mesh.area * depth))
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_a_tank_without_friction_drains_to_the_last_film(scheme):
+    """Cells behind the outlet fall dry one after the other: none of it comes back (Torricelli: empty after 409 s)."""
+    pool = {"type": "basin", "size": [4.0, 2.0], "cells": [8, 4], "level": 2.0}
+    pool["patches"] = {"out": {"side": "south", "span": [1.0, 3.0]}}
+    tap = valve("pool.out", "outside", math.pi * 0.15**2 / 4.0 / math.sqrt(2.0), discharge_coefficient=1.0)
+    given = scene({"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": tap}, 600.0, STEPS | {"scheme": scheme})
+    model, state = ended(given)
+    depth = model.basins[0].depth + model.basins[0].of(state.y)[0]
+    assert depth.min() >= 0.0 and depth.max() < 1e-3
+
+
 def test_a_run_keeps_its_mesh_and_its_resolved_case_reads_back(tmp_path):
     (tmp_path / "meshes").mkdir()
     points, cells = triangles((4.0, 2.0), 0.5)
