@@ -132,6 +132,13 @@ def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
     assert abs(ledger["relative"]) < 1e-13 and (ledger["outflow"] > 0.0 or left > 0.0)
 
 
+def test_what_leaves_by_an_open_side_is_no_mark():
+    """It is no tank that spills or runs dry."""
+    pool = water(start=WAVY, patches={"sea": {"side": "east", "boundary": "open"}})
+    result = fvsolve.run(case(pool, 2.0))
+    assert result.ledger["mass"]["by_node"]["pool.sea"] != 0.0 and result.marks == []
+
+
 def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
     """Given velocity 0.5 m/s: what came in at 1 for 2 s stands between 1 m and 2 m of 4 m after 4 s."""
     inlet = {"time": [0.0, 2.0], "value": [1.0, 0.0], "kind": "step"}
@@ -174,6 +181,15 @@ def test_decay_and_diffusion_of_a_still_pool_have_their_closed_form():
     exact = 1.0 + np.cos(k * x) * math.exp(-(diffusivity * k * k + rate) * 3.0)
     assert np.abs(value - exact).max() < 2e-3
     assert abs(fvsolve.run(given).ledger["heat"]["relative"]) < 1e-13
+
+
+def test_the_ledger_of_each_scalar_is_its_own():
+    """Without patches, too: one is 1 everywhere, the other 3 and decays."""
+    given = case(water(), 2.0, scalars={"one": {"initial": 1.0}, "other": {"initial": 3.0, "decay": 0.5}})
+    ledger = fvsolve.run(given).ledger
+    held = 4.0 * 2.0 * RHO
+    assert ledger["one"]["final"] == approx(held) and ledger["other"]["final"] == approx(3.0 * held / math.e, rel=1e-4)
+    assert max(abs(ledger[name]["relative"]) for name in ("one", "other")) < 1e-13
 
 
 def test_a_basin_under_law_log_is_relieved_into_the_network():
@@ -252,6 +268,43 @@ def test_a_patch_that_runs_dry_does_not_shorten_steps():
     result = fvsolve.run(scene({"pool": pool, "out": reservoir(AMBIENT)}, links, 600.0, STEPS, ["tap.flow"], 10.0))
     assert result.ok and result.summary["steps"] < 20000 and 0.0 <= result["tap.flow"][-1] < 1e-3
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+BANK = {"cells": [8, 8], "bed": "0.5*y", "patches": {"out": {"side": "east"}}}  # half of the outlet is above the water
+
+
+def test_a_patch_up_a_bank_stands_at_the_level_of_its_water():
+    """The lake stays at rest to the bit beside a reservoir of its level."""
+    tap = {"tap": valve("pool.out", "sea", 0.05)}
+    given = scene({"pool": basin(level=0.5, **BANK), "sea": lake(0.5)}, tap, 0.1, STEPS, ["pool.out.head"])
+    result = fvsolve.run(given)
+    assert result["pool.out.head"] == approx(0.5, rel=1e-14)
+    assert result.ledger["mass"]["final"] == result.ledger["mass"]["initial"]
+
+
+@pytest.mark.parametrize("path", ["grid", "holes"])
+def test_a_bank_gives_no_water_that_it_has_not(path):
+    """No cell owes any, and the level falls to where the outlet is dry."""
+    pool = basin(level=0.5, manning=0.02, **BANK) | ({"holes": [[0.0, 1.0, 1.0, 2.0]]} if path == "holes" else {})
+    given = scene(
+        {"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": valve("pool.out", "outside", 0.05)}, 60.0, STEPS
+    )
+    model, state = ended(given)
+    depth = model.basins[0].depth + model.basins[0].of(state.y)[0]
+    assert depth.min() >= 0.0 and 0.0 < depth.max() < 0.25
+    assert fvsolve.run(given).ledger["mass"]["final"] == approx(RHO * np.sum(model.basins[0].mesh.area * depth))
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+def test_a_tank_without_friction_drains_to_the_last_film(scheme):
+    """Cells behind the outlet fall dry one after the other: none of it comes back (Torricelli: empty after 409 s)."""
+    pool = {"type": "basin", "size": [4.0, 2.0], "cells": [8, 4], "level": 2.0}
+    pool["patches"] = {"out": {"side": "south", "span": [1.0, 3.0]}}
+    tap = valve("pool.out", "outside", math.pi * 0.15**2 / 4.0 / math.sqrt(2.0), discharge_coefficient=1.0)
+    given = scene({"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": tap}, 600.0, STEPS | {"scheme": scheme})
+    model, state = ended(given)
+    depth = model.basins[0].depth + model.basins[0].of(state.y)[0]
+    assert depth.min() >= 0.0 and depth.max() < 1e-3
 
 
 def test_a_run_keeps_its_mesh_and_its_resolved_case_reads_back(tmp_path):

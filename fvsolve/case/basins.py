@@ -122,10 +122,12 @@ def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
 
 
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
-    """Patches as places, at the mean height of the bed behind them."""
+    """Patches as places, at the mean height of the bed behind them that is under water, or of the lowest of it."""
     found, bed = {}, bed_of(basin, mesh)
     for patch in patch_names(mesh):
         cells = behind(mesh, patch)
+        level = np.inf if basin.level is None else basin.level
+        cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(level, -np.inf))]  # with water, or the lowest
         height = float(np.average(bed[cells], weights=mesh.area[cells]))
         depth = None
         if basin.level is not None:

@@ -368,7 +368,6 @@ PATCHES = np.dtype(
         ("first", "i8"),  # of its cells in `integers`
         ("count", "i8"),
         ("area", "f8"),  # of these [m2]
-        ("depth", "f8"),  # of water at rest, their mean [m]
         (
             "ring",
             "i8",

@@ -119,14 +119,13 @@ def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
     return {name: float(out[at + q * nodes + i]) for q, name in enumerate(model.case.scalars)}
 
 
-def amount(model, row, y: np.ndarray) -> float:
-    """Amount of a scalar in all pipes and nodes [kg, times its unit]."""
-    pipes, nodes = model.tables[rec.I_PIPES], model.tables[rec.I_NODES]
+def amount(model, q: int, y: np.ndarray) -> float:
+    """Amount of scalar q in all pipes, nodes and basins [kg, times its unit]."""
+    pipes, nodes, row = model.tables[rec.I_PIPES], model.tables[rec.I_NODES], model.tables[rec.I_SCALARS][q]
     total = 0.0
     for pipe in pipes:
         at = int(row["y"] + pipe["cell"])
         total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
-    q = int(np.flatnonzero(model.tables[rec.I_SCALARS]["places"] == row["places"])[0])
     total += sum(float(np.sum(basin.held() * basin.amounts(y)[q])) for basin in model.basins)
     places = model.tables[rec.I_INTEGERS][row["places"] : row["places"] + len(nodes)]
     return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
@@ -138,7 +137,7 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
     for q, (name, row) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
         own, lost = ledger[n + q * n : n + (q + 1) * n], ledger[n * (1 + len(model.case.scalars)) + row["loss"] :]
         decayed = -float(np.sum(lost[: row["losses"]]))
-        initial, final = amount(model, row, model.start), amount(model, row, y)
+        initial, final = amount(model, q, model.start), amount(model, q, y)
         gained = [float(x) for x in own]
         remainder = final - initial - (float(np.sum(own)) - decayed)
         moved = max(abs(initial), abs(final), float(np.sum(np.abs(own))) + abs(decayed))

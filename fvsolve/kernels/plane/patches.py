@@ -1,6 +1,6 @@
 """Patches as a room of a scene: their pressures, and what the network brings into the cells behind them."""
 
-from math import log1p, sqrt
+from math import inf, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -23,7 +23,8 @@ from fvsolve.kernels.records import (
 )
 from fvsolve.kernels.restrictions import head_drop
 
-SHALLOW = 1e-3  # depth at a patch below which no more than a share of what is asked can leave [m]
+SHALLOW = 1e-3  # depth behind a patch below which no more than a share of what is asked can leave [m]
+HARDLY = 1e-6  # share of the cells behind a patch below which its surface turns to the lowest one's
 
 
 @njit
@@ -44,6 +45,41 @@ def to_be_had(depth):
 
 
 @njit
+def share_of(plane, basin, i, y):
+    """Share of its outflow that cell i of a basin of water can give."""
+    return to_be_had(plane[basin["plan"] + i] + y[basin["y"] + i])
+
+
+@njit
+def water_behind(tables, patch, y):
+    """(rise of the surface, depth, area, sum of area times share squared, least depth) of the cells behind a patch.
+
+    Cells count by their area times the share of an outflow that they can give, so that a dry bank is no water. The
+    rise is from the surface at rest, where all is dry from the lowest bed; the least depth is that of cells with water.
+    """
+    basin, plane = tables[I_BASINS][patch["basin"]], tables[I_PLANE]
+    n, plan, low, lowest, least = basin["n"], basin["plan"], inf, 0.0, inf
+    for m in range(patch["count"]):
+        i = tables[I_INTEGERS][patch["first"] + m]
+        bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
+        if plane[plan + i] + y[basin["y"] + i] > 0.0:
+            least = min(least, plane[plan + i] + y[basin["y"] + i])
+        if bed < low:
+            low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
+    rest, rise, depth, wet, squares = max(low, 0.0), 0.0, 0.0, 0.0, 0.0
+    for m in range(patch["count"]):
+        i = tables[I_INTEGERS][patch["first"] + m]
+        share, d = share_of(plane, basin, i, y), y[basin["y"] + i]
+        weight = plane[basin["area"] + i] * share
+        wet, squares = wet + weight, squares + weight * share
+        rise += weight * (plane[plan + n + i] + d - rest)
+        depth += weight * (plane[plan + i] + d)
+    hardly = max(HARDLY * patch["area"] - wet, 0.0)
+    total = wet + hardly
+    return (rise + hardly * (lowest - rest)) / total, depth / total, wet, squares, least
+
+
+@njit
 def patch_pressures(t, y, dydt, out, handle):
     """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
     tables = open_tables(handle)
@@ -51,19 +87,23 @@ def patch_pressures(t, y, dydt, out, handle):
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
-        stored = mean_deviation(tables, patch, y)
-        if basin["kind"] <= SHALLOW_FACES:
+        water = basin["kind"] <= SHALLOW_FACES
+        if water:
+            stored, depth, wet, squares, least = water_behind(tables, patch, y)
             slope, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
+            pressure = slope * stored
+            spread = patch["area"] * squares / (wet * wet) if wet > HARDLY * patch["area"] else 1.0
+            slope, had = slope * spread, to_be_had(depth)
         else:
+            stored, had = mean_deviation(tables, patch, y), 1.0
             slope, content = basin["speed"] * basin["speed"], basin["thickness"] * patch["area"]
-        pressure = slope * stored
+            pressure = slope * stored
         if st["law"] == LAW_LOG and basin["density"] > 0.0:
             strain = stored / basin["density"]
             pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
-        water = basin["kind"] <= SHALLOW_FACES
-        out[layout["had"] + node["row"]] = to_be_had(patch["depth"] + stored) if water else 1.0
+        out[layout["had"] + node["row"]] = had
         out[layout["stiffness"] + node["row"]] = slope / content
 
 
@@ -144,18 +184,25 @@ def shallow_patch(tables, patch, asked, y, dydt, out):
     st, layout, integers, plane = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_INTEGERS], tables[I_PLANE]
     basin, rho = tables[I_BASINS][patch["basin"]], st["rho"]
     n, o, first = basin["n"], basin["y"], patch["first"]
-    depth, share = patch["depth"] + mean_deviation(tables, patch, y), 1.0
-    if asked < 0.0:  # 1.5, the steepest slope of the share
-        out[RATE] = max(out[RATE], -1.5 * asked / (rho * patch["area"] * max(depth, SHALLOW)))
+    _, depth, given, _, least = water_behind(tables, patch, y)
+    share, wet, even = 1.0, max(given, HARDLY * patch["area"]), given < HARDLY * patch["area"] and asked > 0.0
+    if even:  # all is dry
+        wet = patch["area"]
+    if asked < 0.0:
         share = to_be_had(depth)  # the rest comes from outside
+        out[RATE] = max(out[RATE], -1.5 * asked * share / (rho * wet * max(least, SHALLOW)))  # 1.5, its steepest slope
+        share *= given / wet
+        wet = given
     supply = (share - 1.0) * asked
     out[layout["supply"] + patch["node"]] += supply
-    flow = (asked + supply) / (rho * patch["area"])  # [m/s] of depth
+    flow = (asked + supply) / (rho * wet) if wet > 0.0 else 0.0  # [m/s] of depth
     for m in range(patch["count"] if dydt.size > 0 else 0):
-        dydt[o + integers[first + m]] += flow
-    out_per_width = -(asked + supply) / (rho * patch["length"])  # [m2/s]
-    for m in range(patch["faces"] if dydt.size > 0 and out_per_width != 0.0 else 0):
+        i = integers[first + m]
+        dydt[o + i] += flow * (1.0 if even else share_of(plane, basin, i, y))
+    per_width = -flow * patch["area"] / patch["length"]  # [m2/s]
+    for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
         k = integers[patch["ring"] + patch["faces"] + m]
+        out_per_width = per_width * (1.0 if even else share_of(plane, basin, k, y))
         i, at, many = o + k, patch["normals"], patch["faces"]
         h = max(plane[basin["plan"] + k] + y[i], 0.0)
         share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))

@@ -80,10 +80,6 @@ class Basin:
 
         return Points(self.mesh)
 
-    def rest(self) -> np.ndarray:
-        """Depth of water at rest : float64[n] [m]; 0 where it says nothing."""
-        return np.zeros(self.n)
-
     def formula(self, shape) -> np.ndarray:
         """Means of a formula over cells, on grids by nine Gauss points, elsewhere at centres : float64[n]."""
         if shape is None:
@@ -215,7 +211,6 @@ class Basin:
         cells = behind(self.mesh, patch)
         row["first"], row["count"], row["area"] = len(scene.integers), cells.size, self.mesh.area[cells].sum()
         scene.integers += cells.tolist()
-        row["depth"] = np.average(self.rest()[cells], weights=self.mesh.area[cells])
         own, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner
         numbers = np.argsort(self.ring())[own - outer] if self.is_grid else own - outer
         row["ring"], row["faces"], behind_faces = len(scene.integers), own.size, self.mesh.left[own]

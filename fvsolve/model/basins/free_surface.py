@@ -72,9 +72,6 @@ class FreeSurface(Basin, physics="free-surface"):
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
 
-    def rest(self) -> np.ndarray:
-        return self.depth
-
     def ranges(self) -> dict[str, tuple[float, float]]:
         depth = self.depth + self.start()[0]
         low, high = float(depth.min()), float(depth.max())
