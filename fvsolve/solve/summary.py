@@ -76,7 +76,6 @@ class Summary:
 def find_marks(model: Model) -> list[Mark]:
     """First time and place of everything the model cannot really follow; cavities are none where the law has them."""
     marks, pipes, nodes = model.tables[rec.I_MARKS], model.pipes, model.node_names
-    passes = {f"nodes.{nodes[basin.row['open']]}" for basin in model.basins if basin.row["open"] >= 0}
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(what, place.removesuffix(".inside")) for what, place in kinds]
@@ -94,9 +93,7 @@ def find_marks(model: Model) -> list[Mark]:
     return [
         Mark(what, place, float(time), f"{place.split('.', 1)[1]}: {texts[what]}")
         for (what, place), time in zip(kinds, marks[: len(kinds)], strict=True)
-        if np.isfinite(time)
-        and not (what == "below vapor pressure" and model.cavitates)
-        and not (what in ("dry", "spilling") and place in passes)  # what leaves by an open side, booked there
+        if np.isfinite(time) and not (what == "below vapor pressure" and model.cavitates)
     ]
 
 
