@@ -202,10 +202,10 @@ def reached(folder) -> float:
 def busy(numerics: dict) -> dict:
     """A valve that goes to and fro, so that there is something to step for."""
     case = long_run()
-    t = 0.5 * np.arange(1000)
+    t = 0.5 * np.arange(500)
     opening = {"time": t.tolist(), "value": (0.6 + 0.4 * np.cos(t**2)).tolist()}
     case["links"]["valve"]["opening"] = opening
-    case["numerics"] = {"end": 500.0, "scheme": "upwind", **numerics}
+    case["numerics"] = {"end": 250.0, "scheme": "upwind", **numerics}
     return case
 
 
