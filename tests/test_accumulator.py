@@ -80,7 +80,7 @@ def test_losses_by_direction_follow_scipy():
 def filled(law: str, q: float = 1e-3, end: float = 40.0, **more) -> dict:
     """An inflow into a vessel, against whatever its pressure is."""
     nodes = {"in": {"type": "inflow", "flow": q}, "a": vessel(initial_pressure=P0, **more)}
-    links = {"gap": {"type": "valve", "from": "in", "to": "a", "area": 0.01}}
+    links = {"gap": {"type": "valve", "from": "in", "to": "a", "area": 1e-3}}
     return scene(nodes, links, end, TIGHT, ("a.pressure", "a.gas_volume"), 1.0, fluid=WATER | {"law": law})
 
 

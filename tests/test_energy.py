@@ -149,7 +149,7 @@ def test_euler_creates_half_the_square_of_what_a_step_moves():
     """A tank of area A that gains M h a step: the level used is that before, so rho g (M h / rho)^2 / (2 A) is made."""
     flow, section, h, steps = 0.02, 1.5, 0.5, 40
     nodes = {"spring": {"type": "inflow", "flow": flow}, "pond": tank(section, 1.0)}
-    case = scene(nodes, {"sluice": valve("spring", "pond", 1.0)}, h * steps, {"method": "euler", "step": h})
+    case = scene(nodes, {"sluice": valve("spring", "pond", 0.05)}, h * steps, {"method": "euler", "step": h})
     found = energy(case)
     made = steps * RHO * GRAVITY * (flow * h) ** 2 / (2 * section)
     assert found.remainder[-1] == pytest.approx(-made, rel=1e-9)
@@ -191,7 +191,7 @@ def test_what_runs_over_the_rim_carries_its_height_away():
     flow, rim, end = 0.05, 2.0, 60.0
     nodes = {"spring": {"type": "inflow", "flow": flow, "elevation": 10.0},
              "pond": tank(1.0, 1.5, height=rim, elevation=10.0)}  # fmt: skip
-    found = energy(scene(nodes, {"sluice": valve("spring", "pond", 1.0)}, end, TIGHT))
+    found = energy(scene(nodes, {"sluice": valve("spring", "pond", 0.05)}, end, TIGHT))
     assert found.datum == 10.0
     assert found.supplied["pond over the rim"][-1] == pytest.approx(-RHO * GRAVITY * rim * (flow * end - 0.5), rel=1e-7)
     assert found.stored["pond"][-1] == pytest.approx(0.5 * RHO * GRAVITY * (rim**2 - 1.5**2), rel=1e-7)
@@ -202,7 +202,7 @@ def test_a_shaped_tank_stores_the_moment_of_its_areas():
     """A cone of areas 1 to 3 m2 over 2 m: integral of z A dz from 0.5 to the end's level."""
     shape = {"level": [0.0, 2.0], "area": [1.0, 3.0]}
     nodes = {"spring": {"type": "inflow", "flow": 0.05}, "pond": tank(shape, 0.5)}
-    found = energy(scene(nodes, {"sluice": valve("spring", "pond", 1.0)}, 40.0, TIGHT))
+    found = energy(scene(nodes, {"sluice": valve("spring", "pond", 0.05)}, 40.0, TIGHT))
     volume = 0.5 + 0.5 * 0.5**2 + 2.0
     top = -1.0 + math.sqrt(1.0 + 2.0 * volume)
     moment = (0.5 * top**2 + top**3 / 3.0) - (0.5 * 0.5**2 + 0.5**3 / 3.0)

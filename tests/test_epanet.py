@@ -70,7 +70,7 @@ def truth(path, hour):
     network.options.hydraulic.accuracy = 1e-5
     network.options.hydraulic.trials = 200
     step = network.options.time.hydraulic_timestep
-    network.options.time.duration = max(network.options.time.duration, 3600 * hour)
+    network.options.time.duration = 3600 * hour
     network.options.time.report_timestep = step
     found = wntr.sim.EpanetSimulator(network).run_sim(file_prefix=str(path.parent / path.stem) + "-truth")
     at = 3600 * hour

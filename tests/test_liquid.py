@@ -344,7 +344,7 @@ def vortex(box: Box, t: float, speed: float = 3.0, drift=(2.0, 1.0)) -> np.ndarr
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_vortex_is_carried_unchanged(scheme):
     """Mach number 0.3: averages of products are not products of averages, and fifth order ends at two."""
-    found = order(Box(4, 4, scheme, (10.0, 10.0), log=True, reflect=-1.0), vortex, 0.2, (128, 256))
+    found = order(Box(4, 4, scheme, (10.0, 10.0), log=True, reflect=-1.0), vortex, 0.2, (96, 192))
     assert found == approx(min(ORDERS[scheme], 2), abs=0.15)
 
 

@@ -1,4 +1,4 @@
-"""`fvsolve order` from the outside: the orders it prints are those that theory gives, and it says what it is."""
+"""Orders are those that theory gives, and `fvsolve order` prints them and says what they are."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from pytest import approx
 from truth import pulses, scenes
 from truth.order_json import call, studies
 
+from fvsolve.studies import order
+
 SPACE = {"upwind": 1, "linear-upwind": 2, "fromm": 2, "central": 2, "upwind3": 3, "upwind5": 5, "muscl": 2, "weno5": 5}
 
 
 @pytest.mark.parametrize(("scheme", "p"), SPACE.items())
-def test_every_scheme_shows_its_order_against_the_exact_solution(scheme, p, capsys, tmp_path):
-    cells = {1: "160", 5: "40"}.get(p, "80")
-    [found] = studies(capsys, tmp_path, pulses.case(), "--scheme", scheme, "--cells", cells, "--levels", "4")
+def test_every_scheme_shows_its_order_against_the_exact_solution(scheme, p):
+    cells = {1: 160, 5: 40}.get(p, 80)
+    case = pulses.case(points=pulses.FINE if p == 5 else pulses.FEW)
+    found = order(case, scheme=scheme, cells=cells, levels=4).plain()
     assert found["reference"]["kind"] == "exact" and found["scheme"] == scheme
     for variable in ("pressure", "flow"):
         fit = found["fits"][variable]["L1"]
@@ -28,15 +31,16 @@ TIME = {"euler": 1, "ssp-rk2": 2, "ssp-rk3": 3, "rk4": 4, "implicit-euler": 1, "
 
 
 @pytest.mark.parametrize(("method", "p"), TIME.items())
-def test_every_method_shows_its_order_in_time_on_one_grid(method, p, capsys, tmp_path):
-    case, levels = pulses.case(20, courant=0.4), "6" if p == 1 else "4"
-    [found] = studies(capsys, tmp_path, case, "--method", method, "--refine", "time", "--levels", levels)
+def test_every_method_shows_its_order_in_time_on_one_grid(method, p):
+    points = pulses.FINE if p == 4 else pulses.FEW
+    case, levels = pulses.case(20, courant=0.4, points=points), 6 if p == 1 else 4
+    found = order(case, method=method, refine="time", levels=levels).plain()
     assert found["reference"]["kind"] == "finer" and found["measure"] == "step [s]"  # exact only in space and time
     fit = found["fits"]["pressure"]["L2"]
     assert fit["order"] == approx(p, abs=0.15) and abs(fit["order"] - p) <= max(fit["spread"], 0.05)
-    assert [row["cells"] for row in found["rows"]] == [20] * int(levels)
+    assert [row["cells"] for row in found["rows"]] == [20] * levels
     steps = [row["step"] for row in found["rows"]]
-    assert [a / b for a, b in zip(steps, steps[1:], strict=False)] == approx([2.0] * (int(levels) - 1))
+    assert [a / b for a, b in zip(steps, steps[1:], strict=False)] == approx([2.0] * (levels - 1))
 
 
 @pytest.mark.parametrize(("scheme", "p"), [("upwind", 1), ("upwind3", 3), ("upwind5", 5), ("weno5", 5)])
@@ -78,7 +82,7 @@ def test_cell_time_is_a_resolution_of_the_pipes_that_state_no_cells(capsys, tmp_
 
 
 def test_settings_that_leave_no_exact_solution_are_said(capsys, tmp_path):
-    case = pulses.case()
+    case = pulses.case(points=pulses.FEW)
     words = ("--set", "links.main.minor_loss=2", "--levels", "3", "--scheme", "upwind3")
     [found] = studies(capsys, tmp_path, case, *words)
     assert found["reference"]["kind"] == "finer" and any("[exact]" in note for note in found["notes"])
@@ -134,7 +138,7 @@ def test_the_table_picture_and_sheet_say_the_same(capsys, tmp_path):
 
 
 def test_too_few_rows_give_no_number(capsys, tmp_path):
-    [found] = studies(capsys, tmp_path, pulses.case(), "--levels", "2")
+    [found] = studies(capsys, tmp_path, pulses.case(points=pulses.FEW), "--levels", "2")
     for fits in found["fits"].values():
         assert all(fit["order"] is None and fit["reason"] for fit in fits.values())
 
@@ -149,5 +153,5 @@ def test_a_failed_row_is_a_row_with_its_reason(capsys, tmp_path):
 
 
 def test_a_name_that_is_asked_for_twice_is_studied_once(capsys, tmp_path):
-    found = studies(capsys, tmp_path, pulses.case(), "--method", "rk4,rk4, rk4", "--levels", "2")
+    found = studies(capsys, tmp_path, pulses.case(points=pulses.FEW), "--method", "rk4,rk4, rk4", "--levels", "2")
     assert [one["method"] for one in found] == ["rk4"]

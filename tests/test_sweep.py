@@ -115,6 +115,7 @@ def test_ctrl_c_breaks_off_the_runs_of_other_processes_and_keeps_what_is_finishe
         while not kept.exists() or len(kept.read_text().splitlines()) < 2:
             assert running.poll() is None, running.communicate()
             time.sleep(0.01)
+        time.sleep(0.3)  # it counts a row after it has kept it
         send(running.pid, signal.SIGINT)
         err = running.communicate(timeout=30)[1]  # ends where no process holds the pipe any more
     finally:

@@ -68,8 +68,8 @@ def lower(schedule) -> np.ndarray:
     from scipy.interpolate import PchipInterpolator
 
     c = PchipInterpolator(t, v).c
-    inner = [[t[k], 0, t[k], c[3, k], c[2, k], c[1, k], c[0, k]] for k in range(len(t) - 1)]
-    return np.array([*hold, *inner, *last])
+    inner = np.column_stack([t[:-1], np.zeros(len(t) - 1), t[:-1], *c[::-1]])
+    return np.concatenate([hold, inner, last])
 
 
 def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
