@@ -10,6 +10,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import THIN
 from fvsolve.kernels.plane.diffusion import scalar_sources
+from fvsolve.kernels.plane.patches import counted, weight
 from fvsolve.kernels.records import (
     CELL_SCALAR,
     I_BASINS,
@@ -26,6 +27,8 @@ from fvsolve.kernels.records import (
     SHALLOW_FACES,
 )
 from fvsolve.kernels.schedules import schedule_value
+
+LEAST = 1e-12  # what a dry cell counts by in the value at a patch [m]
 
 
 @njit
@@ -44,18 +47,20 @@ def cell_value(tables, basin, q, y, i):
 
 @njit
 def patch_values(t, y, dydt, out, handle):
-    """Value of every scalar at every patch: the mean of the cells behind it, by their areas."""
+    """Value of every scalar at every patch: the mean of what leaves the cells behind it, or of dry ones by area."""
     tables = open_tables(handle)
     nodes, value = tables[I_NODES].size, tables[I_LAYOUT][0]["value"]
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         basin = tables[I_BASINS][patch["basin"]]
         for q in range(tables[I_SCALARS].size):
-            total = 0.0
+            water, total, held = basin["kind"] <= SHALLOW_FACES, 0.0, 0.0
             for m in range(patch["count"]):
                 i = tables[I_INTEGERS][patch["first"] + m]
-                total += tables[I_PLANE][basin["area"] + i] * cell_value(tables, basin, q, y, i)
-            out[value + q * nodes + patch["node"]] = total / patch["area"]
+                part = tables[I_PLANE][basin["area"] + i]
+                part *= max(weight(tables[I_PLANE], basin, True, i, y), LEAST) if water else 1.0
+                total, held = total + part, held + part * cell_value(tables, basin, q, y, i)
+            out[value + q * nodes + patch["node"]] = held / total
 
 
 @njit
@@ -188,10 +193,14 @@ def bring(tables, patch, basin, q, y, rate, out):
     layout, nodes, rho = tables[I_LAYOUT][0], tables[I_NODES].size, tables[I_SETTINGS][0]["rho"]
     node = patch["node"]
     made_up = out[layout["gain"] + q * nodes + node]
-    flow = (out[layout["net"] + node] + out[layout["supply"] + node]) / (rho * patch["area"])  # [m/s] of depth
-    brought = (out[layout["brought"] + q * nodes + node] + made_up) / (rho * patch["area"])
-    leaves = min(flow, 0.0)
-    even = brought - leaves * out[layout["value"] + q * nodes + node]
+    flow = min(out[layout["net"] + node] + out[layout["supply"] + node], 0.0) / (rho * counted(tables, patch, True, y))
+    brought, plane = (out[layout["brought"] + q * nodes + node] + made_up) / rho, tables[I_PLANE]
+    for m in range(patch["count"] if flow < 0.0 else 0):
+        i = tables[I_INTEGERS][patch["first"] + m]
+        gone = flow * weight(plane, basin, True, i, y) * cell_value(tables, basin, q, y, i)
+        rate[i] += gone
+        brought -= plane[basin["area"] + i] * gone
+    brought /= counted(tables, patch, False, y)
     for m in range(patch["count"]):
         i = tables[I_INTEGERS][patch["first"] + m]
-        rate[i] += even + leaves * cell_value(tables, basin, q, y, i)
+        rate[i] += brought * weight(plane, basin, False, i, y)

@@ -13,6 +13,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.friction import FASTEST
+from fvsolve.kernels.plane.patches import counted, weight
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     CARRIED_GRID,
@@ -114,18 +115,20 @@ def patch_loss(tables, patch, flow, y):
         tables[I_PLANE],
         tables[I_INTEGERS],
     )
-    n, o, lost, away = basin["n"], basin["y"], 0.0, -flow / patch["length"]
+    n, o, lost, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
     depths, area = plane[basin["plan"] :], plane[basin["area"] :]
+    each = flow / counted(tables, patch, leaves, y)
     for m in range(patch["count"]):
         i = integers[patch["first"] + m]
         share = per_flow(max(depths[i] + y[o + i], 0.0))
         square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
-        lost += 0.5 * area[i] * square * flow / patch["area"]
+        lost += 0.5 * area[i] * square * each * weight(plane, basin, leaves, i, y)
     for m in range(patch["faces"]):
         i, at, many = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
         depth = max(depths[i] + y[o + i], 0.0)
         share, wide = per_flow(depth), plane[at + 2 * many + m] * area[i]
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
+        away = -each * weight(plane, basin, leaves, i, y) * patch["area"] / patch["length"]
         along = u * plane[at + m] + v * plane[at + many + m]
         held = away - st["rho"] * depth * along  # against a wall all that runs into it is lost
         lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * held

@@ -24,7 +24,7 @@ from fvsolve.kernels.records import (
 from fvsolve.kernels.restrictions import head_drop
 
 SHALLOW = 1e-3  # depth behind a patch below which no more than a share of what is asked can leave [m]
-HARDLY = 1e-6  # share of the cells behind a patch below which its surface turns to the lowest one's
+HARDLY = 1e-9  # volume behind a patch, over its area, below which its surface turns to the lowest one's [m]
 
 
 @njit
@@ -45,38 +45,59 @@ def to_be_had(depth):
 
 
 @njit
-def share_of(plane, basin, i, y):
-    """Share of its outflow that cell i of a basin of water can give."""
-    return to_be_had(plane[basin["plan"] + i] + y[basin["y"] + i])
+def depth_behind(plane, basin, i, y):
+    """Depth of cell i of a basin of water."""
+    return max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+
+
+@njit
+def weight_out(depth):
+    """What a cell counts by in what leaves: its depth, so that all leaves at one speed, but for what it has not."""
+    return depth * to_be_had(depth)
+
+
+@njit
+def weight(plane, basin, leaves, i, y):
+    """What cell i counts by in what leaves or enters by a patch [m]; of what enters a dry cell gets that of a film."""
+    depth = depth_behind(plane, basin, i, y)
+    return weight_out(depth) if leaves else max(depth, SHALLOW)
+
+
+@njit
+def counted(tables, patch, leaves, y):
+    """Sum of area times `weight` of the cells behind a patch [m3], never nothing."""
+    basin, plane, total = tables[I_BASINS][patch["basin"]], tables[I_PLANE], 0.0
+    for m in range(patch["count"]):
+        i = tables[I_INTEGERS][patch["first"] + m]
+        total += plane[basin["area"] + i] * weight(plane, basin, leaves, i, y)
+    return max(total, HARDLY * patch["area"])
 
 
 @njit
 def water_behind(tables, patch, y):
-    """(rise of the surface, depth, area, sum of area times share squared, least depth) of the cells behind a patch.
+    """(rise of the surface, depth, volume, sum of area times weight squared) of the cells behind a patch.
 
-    Cells count by their area times the share of an outflow that they can give, so that a dry bank is no water. The
-    rise is from the surface at rest, where all is dry from the lowest bed; the least depth is that of cells with water.
+    Cells count by their area times `weight_out`, so that a dry bank is no water; the volume is the sum. The rise is
+    from the surface at rest, where all is dry from the lowest bed.
     """
     basin, plane = tables[I_BASINS][patch["basin"]], tables[I_PLANE]
-    n, plan, low, lowest, least = basin["n"], basin["plan"], inf, 0.0, inf
+    n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
     for m in range(patch["count"]):
         i = tables[I_INTEGERS][patch["first"] + m]
         bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
-        if plane[plan + i] + y[basin["y"] + i] > 0.0:
-            least = min(least, plane[plan + i] + y[basin["y"] + i])
         if bed < low:
             low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
-    rest, rise, depth, wet, squares = max(low, 0.0), 0.0, 0.0, 0.0, 0.0
+    rest, rise, depth, volume, squares = max(low, 0.0), 0.0, 0.0, 0.0, 0.0
     for m in range(patch["count"]):
         i = tables[I_INTEGERS][patch["first"] + m]
-        share, d = share_of(plane, basin, i, y), y[basin["y"] + i]
-        weight = plane[basin["area"] + i] * share
-        wet, squares = wet + weight, squares + weight * share
-        rise += weight * (plane[plan + n + i] + d - rest)
-        depth += weight * (plane[plan + i] + d)
-    hardly = max(HARDLY * patch["area"] - wet, 0.0)
-    total = wet + hardly
-    return (rise + hardly * (lowest - rest)) / total, depth / total, wet, squares, least
+        h = depth_behind(plane, basin, i, y)
+        part = plane[basin["area"] + i] * weight_out(h)
+        volume, squares = volume + part, squares + part * weight_out(h)
+        rise += part * (plane[plan + n + i] + y[basin["y"] + i] - rest)
+        depth += part * h
+    hardly = max(HARDLY * patch["area"] - volume, 0.0)
+    total = volume + hardly
+    return (rise + hardly * (lowest - rest)) / total, depth / total, volume, squares
 
 
 @njit
@@ -89,10 +110,10 @@ def patch_pressures(t, y, dydt, out, handle):
         basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
         water = basin["kind"] <= SHALLOW_FACES
         if water:
-            stored, depth, wet, squares, least = water_behind(tables, patch, y)
+            stored, depth, volume, squares = water_behind(tables, patch, y)
             slope, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
             pressure = slope * stored
-            spread = patch["area"] * squares / (wet * wet) if wet > HARDLY * patch["area"] else 1.0
+            spread = patch["area"] * squares / (volume * volume) if volume > HARDLY * patch["area"] else 1.0
             slope, had = slope * spread, to_be_had(depth)
         else:
             stored, had = mean_deviation(tables, patch, y), 1.0
@@ -184,27 +205,23 @@ def shallow_patch(tables, patch, asked, y, dydt, out):
     st, layout, integers, plane = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_INTEGERS], tables[I_PLANE]
     basin, rho = tables[I_BASINS][patch["basin"]], st["rho"]
     n, o, first = basin["n"], basin["y"], patch["first"]
-    _, depth, given, _, least = water_behind(tables, patch, y)
-    share, wet, even = 1.0, max(given, HARDLY * patch["area"]), given < HARDLY * patch["area"] and asked > 0.0
-    if even:  # all is dry
-        wet = patch["area"]
-    if asked < 0.0:
-        share = to_be_had(depth)  # the rest comes from outside
-        out[RATE] = max(out[RATE], -1.5 * asked * share / (rho * wet * max(least, SHALLOW)))  # 1.5, its steepest slope
-        share *= given / wet
-        wet = given
-    supply = (share - 1.0) * asked
-    out[layout["supply"] + patch["node"]] += supply
-    flow = (asked + supply) / (rho * wet) if wet > 0.0 else 0.0  # [m/s] of depth
+    _, depth, volume, _ = water_behind(tables, patch, y)
+    leaves, had = asked < 0.0, 1.0
+    total = counted(tables, patch, leaves, y)
+    if leaves:
+        had = to_be_had(depth)  # the rest comes from outside
+        slope = -2.0 * asked * had * min(depth / SHALLOW, 1.0) / (rho * total)  # 2, more than that of `weight_out`
+        out[RATE] = max(out[RATE], slope)
+        out[layout["supply"] + patch["node"]] += (had * volume / total - 1.0) * asked
+    flow = had * asked / (rho * total)  # of depth, over weights [1/s]
     for m in range(patch["count"] if dydt.size > 0 else 0):
-        i = integers[first + m]
-        dydt[o + i] += flow * (1.0 if even else share_of(plane, basin, i, y))
-    per_width = -flow * patch["area"] / patch["length"]  # [m2/s]
+        dydt[o + integers[first + m]] += flow * weight(plane, basin, leaves, integers[first + m], y)
+    per_width = -flow * patch["area"] / patch["length"]  # over weights [m/s]
     for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
         k = integers[patch["ring"] + patch["faces"] + m]
-        out_per_width = per_width * (1.0 if even else share_of(plane, basin, k, y))
+        out_per_width = per_width * weight(plane, basin, leaves, k, y)
+        h = depth_behind(plane, basin, k, y)
         i, at, many = o + k, patch["normals"], patch["faces"]
-        h = max(plane[basin["plan"] + k] + y[i], 0.0)
         share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
         along_x, along_y = plane[at + m], plane[at + many + m]
         u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
