@@ -139,6 +139,40 @@ def test_what_leaves_by_an_open_side_is_no_mark():
     assert result.ledger["mass"]["by_node"]["pool.sea"] != 0.0 and result.marks == []
 
 
+@pytest.mark.parametrize("path", ["grid", "holes"])
+def test_what_is_the_same_everywhere_leaves_so_by_open_sides_and_drains(path):
+    """Its ledger is at round-off; other water comes in by the open side only where the flow turns."""
+    patches = {"sea": {"side": "east", "boundary": "open", "scalars": {"dye": 3.0}}, "drain": {"side": "south"}}
+    pool = basin(level=0.6, bed="0.1*y + 0.05*x", start={"level": "0.6 + 0.1*cos(pi*x/4)"}, patches=patches)
+    pool |= {"holes": HOLE} if path == "holes" else {}
+    tap = {"tap": valve("pool.drain", "below", 0.02)}
+    given = scene({"pool": pool, "below": reservoir(AMBIENT)}, tap, 4.0, STEPS, scalars={"dye": {"initial": 3.0}})
+    model, state = ended(given)
+    assert np.abs(model.basins[0].values(state.y)["dye"] - 3.0).max() < 1e-12
+    book = fvsolve.run(given).ledger
+    assert abs(book["dye"]["relative"]) < 1e-13 and book["dye"]["outflow"] == approx(3.0 * book["mass"]["outflow"])
+
+
+@pytest.mark.parametrize(
+    "method, apart", [("radau-iia-5", 1e-6), ("rodas-5p", 1e-6), ("tr-bdf2", 1e-4), ("auto", 1e-6)]
+)
+def test_implicit_steps_carry_scalars_of_water_as_explicit_ones_do(method, apart):
+    """With decay and diffusion, an open side, and a link that brings another value."""
+    patches = {"sea": {"side": "east", "boundary": "open"}, "in": {"side": "west", "span": [0.5, 1.0]}}
+    pool = basin(cells=[8, 4], level=0.6, bed="0.02*x", scalars={"dye": "x"}, patches=patches)
+    nodes = {"works": {"type": "inflow", "flow": 0.05, "scalars": {"dye": 9.0}}, "pool": pool}
+    links = {"feed": pipe("works", "pool.in", 5.0, 0.3, 50.0, 4)}
+    scalars = {"dye": {"decay": 0.1, "diffusivity": 1e-3}, "heat": {"initial": 2.0}}
+    probes = ["pool.dye@1,1", "pool.dye@3.9,1", "pool.heat@2,1"]
+    found = []
+    for numerics in ({"method": "rk4", "courant": 0.4}, {"method": method, "rtol": 1e-7}):
+        given = scene(nodes, links, 4.0, {"scheme": "upwind"} | numerics, probes, 4.0, scalars=scalars)
+        result = fvsolve.run(copy.deepcopy(given))
+        assert max(abs(result.ledger[name]["relative"]) for name in ("mass", "dye", "heat")) < 1e-11
+        found.append([*(result[probe][-1] for probe in probes), result.ledger["dye"]["decayed"]])
+    assert found[1] == approx(found[0], rel=apart)
+
+
 def test_a_plug_is_carried_through_a_channel_and_all_of_it_is_booked():
     """Given velocity 0.5 m/s: what came in at 1 for 2 s stands between 1 m and 2 m of 4 m after 4 s."""
     inlet = {"time": [0.0, 2.0], "value": [1.0, 0.0], "kind": "step"}

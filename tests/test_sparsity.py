@@ -12,7 +12,6 @@ from truth.random_networks import random_network
 from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
-from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
 from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
@@ -67,10 +66,6 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme, law):
 @pytest.mark.parametrize("path", CASES, ids=lambda p: p.stem)
 def test_shipped_cases_keep_to_their_pattern(path):
     model, rng = fvsolve.build(fvsolve.load(path)), np.random.default_rng(0)
-    if path.stem == "tracer-basin":
-        with pytest.raises(FvsolveError, match="cannot be linearised yet"):
-            _ = model.structure
-        return
     for t in (0.0, 0.5 * model.case.numerics.end):
         assert stray(model, t, random_state(model, rng)) < 1e-7
 
@@ -80,6 +75,27 @@ def test_what_is_carried_keeps_to_its_pattern_beside_sides_and_corners_too(schem
     settings = {"nodes.sheet.cells": [14, 12], "numerics.scheme": scheme}
     model, rng = fvsolve.build(fvsolve.load(CASES[0].parent / "swirl.toml", settings)), np.random.default_rng(0)
     assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+@pytest.mark.parametrize("physics", ["free-surface", "transport"])
+def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(physics, scheme):
+    patches = {"out": {"side": "east", "boundary": "open"}, "in": {"side": "west", "span": [0.5, 1.5]}}
+    pool = {"type": "basin", "size": [10, 2], "cells": [10, 8], "patches": patches}
+    nodes, links = {"pool": pool}, {}
+    if physics == "transport":
+        pool |= {"physics": physics, "velocity": {"u": "where(abs(y - 1) < 0.5, 0.1*y, 0)"}}
+    else:
+        pool |= {"level": 0.6, "bed": "0.005*x", "manning": 0.01}
+        nodes["works"], links["feed"] = {"type": "inflow", "flow": 0.02}, pipe("works", "pool.in", 5.0, 0.3, 50.0, 4)
+    dyes = {"dye": {"decay": 0.01, "diffusivity": 1e-3}, "heat": {"decay": 0.1}}
+    implicit = {"scheme": scheme, "method": "radau-iia-5", "step": 0.1}
+    given = scene(nodes, links, 1.0, implicit, scalars=dyes)
+    if not links:
+        del given["links"]
+    model = fvsolve.build(fvsolve.load(given))
+    y = model.start + model.scale * np.random.default_rng(0).normal(scale=0.05, size=model.y_size)
+    assert stray(model, 0.2, y) < 1e-7 and stray(model, 0.2, model.start) < 1e-7
 
 
 def test_a_pipe_couples_no_more_than_its_scheme_reads():
