@@ -42,14 +42,14 @@ class Field:
         """(rates, greatest rate); work starts as NaN, so that what is read before it is written shows."""
         work, found = np.full(shallow_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
         rate = shallow_faces.shallow_rates(
-            G, scheme, limiter, self.floats, self.integers, reflect, plan, *y, flow, work, *found
+            G, scheme, limiter, self.floats, self.integers, reflect, plan, *y, flow, NONE, work, *found
         )
         return found, rate
 
     def liquid(self, law, scheme, y, reflect=NONE, limiter=VAN_LEER, table=None):
         work, found = np.full(liquid_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
         return found, liquid_faces.liquid_rates(
-            law, C, RHO, table, scheme, limiter, self.floats, self.integers, reflect, *y, work, *found
+            law, C, RHO, table, scheme, limiter, self.floats, self.integers, reflect, *y, NONE, work, *found
         )
 
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, limiter=VAN_LEER):

@@ -316,6 +316,7 @@ PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW =
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
+GIVEN_FLOW = 22  # of a patch that a given velocity passes
 
 SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, LIQUID_GRID, LIQUID_FACES = range(5)
 TABLE_GRID, TABLE_FACES, CARRIED_GRID, CARRIED_FACES = range(5, 9)
@@ -337,7 +338,8 @@ BASIN = np.dtype(
         ("area", "i8"),  # of cells [m2]
         ("reflect", "i8"),  # what comes back of waves, a value for each face of the boundary
         ("outer_given", "i8"),  # how many values these are: 0 for walls everywhere
-        ("open", "i8"),  # node of the first patch that is no wall, to whom what passes is booked; -1 for none
+        ("through", "i8"),  # flows inward through faces of the boundary; -1 where none is open
+        ("unused", "i8"),  # rates that only tell what passes it
         ("mesh", "i8"),  # numbers of a mesh, in `plane` and
         ("links", "i8"),  # in `integers`
         ("work", "i8"),

@@ -114,6 +114,8 @@ BASINS = {  # kind of basin
     LIQUID_FACES: Room(after="plane.rooms: liquid_meshes"),
     TABLE_GRID: Room(after="plane.table_rooms: table_grids"),
     TABLE_FACES: Room(after="plane.table_rooms: table_meshes"),
+    CARRIED_GRID: Room(observe="plane.carried: observe_given_flows"),
+    CARRIED_FACES: Room(observe="plane.carried: observe_given_flows"),
 }
 ALWAYS = Room(record="observer: record_nodes", events="observer: tank_events")
 
@@ -161,7 +163,7 @@ class Scene:
         if self.memory:
             yield ROOMS["memory" if linear else "memory, barotropic"]
         for kind in self.basins:
-            yield BASINS.get(kind, Room())
+            yield BASINS[kind]
         flowing = any(kind not in (CARRIED_GRID, CARRIED_FACES) for kind in self.basins)
         if self.basins:
             yield ROOMS["basins"]

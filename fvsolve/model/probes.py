@@ -23,6 +23,10 @@ def lower_probes(scene) -> np.ndarray:
         elif probe.part == "nodes" and probe.quantity == "flow":
             row["index"], row["kind"] = scene.node_index[probe.name], rec.PATCH_FLOW
             row["scale"] = 1.0 / scene.fluid.density
+            basin = scene.case.places[probe.name].basin
+            if scene.case.nodes[basin].physics == "transport":
+                patches = scene.patch_table["node"].tolist()
+                row["index"], row["kind"] = patches.index(row["index"]), rec.GIVEN_FLOW
         elif probe.quantity in scene.case.scalars:
             scalar_probe(scene, row, probe, name)
         elif name in scene.device_names and probe.quantity in scene.device_of(name).quantities:

@@ -86,12 +86,19 @@ class Couplings:
             yield from self.remembered(pipe)
         for basin in self.basins:
             yield pattern.inside(basin)
-            if basin.row["open"] >= 0:
-                yield every(states(self.size + basin.row["open"]), pattern.of_cells(basin, pattern.at_openings(basin)))
+        yield from self.passing()
         yield from self.stored()
         yield from self.rigid()
         yield from self.moving()
         yield from self.driven()
+
+    def passing(self) -> Iterator[Pairs]:
+        """What passes an open patch, on the cells there."""
+        for i, row in self.patches.items():
+            basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
+            if row["open"]:
+                cells = pattern.about(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
+                yield every(states(self.size + i), pattern.of_cells(basin, cells))
 
     # nodes ------------------------------------------------------------------------------------------------------
 

@@ -93,7 +93,7 @@ class Carriage:
     def passing(self, basin) -> Iterator[Pairs]:
         """What passes the open boundary of a basin, booked to its patches, on the cells there."""
         nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
-        if basin.row["open"] >= 0:
+        if basin.row["through"] >= 0:
             behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
             cells = pattern.about(pattern.looked_at(basin), np.concatenate(behind))
             felt = states(pattern.amounts(basin, self.q, cells), pattern.of_cells(basin, cells))

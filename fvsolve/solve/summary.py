@@ -134,7 +134,7 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the contents."""
     nodes = model.tables[rec.I_NODES]
     initial, change = model.contents(y)
-    passes = {int(basin.row["open"]) for basin in model.basins}  # patches where what passes is booked
+    passes = {int(row["node"]) for row in model.tables[rec.I_PATCHES] if row["open"]}
     named = list(zip(range(len(nodes)), model.node_names, ledger, nodes, strict=True))
     tanks = [(x, row["full"]) for i, _, x, row in named if row["kind"] in (rec.TANK, rec.PATCH) and i not in passes]
     spilled = sum(-x for x, full in tanks if x < 0 and full < np.inf)

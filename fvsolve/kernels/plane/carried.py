@@ -10,9 +10,10 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import THIN
 from fvsolve.kernels.plane.diffusion import scalar_sources
-from fvsolve.kernels.plane.patches import counted, weight
+from fvsolve.kernels.plane.patches import counted, through_patch, weight
 from fvsolve.kernels.records import (
     CELL_SCALAR,
+    GIVEN_FLOW,
     I_BASINS,
     I_FLOATS,
     I_INTEGERS,
@@ -77,6 +78,18 @@ def observe_values(t, y, out, handle, values):
 
 
 @njit
+def observe_given_flows(t, y, out, handle, values):
+    """values[k] of every probe of what a given velocity brings in through a patch [m3/s]."""
+    tables = open_tables(handle)
+    for k in range(tables[I_PROBES].size):
+        if tables[I_PROBES][k]["kind"] == GIVEN_FLOW:
+            patch = tables[I_PATCHES][tables[I_PROBES][k]["index"]]
+            basin, values[k] = tables[I_BASINS][patch["basin"]], 0.0
+            if patch["open"] == 1:
+                values[k] = turned(t, basin) * basin["thickness"] * through_patch(tables, patch)
+
+
+@njit
 def put_outside(t, tables, patch, basin, q):
     """Fill the values of a scalar beyond the faces of a patch, its initial one where nothing is said."""
     schedule = tables[I_INTEGERS][patch["values"] + q]
@@ -86,20 +99,6 @@ def put_outside(t, tables, patch, basin, q):
     for m in range(patch["faces"]):
         k = tables[I_INTEGERS][patch["ring"] + m]
         tables[I_PLANE][basin["outside"] + q * basin["outer"] + k] = value
-
-
-@njit
-def flow_in(plane, basin, k):
-    """Flow inward through face k of the boundary."""
-    nx, ny, at = basin["nx"], basin["ny"], basin["flows"]
-    if basin["faces"] > 0:  # a mesh of any cells
-        return -plane[at + basin["faces"] - basin["outer"] + k]
-    if k < ny:
-        return plane[at + k * (nx + 1)]
-    if k < 2 * ny:
-        return -plane[at + (k - ny) * (nx + 1) + nx]
-    up = at + ny * (nx + 1)
-    return plane[up + k - 2 * ny] if k < 2 * ny + nx else -plane[up + ny * nx + k - 2 * ny - nx]
 
 
 @njit
@@ -149,7 +148,7 @@ def settle_amounts(t, y, dydt, out, handle):
 def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
     """Add to rates what decays and what links bring; book these, and what passes the boundary."""
     scalar, patches, n = tables[I_SCALARS][q], tables[I_PATCHES], basin["n"]
-    if basin["open"] >= 0:
+    if basin["through"] >= 0:
         book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
     if scalar["decay"] > 0.0:
         area = tables[I_PLANE][basin["area"] : basin["area"] + n]
@@ -170,14 +169,14 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
     lies, gained = tables[I_LAYOUT][0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
         gained += plane[basin["area"] + i] * rate[i]
-    last, most = basin["open"], 0.0
+    last, most = -1, -1.0
     for p in range(patches.size):
         if patches[p]["basin"] != b or patches[p]["open"] == 0:
             continue
         into, away = 0.0, 0.0
         for m in range(patches[p]["faces"]):
             k = tables[I_INTEGERS][patches[p]["ring"] + m]
-            flow = factor * flow_in(plane, basin, k)
+            flow = factor * plane[basin["through"] + k]
             into += max(flow, 0.0) * outside[k]
             away -= min(flow, 0.0)
         out[lies + patches[p]["node"]] = per * into

@@ -69,6 +69,13 @@ def gather(values, where, out):
 
 
 @njit
+def put_inward(edges, number, flux, length, through):
+    """What comes in through the boundary at its sides `edges`, all of one number of a block, from fluxes outward."""
+    for q in range(edges.size):
+        through[number[q]] = -flux[edges[q] % BLOCK] * length[number[q]]
+
+
+@njit
 def sides_of_three(p, wide, cap, beyond, geo, out):
     """Limited values at three sides of a block of cells, from those beyond.
 

@@ -144,6 +144,13 @@ def send_back(reflect, leaving, entering):
 
 
 @inner
+def put_inward(k, entering, leaving, inward):
+    """What comes in through a side's faces, of waves; k : 1 / lengths of faces."""
+    for i in range(inward.size):
+        inward[i] = (entering[i] - leaving[i]) / k[i]
+
+
+@inner
 def put_waves(half, r, m, forward, backward):
     """Both waves of a row of cells; half : c / 2."""
     for i in range(r.size):
@@ -188,12 +195,13 @@ def work_size(nx, ny):
 
 
 @njit
-def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, work, rate_r, rate_x, rate_y):
+def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y):
     """Rates of all cells; returns the greatest c (kx + ky) [1/s].
 
     c : wave speed [m/s]; small : a flow density too small to mean anything, squared [kg2/(m4 s2)]
     kx, ky : float64[nx], float64[ny]  1/width of columns, 1/height of rows [1/m]
     reflect : float64[2 (nx + ny)]  share of a wave that a side sends back: west, east, south, north; empty: walls
+    through : float64[2 (nx + ny)]  what comes in through faces of the boundary [kg/(m s)], in that order, or empty
     work : float64[work_size(nx, ny)]
     """
     wide, f = nx + 2 * BEYOND, nx + 1
@@ -222,6 +230,8 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, wo
                 fe[0] = reflect[rows] * fw[0]
             if to_e != WALLS:
                 fw[nx] = reflect[ny + rows] * fe[nx]
+            if through.size > 0:
+                through[rows], through[ny + rows] = (fe[0] - fw[0]) / ky[rows], (fw[nx] - fe[nx]) / ky[rows]
             settle_row(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
@@ -246,6 +256,10 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, wo
             send_back(south, fd, fu)
         if j == ny and to_n != WALLS:
             send_back(north, fu, fd)
+        if through.size > 0 and j == 0:
+            put_inward(kx, fu, fd, through[2 * ny : 2 * ny + nx])
+        if through.size > 0 and j == ny:
+            put_inward(kx, fd, fu, through[2 * ny + nx :])
         if j > 0:
             a, z = (j - 1) * nx, j * nx
             settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])

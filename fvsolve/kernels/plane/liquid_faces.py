@@ -24,6 +24,7 @@ from fvsolve.kernels.plane.faces import (
     edges_before,
     gather,
     place,
+    put_inward,
     put_sides,
     width,
 )
@@ -31,10 +32,10 @@ from fvsolve.kernels.plane.liquid_log import log_sum
 from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
-# rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step
-_U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE = (k * BLOCK for k in range(1, 10))
+# rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step, flow through the side
+_U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-ROWS = 10
+ROWS = 11
 
 
 @njit
@@ -91,6 +92,7 @@ def settle_linear(c0, wl, ul, vl, geo, w):
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         push = reach * (c0 * (forward + backward))
         w[_RR + i] -= reach * (forward - backward)
+        w[_MASS + i] = forward - backward
         w[_RX + i] -= push * nx
         w[_RY + i] -= push * ny
         w[_FAST + i] += reach * c0
@@ -118,6 +120,7 @@ def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w):
         w[_RX + i] -= reach * (push * nx - along * ny)
         w[_RY + i] -= reach * (push * ny + along * nx)
         w[_FAST + i] += reach * (abs(u0[i] * nx + v0[i] * ny) + c[i])
+        w[_MASS + i] = mass
 
 
 @njit
@@ -144,7 +147,7 @@ def work_size(integers):
 
 @njit
 def liquid_rates(
-    law, c0, rho, table, scheme, limiter, floats, integers, reflect, r, mx, my, work, rate_r, rate_x, rate_y
+    law, c0, rho, table, scheme, limiter, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
 ):
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
@@ -153,14 +156,15 @@ def liquid_rates(
     scheme, limiter : UPWIND, or MUSCL as in `faces.width`
     reflect : float64[b]  share of a wave that comes back, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
+    through : float64[b]  what comes in through the boundary [kg/(m s)], or empty
     work : float64[work_size(integers)]
     """
-    slots, n, b, ring = integers[0], integers[1], integers[3], integers[4]
+    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
     m = count * slots * BLOCK
     at, to = HEAD + INDICES * m // 2, MEASURES * m
     need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
-    bx, by = floats[to : to + b], floats[to + b : to + 2 * b]
+    bx, by, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
     places = integers[HEAD:].view(np.int32)
     near, wide = ring * BLOCK, 4 * ring * BLOCK
     p, u, v, c = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
@@ -203,6 +207,8 @@ def liquid_rates(
                 settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w)
             else:
                 settle_linear(c0, ps[own:], us[own:], vs[own:], geo, w)
+            if through.size > 0:
+                put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
         put_rates(w, rate_r[first:last], rate_x[first:last], rate_y[first:last])
     most = 0.0
     for i in range(BLOCK):

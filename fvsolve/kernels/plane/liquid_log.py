@@ -33,6 +33,7 @@ from fvsolve.kernels.plane.liquid import (
     side_of,
     value_upwind5,
 )
+from fvsolve.kernels.plane.shallow import put_inward
 from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import LINEAR, MINMOD, UPWIND, VAN_LEER, WENO5
@@ -155,7 +156,7 @@ def work_size(nx, ny):
 
 @njit
 def grid_rates(
-    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, work, rate_r, rate_x, rate_y
+    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
 ):
     """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
@@ -197,6 +198,8 @@ def grid_rates(
                 fw[nx] = reflect[ny + rows] * fe[nx]
             faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
             fluxes(c0, rho, table, fe, fw, ft)
+            if through.size > 0:
+                through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
             settle_row(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
@@ -227,6 +230,10 @@ def grid_rates(
             across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
         )
         fluxes(c0, rho, table, gu, gd, gt)
+        if through.size > 0 and j == 0:
+            put_inward(1.0, kx, gu, through[2 * ny : 2 * ny + nx])
+        if through.size > 0 and j == ny:
+            put_inward(-1.0, kx, gu, through[2 * ny + nx :])
         if j > 0:
             a, z = (j - 1) * nx, j * nx
             settle_column(

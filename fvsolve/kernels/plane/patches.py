@@ -129,14 +129,21 @@ def patch_pressures(t, y, dydt, out, handle):
 
 
 @njit
-def book_open(tables, basin, per, dydt, out):
-    """What passes the open boundary of a basin is what its contents gain before links bring any."""
-    if basin["open"] >= 0:
-        n, gained = basin["n"], 0.0
-        area, rate = tables[I_PLANE][basin["area"] : basin["area"] + n], dydt[basin["y"] : basin["y"] + n]
-        for i in range(n):
-            gained += area[i] * rate[i]
-        out[tables[I_LAYOUT][0]["supply"] + basin["open"]] += per * gained
+def through_patch(tables, patch):
+    """What flows in through all faces of a patch."""
+    through, total = tables[I_BASINS][patch["basin"]]["through"], 0.0
+    for m in range(patch["faces"]):
+        total += tables[I_PLANE][through + tables[I_INTEGERS][patch["ring"] + m]]
+    return total
+
+
+@njit
+def book_open(tables, b, per, out):
+    """Book what passes the open boundary of a basin, to each patch its own."""
+    patches = tables[I_PATCHES]
+    for k in range(patches.size):
+        if patches[k]["basin"] == b and patches[k]["open"] == 1:
+            out[tables[I_LAYOUT][0]["supply"] + patches[k]["node"]] = per * through_patch(tables, patches[k])
 
 
 @njit

@@ -34,8 +34,14 @@ def through_faces(kx, ky, flow_x, flow_y):
             flow_y[j * nx + i] *= wide
 
 
+@njit(forceinline=True)
+def wanted(basin, dydt):
+    """Whether its rates are asked for, or what they say of flows through open patches."""
+    return dydt.size > 0 or basin["through"] >= 0
+
+
 @njit
-def finish_water(tables, b, rate, depth, dh, qx, qy, dydt, rate_x, rate_y, out):
+def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
     """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
     st, basin = tables[I_SETTINGS][0], tables[I_BASINS][b]
     if basin["friction"] != NO_DRAG:
@@ -44,7 +50,7 @@ def finish_water(tables, b, rate, depth, dh, qx, qy, dydt, rate_x, rate_y, out):
             basin["friction"], st["gravity"], roughness, FASTEST, depth, dh, qx, qy, rate_x, rate_y
         )  # fmt: skip
         out[RATE] = max(out[RATE], fades)
-    book_open(tables, basin, st["rho"], dydt, out)
+    book_open(tables, b, st["rho"], out)
     out[RATE] = max(out[RATE], basin["unsplit"] * rate)
 
 
@@ -53,26 +59,29 @@ def shallow_grids(t, y, dydt, out, handle):
     """Rates of water on grids."""
     tables = open_tables(handle)
     st, plane = tables[I_SETTINGS][0], tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+    for b in range(tables[I_BASINS].size):
         basin = tables[I_BASINS][b]
-        if basin["kind"] != SHALLOW_GRID:
+        if basin["kind"] != SHALLOW_GRID or not wanted(basin, dydt):
             continue
         n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
-        nx, ny = basin["nx"], basin["ny"]
+        nx, ny, through = basin["nx"], basin["ny"], basin["through"]
         plan, many = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n)), ny * (nx + 1)
         flow_x, flow_y = plane[:0], plane[:0]
         if f >= 0:  # scalars are carried by them
             flow_x, flow_y = plane[f : f + many], plane[f + many : f + many + (ny + 1) * nx]
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        rate_x, rate_y = dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n]
+        rates = dydt[o : o + 3 * n]
+        if dydt.size == 0:
+            rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+        rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         rate = shallow.grid_rates(
             st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
-            plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
+            plane[through : through + basin["outer_given"]], plane[basin["work"] :], rates[:n], rate_x, rate_y,
         )  # fmt: skip
         if f >= 0:
             through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
-        finish_water(tables, b, rate, plan[0], dh, qx, qy, dydt, rate_x, rate_y, out)
+        finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
 
 
 @njit
@@ -80,34 +89,44 @@ def acoustic_grids(t, y, dydt, out, handle):
     """Rates of a liquid under law linear on grids."""
     tables = open_tables(handle)
     plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+    for b in range(tables[I_BASINS].size):
         basin = tables[I_BASINS][b]
-        if basin["kind"] != ACOUSTIC_GRID:
+        if basin["kind"] != ACOUSTIC_GRID or not wanted(basin, dydt):
             continue
         n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
+        through = basin["through"]
+        rates = dydt[o : o + 3 * n]
+        if dydt.size == 0:
+            rates = plane[basin["unused"] : basin["unused"] + 3 * n]
         rate = liquid.grid_rates(
             basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
             plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
-            dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
+            plane[through : through + basin["outer_given"]], plane[basin["work"] :],
+            rates[:n], rates[n : 2 * n], rates[2 * n :],
         )  # fmt: skip
-        book_open(tables, basin, basin["thickness"], dydt, out)
+        book_open(tables, b, basin["thickness"], out)
         out[RATE] = max(out[RATE], rate)
 
 
 @njit
-def full_grid(tables, basin, table, y, dydt, out):
+def full_grid(tables, b, table, y, dydt, out):
     """Rates of a liquid with the full momentum flux on a grid, of its waves or, with no table, under law log."""
-    plane = tables[I_PLANE]
+    plane, basin = tables[I_PLANE], tables[I_BASINS][b]
     n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
+    through = basin["through"]
+    rates = dydt[o : o + 3 * n]
+    if dydt.size == 0:
+        rates = plane[basin["unused"] : basin["unused"] + 3 * n]
     rate = liquid_log.grid_rates(
         basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], nx, ny,
         plane[k : k + nx], plane[k + nx : k + nx + ny],
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
-        dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
+        plane[through : through + basin["outer_given"]], plane[basin["work"] :],
+        rates[:n], rates[n : 2 * n], rates[2 * n :],
     )  # fmt: skip
-    book_open(tables, basin, basin["thickness"], dydt, out)
+    book_open(tables, b, basin["thickness"], out)
     out[RATE] = max(out[RATE], rate)
 
 
@@ -115,9 +134,9 @@ def full_grid(tables, basin, table, y, dydt, out):
 def liquid_grids(t, y, dydt, out, handle):
     """Rates of a liquid under law log on grids."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        if tables[I_BASINS][b]["kind"] == LIQUID_GRID:
-            full_grid(tables, tables[I_BASINS][b], None, y, dydt, out)
+    for b in range(tables[I_BASINS].size):
+        if tables[I_BASINS][b]["kind"] == LIQUID_GRID and wanted(tables[I_BASINS][b], dydt):
+            full_grid(tables, b, None, y, dydt, out)
 
 
 @njit
@@ -125,38 +144,45 @@ def shallow_meshes(t, y, dydt, out, handle):
     """Rates of water on meshes of any cells."""
     tables = open_tables(handle)
     st, plane, integers = tables[I_SETTINGS][0], tables[I_PLANE], tables[I_INTEGERS]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+    for b in range(tables[I_BASINS].size):
         basin = tables[I_BASINS][b]
-        if basin["kind"] != SHALLOW_FACES:
+        if basin["kind"] != SHALLOW_FACES or not wanted(basin, dydt):
             continue
-        n, o, at, f = basin["n"], basin["y"], basin["plan"], basin["flows"]
+        n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
         plan = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n))
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        rate_x, rate_y = dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n]
+        rates = dydt[o : o + 3 * n]
+        if dydt.size == 0:
+            rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+        rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         flow = plane[:0]
         if f >= 0:  # scalars are carried by them
             flow = plane[f : f + basin["faces"]]
         rate = shallow_faces.shallow_rates(
             st["gravity"], basin["scheme"], basin["limiter"], plane[basin["mesh"] :], integers[basin["links"] :],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
-            plane[basin["work"] :], dydt[o : o + n], rate_x, rate_y,
+            plane[through : through + basin["outer_given"]], plane[basin["work"] :], rates[:n], rate_x, rate_y,
         )  # fmt: skip
-        finish_water(tables, b, rate, plan[0], dh, qx, qy, dydt, rate_x, rate_y, out)
+        finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
 
 
 @njit
-def liquid_mesh(tables, basin, table, y, dydt, out):
+def liquid_mesh(tables, b, table, y, dydt, out):
     """Rates of a liquid on a mesh, of its waves or, with no table, under laws linear and log."""
-    plane, integers = tables[I_PLANE], tables[I_INTEGERS]
-    n, o = basin["n"], basin["y"]
+    plane, integers, basin = tables[I_PLANE], tables[I_INTEGERS], tables[I_BASINS][b]
+    n, o, through = basin["n"], basin["y"], basin["through"]
+    rates = dydt[o : o + 3 * n]
+    if dydt.size == 0:
+        rates = plane[basin["unused"] : basin["unused"] + 3 * n]
     rate = liquid_faces.liquid_rates(
         tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
         plane[basin["mesh"] :],
         integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n], plane[basin["work"] :],
-        dydt[o : o + n], dydt[o + n : o + 2 * n], dydt[o + 2 * n : o + 3 * n],
+        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
+        plane[through : through + basin["outer_given"]], plane[basin["work"] :],
+        rates[:n], rates[n : 2 * n], rates[2 * n :],
     )  # fmt: skip
-    book_open(tables, basin, basin["thickness"], dydt, out)
+    book_open(tables, b, basin["thickness"], out)
     out[RATE] = max(out[RATE], rate)
 
 
@@ -164,6 +190,6 @@ def liquid_mesh(tables, basin, table, y, dydt, out):
 def liquid_meshes(t, y, dydt, out, handle):
     """Rates of a liquid on meshes of any cells, under laws linear and log."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        if tables[I_BASINS][b]["kind"] == LIQUID_FACES:
-            liquid_mesh(tables, tables[I_BASINS][b], None, y, dydt, out)
+    for b in range(tables[I_BASINS].size):
+        if tables[I_BASINS][b]["kind"] == LIQUID_FACES and wanted(tables[I_BASINS][b], dydt):
+            liquid_mesh(tables, b, None, y, dydt, out)

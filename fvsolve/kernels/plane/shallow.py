@@ -52,6 +52,13 @@ def copy(source, target):
 
 
 @njit
+def put_inward(turn, k, flux, inward):
+    """Flows through a row of faces; turn : 1 or -1 for fluxes inward or outward, k : 1 / lengths of faces."""
+    for i in range(inward.size):
+        inward[i] = turn * flux[i] / k[i]
+
+
+@njit
 def place(j, i):
     """Where cell i of row j is in the ring."""
     return (j & (RING - 1)) * BLOCK + GHOSTS + i
@@ -87,8 +94,9 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
 
 @njit
 def grid_rates(
-    g, scheme, limiter, nx, ny, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, work, rate_h, rate_x, rate_y
-):
+    g, scheme, limiter, nx, ny, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h, rate_x,
+    rate_y,
+):  # fmt: skip
     """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
@@ -97,14 +105,15 @@ def grid_rates(
     plan : float64[PLANS, n], depth of the profile at rest and its surface less the level [m]
     dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
+    through : float64[2 (nx + ny)]  flows inward through faces of the boundary [m3/s], in the order of reflect, or empty
     work : float64[WORK], fastest where it begins at a cache line
     """
     most = 0.0
     for first in range(0, nx, MOST):
         last = min(first + MOST, nx)
         rate = column_rates(
-            g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, work,
-            rate_h, rate_x, rate_y,
+            g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
+            work, rate_h, rate_x, rate_y,
         )  # fmt: skip
         most = max(most, rate)
     return most
@@ -112,8 +121,8 @@ def grid_rates(
 
 @njit
 def column_rates(
-    g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, work,
-    rate_h, rate_x, rate_y,
+    g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
+    work, rate_h, rate_x, rate_y,
 ):  # fmt: skip
     """The same of columns `first` to `last`, no more than MOST of them, row by row."""
     n, fifth = last - first, scheme == LINEAR or scheme == WENO5
@@ -151,6 +160,9 @@ def column_rates(
         put_fluxes(g, n, NORTH, EAST, under, low, l, r, north)
         if flow_y.size > 0:
             copy(north, flow_y[j * nx + first : j * nx + last])
+        if through.size > 0 and (j == 0 or j == ny):
+            at = 2 * ny + first + (nx if j > 0 else 0)
+            put_inward(-1.0 if j > 0 else 1.0, kx[first:last], north, through[at : at + n])
         if j == 0:
             continue
         # row j - 1 : faces along it, and its rates
@@ -168,6 +180,10 @@ def column_rates(
         if flow_x.size > 0:
             at = (j - 1) * (nx + 1)
             copy(along, flow_x[at + first : at + last + 1])
+        if through.size > 0 and first == 0:
+            through[j - 1] = along[0] / ky[j - 1]
+        if through.size > 0 and last == nx:
+            through[ny + j - 1] = -along[n] / ky[j - 1]
         a, z = (j - 1) * nx + first, (j - 1) * nx + last
         put_rates(
             g, kx[first:last], ky[j - 1], ends[PUSH + 1 :], sides[was * SIDE + PUSH :], along, south, north,

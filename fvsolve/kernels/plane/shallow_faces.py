@@ -25,6 +25,7 @@ from fvsolve.kernels.plane.faces import (
     edges_before,
     gather,
     place,
+    put_inward,
     put_sides,
     width,
 )
@@ -138,13 +139,16 @@ def work_size(integers):
 
 
 @njit
-def shallow_rates(g, scheme, limiter, floats, integers, reflect, plan, dh, qx, qy, flow, work, rate_h, rate_x, rate_y):
+def shallow_rates(
+    g, scheme, limiter, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y
+):
     """Rates of all cells; returns the greatest of sum L (|u| + c) / (2 A) and of the share that leaves a cell [1/s].
 
     Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
     scheme, limiter : UPWIND, or MUSCL as in `faces.width`
     reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
     flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
+    through : float64[b]  volumes inward through the boundary [m3/s], or empty
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -202,6 +206,8 @@ def shallow_rates(g, scheme, limiter, floats, integers, reflect, plan, dh, qx, q
             settle(g, h[o:], e[o:], c[o:], hs[own:], es[own:], us[own:], vs[own:], geo, w)
             if flow.size > 0:
                 put_flow(faces[slot * BLOCK :], w, lengths, flow)
+            if through.size > 0:
+                put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
         quickest(w, top)
         put_rates(w, rate_h[first:last], rate_x[first:last], rate_y[first:last])
     most = 0.0

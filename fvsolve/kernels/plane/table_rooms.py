@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.patches import mean_deviation
-from fvsolve.kernels.plane.rooms import full_grid, liquid_mesh
+from fvsolve.kernels.plane.rooms import full_grid, liquid_mesh, wanted
 from fvsolve.kernels.plane.waves import pressure
 from fvsolve.kernels.records import (
     CELL_STATE,
@@ -24,20 +24,20 @@ from fvsolve.kernels.records import (
 def table_grids(t, y, dydt, out, handle):
     """Rates on grids."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+    for b in range(tables[I_BASINS].size):
         basin = tables[I_BASINS][b]
-        if basin["kind"] == TABLE_GRID:
-            full_grid(tables, basin, tables[I_PLANE][basin["table"] :], y, dydt, out)
+        if basin["kind"] == TABLE_GRID and wanted(basin, dydt):
+            full_grid(tables, b, tables[I_PLANE][basin["table"] :], y, dydt, out)
 
 
 @njit
 def table_meshes(t, y, dydt, out, handle):
     """Rates on meshes of any cells."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
+    for b in range(tables[I_BASINS].size):
         basin = tables[I_BASINS][b]
-        if basin["kind"] == TABLE_FACES:
-            liquid_mesh(tables, basin, tables[I_PLANE][basin["table"] :], y, dydt, out)
+        if basin["kind"] == TABLE_FACES and wanted(basin, dydt):
+            liquid_mesh(tables, b, tables[I_PLANE][basin["table"] :], y, dydt, out)
 
 
 @njit

@@ -117,6 +117,11 @@ class Basin:
         """What comes back of waves at a patch."""
         return 0.0 if patch.boundary == "open" else 1.0
 
+    def opens(self, patch: str) -> bool:
+        """Whether something passes a patch that no link brings."""
+        stated = self.part.patches.get(patch)
+        return stated is not None and self.reflection(stated) != 1.0
+
     def of(self, y: np.ndarray) -> np.ndarray:
         """Its deviations in the states of a model : float64[quantities, n]."""
         at = int(self.row["y"])
@@ -143,10 +148,10 @@ class Basin:
             row["links"] = len(scene.integers)
             scene.integers += self.integers.tolist()
         given = self.reflects()
-        row["reflect"], row["outer_given"], row["open"] = scene.to_plane(given), given.size, -1
-        if given.size:
-            known = (name for name, patch in self.part.patches.items() if self.reflection(patch) != 1.0)
-            row["open"] = scene.node_index[f"{self.name}.{next(known)}"]
+        row["reflect"], row["outer_given"] = scene.to_plane(given), given.size
+        row["outer"] = mesh.left.size - mesh.inner
+        row["through"] = scene.to_plane(np.zeros(given.size)) if given.size else -1
+        row["unused"] = scene.to_plane(np.zeros(len(self.quantities) * self.n if given.size else 0))
         row["carried"] = row["flows"] = -1
         self.lower(scene, row)
         if self.scalars:
@@ -163,9 +168,7 @@ class Basin:
     def lower_scalars(self, scene, row) -> None:
         """Reserve what scalars are carried by and in, and values beyond the boundary."""
         mesh, grid = self.mesh, self.mesh.grid
-        outer = mesh.left.size - mesh.inner
-        row["outside"] = scene.to_plane(np.zeros(len(self.scalars) * outer))
-        row["outer"] = outer
+        row["outside"] = scene.to_plane(np.zeros(len(self.scalars) * int(row["outer"])))
         if self.is_grid:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
             toil = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
@@ -219,7 +222,7 @@ class Basin:
         row["length"] = length.sum()
         row["normals"] = scene.to_plane(np.array([*self.mesh.normal[own].T, length / self.mesh.area[behind_faces]]))
         stated = self.part.patches.get(patch)
-        row["open"] = self.part.physics == "transport" or (stated is not None and self.reflection(stated) != 1.0)
+        row["open"] = self.opens(patch)
         given = stated.scalars if stated is not None else {}
         row["values"] = len(scene.integers)
         scene.integers += [scene.schedules.add(given[name]) if name in given else -1 for name in self.scalars]

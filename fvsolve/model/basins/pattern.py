@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array, eye_array, kron
 
 from fvsolve.kernels import records as rec
 
-REACH = {rec.UPWIND: 1, rec.MUSCL: 2}  # cells either way; fifth order looks at three
+REACH, FIFTH = {rec.UPWIND: 1, rec.MUSCL: 2}, 3  # cells either way; fifth order looks at three
 
 
 def inside(basin) -> tuple[np.ndarray, np.ndarray]:
@@ -48,16 +48,9 @@ def amounts(basin, q: int, cells: np.ndarray) -> np.ndarray:
     return int(basin.row["carried"]) + q * basin.n + cells
 
 
-def at_openings(basin) -> np.ndarray:
-    """Cells that what passes the open boundary hangs on."""
-    patches = (name for name, patch in basin.part.patches.items() if basin.reflection(patch) != 1.0)
-    behind = [basin.mesh.left[basin.mesh.patch(name)] for name in patches]
-    return about(neighbours(basin), np.concatenate(behind or [np.zeros(0, np.int64)]))
-
-
 def about(near: csr_array, cells: np.ndarray) -> np.ndarray:
-    """Cells that look at some cells, and those."""
-    return np.flatnonzero(near[:, np.unique(cells)].sum(axis=1))
+    """Cells that some cells look at, themselves among them."""
+    return np.unique(near[np.unique(cells)].indices)
 
 
 def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
@@ -68,12 +61,16 @@ def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndar
 
 def neighbours(basin) -> csr_array:
     """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
-    found = csr_array(eye_array(basin.n, dtype=bool))
+    found, reach = csr_array(eye_array(basin.n, dtype=bool)), REACH.get(int(basin.row["scheme"]), FIFTH)
+    edge = np.unique(basin.mesh.left[basin.mesh.inner :])
+    if reach < FIFTH or basin.row["kind"] <= rec.SHALLOW_FACES or not basin.row["outer_given"]:
+        edge = edge[:0]
+    beside = csr_array(coo_array((np.ones(edge.size, dtype=bool), (edge, edge)), shape=found.shape))
     for ring in rings(basin):
         reached = ring
-        for _ in range(REACH.get(int(basin.row["scheme"]), 3) - 1):
+        for _ in range(reach - 1):
             reached = reached @ ring
-        found = found + reached
+        found = found + reached + beside @ reached @ ring  # a wave leaves a liquid on a polynomial of five cells
     return csr_array(found, dtype=bool)
 
 

@@ -31,7 +31,7 @@ class Transport(Basin, physics="transport"):
             through = np.bincount(mesh.left, np.abs(flows), self.n)
             through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
             row["fastest"] = (0.5 * through / mesh.area).max()
-        passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
+        self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
             at = mesh.middle[own[np.argmax(flows[own] != 0.0)]]
@@ -39,7 +39,11 @@ class Transport(Basin, physics="transport"):
             scene.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
             scene.check()
         if passing:
-            row["open"] = scene.node_index[f"{self.name}.{passing[0]}"]
+            inward = -flows[mesh.inner :]
+            row["through"] = scene.to_plane(inward[self.ring()] if self.is_grid else inward)
+
+    def opens(self, patch: str) -> bool:
+        return patch in self.passing
 
     def flows(self, scene) -> np.ndarray:
         """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
