@@ -50,6 +50,9 @@ class Loop:
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
         self.orders[told.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
         self.orders[told.STOP_AT], self.orders[told.LEAPS] = NO_LIMIT, leaps
+        opened = model.tables[rec.I_BASINS]["open"] >= 0  # what passes there is what rates make of the contents
+        flows = model.tables[rec.I_PROBES]["kind"] == rec.PATCH_FLOW
+        self.orders[told.RATED] = opened.any() and flows.any()
         for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)

@@ -82,7 +82,7 @@ def march(
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
-    rhs(t, y, dydt, out, handle) with an empty dydt computes `out` alone, which is all that a row wants;
+    rhs(t, y, dydt, out, handle) with an empty dydt computes `out` alone, all that a row wants where no probe is RATED;
     leap(t, h, y, y_new, out, handle, values), where orders[LEAPS] allows it, is a whole step to t of a method of one
     stage, with the `out` and the record of its end: taken wherever no row is due;
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
@@ -129,7 +129,7 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
-                    y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows,
+                    y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, y[3], rows,
                 )  # fmt: skip
                 if why != DONE:
                     return why

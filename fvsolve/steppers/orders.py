@@ -8,12 +8,12 @@ COUNTS = {
     "steps": STEPS, "rejections": REJECTIONS, "rhs": CALLS, "jacobians": JACOBIANS, "factorisations": FACTORS,
     "newton": NEWTON, "newton_failures": NEWTON_FAILURES,
 }  # fmt: skip
-# What a call is told.
-START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
+# What a call is told; RATED: whether probes want rates too.
+START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS, RATED = range(12)
 # Power of h of the error estimate; whether the last stage is the next first; the kind of step; whether stiffness is
 # watched, and then the price of an implicit step in explicit ones.
-ORDER, FSAL, KIND, WATCH, PRICE = range(11, 16)
-ORDERS = 16
+ORDER, FSAL, KIND, WATCH, PRICE = range(12, 17)
+ORDERS = 17
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
 # Why a call came back.

@@ -9,6 +9,7 @@ from fvsolve.steppers.orders import (
     FIELD_EVERY,
     NEXT_FIELD,
     NEXT_OUTPUT,
+    RATED,
     ROWS,
     ROWS_FULL,
     START,
@@ -44,9 +45,12 @@ def next_due(orders, memory, times):
 
 @njit
 def emit(
-    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
+    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, spare, rows,
 ):  # fmt: skip
-    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
+    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full.
+
+    spare : float64[n], for rates, which some probes hang on
+    """
     t, h = memory[T], memory[T] - t_old
     while True:
         row = row_due(orders, memory, times)
@@ -57,7 +61,7 @@ def emit(
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
         interpolate((due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
-        rhs(due, y_out, y_out[:0], out, handle)
+        rhs(due, y_out, spare if orders[RATED] == 1.0 else spare[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
             observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
