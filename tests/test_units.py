@@ -80,7 +80,8 @@ PINT_SI = {
     "m/s": "meter/second", "m/s2": "meter/second**2", "kg/m3": "kilogram/meter**3", "Pa s": "pascal*second",
     "K": "kelvin", "-": "dimensionless", "m2/s": "meter**2/second", "kg": "kilogram",
     "kg/s": "kilogram/second",
-    "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "rad": "radian",
+    "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "1/s": "1/second", "rad": "radian",
+    "Pa s/m": "pascal*second/meter",
     "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2", "C": "coulomb", "F": "farad",
 }  # fmt: skip
 
