@@ -433,3 +433,113 @@ def test_what_a_mesh_leaves_unsaid_is_noted(tmp_path):
 
 def test_a_summary_counts_the_cells_of_basins():
     assert fvsolve.run(draining([], 0.2)).summary["cells"] == 160
+
+
+# open sides and what is said of a basin ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("physics", ["free-surface", "liquid"])
+def test_rows_hold_what_passes_an_open_side(physics, tmp_path):
+    """What flows through the open side between two rows is what the contents gain between them."""
+    sea = {"sea": {"side": "west", "boundary": "open"}}
+    if physics == "liquid":
+        case = liquid(["block.sea.flow"], size=[1.0, 0.2], cells=[20, 2], patches=sea, start={"pressure": "1e5*x"})
+        case["output"]["every"] = 2e-6
+    else:
+        case = draining(["pool.sea.flow"], 2.0, {"every": 0.01}, patches=sea, start={"level": "2 - 0.01*x"})
+        case["links"], case["nodes"] = {}, {"pool": case["nodes"]["pool"]}
+    found = fvsolve.run(case)
+    flow = found["pool.sea.flow" if physics == "free-surface" else "block.sea.flow"]
+    assert np.ptp(flow[1:-1]) > 0.1 * np.abs(flow).max() > 0.0
+    booked = found.summary["ledgers"]["mass"]["by_node"]
+    assert RHO * np.trapezoid(flow, found.t) == approx(next(iter(booked.values())), rel=2e-3)
+
+
+def sheet(**more) -> dict:
+    """A uniform stream that carries a dye along."""
+    one = {"type": "basin", "physics": "transport", "size": [2.0, 1.0], "cells": [16, 8], "scalars": {"dye": "x"},
+           "velocity": {"expression": "constant", "u": "40 cm/s", "v": 0.0}, **more}  # fmt: skip
+    ends = {"in": {"side": "west", "scalars": {"dye": 0.0}}, "out": {"side": "east"}}
+    case = scene({"sheet": one | {"patches": ends}}, {}, 0.5, PLANE, ["sheet.dye@1,0.5"], 0.1)
+    case["scalars"] = {"dye": {"unit": "g/l", "decay": "1800 1/h"}}
+    return case
+
+
+def test_a_line_has_scalars_and_a_velocity_by_name_its_parameters(tmp_path):
+    """c = (x - u t) exp(-decay t) away from the inlet, decay 1800 1/h."""
+    case = sheet()
+    case["numerics"]["courant"] = 0.2
+    case["output"] |= {
+        "fields": 1,
+        "lines": {"mid": {"basin": "sheet", "from": [1, 0.5], "to": [1.5, 0.5], "points": 3}},
+    }
+    fvsolve.run(case, out=tmp_path / "run")
+    rows = list(csv.reader((tmp_path / "run/lines/mid-000001.csv").read_text().splitlines()))
+    assert rows[0] == ["distance [m]", "x [m]", "y [m]", "dye [g/l]"]
+    for _, x, _, dye in rows[1:]:
+        assert float(dye) == approx((float(x) - 0.4 * 0.5) * np.exp(-0.25), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "velocity, said",
+    [
+        ({"expression": "swirl", "speed": "fast"}, 'nodes.sheet.velocity.speed: "fast" is no number with a unit'),
+        ({"expression": "shear", "rate": 1, "y1": 0}, 'velocity "shear" has no y1; it takes rate, u, y0'),
+        ({"stream": "y", "u": 1}, "nodes.sheet.velocity: has stream, u; wanted { u, v } or { stream }"),
+        (
+            {"expression": "rotation", "centre": [0], "angular_velocity": 1},
+            "nodes.sheet.velocity.centre: [0] has 1 values",
+        ),
+    ],
+)
+def test_a_velocity_that_is_none(velocity, said):
+    with pytest.raises(FvsolveError) as caught:
+        fvsolve.build(fvsolve.load(sheet(velocity=velocity)))
+    assert said in str(caught.value)
+
+
+def test_quantities_of_a_basin():
+    plain = liquid([], size=[1.0, 1.0], cells=[2, 2], start={"pressure": 1e5, "u": 0.5, "v": "2*x"},
+                   patches={"soft": {"side": "west", "impedance": 2e6}})  # fmt: skip
+    named = json.loads(json.dumps(plain))
+    named["nodes"]["block"] |= {"start": {"pressure": "1 bar", "u": "50 cm/s", "v": "2*x"},
+                                "patches": {"soft": {"side": "west", "impedance": "2 MPa s/m"}}}  # fmt: skip
+    one, other = (fvsolve.load(case).nodes["block"] for case in (plain, named))
+    assert one.patches["soft"].impedance == other.patches["soft"].impedance == 2e6
+    at = np.array([0.3]), np.array([0.4])
+    for field in ("pressure", "u", "v"):
+        assert getattr(one.start, field).at(*at) == approx(getattr(other.start, field).at(*at), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"level": "two"}, "nodes.pool.level"),
+        ({"holes": "none"}, "nodes.pool.holes"),
+        ({"bed": "0.5*(y"}, 'nodes.pool.bed: "0.5*(y" is no formula of x and y: a bracket is left open'),
+        ({"bed": "0.5*y)"}, "a bracket is closed that was not opened"),
+        ({"bed": "2*x y"}, '"2*x y" is no formula of x and y: invalid syntax'),
+        ({"bed": {"file": "bed.csv"}}, 'nodes.pool.bed.file: bed.csv, line 4: "1,0,deep"; wanted x [m], y [m]'),
+    ],
+)
+def test_a_fault_in_a_basin_comes_once(changes, said, tmp_path):
+    (tmp_path / "bed.csv").write_text("x,y,z\n# metres\n0,0,0\n1,0,deep\n0,1,0\n")
+    case = draining(["pool.outlet.flow", "pool.depth@1,1"], **changes)
+    case["output"]["lines"] = {"middle": {"basin": "pool", "from": [0, 2], "to": [10, 2]}}
+    case["expect"] = {"max(pool.outlet.flow)": {"value": 0.0, "atol": 1.0}}
+    if "bed" in changes and isinstance(changes["bed"], dict):
+        case["nodes"]["pool"]["bed"] = {"file": str(tmp_path / "bed.csv")}
+    with pytest.raises(CaseError) as caught:
+        fvsolve.load(case)
+    assert len(caught.value.faults) == 1 and said in str(caught.value)
+
+
+def test_check_names_the_valve_that_sets_the_step():
+    """Between equal levels the slope of a valve's flow is great; a small valve sets nothing."""
+    nodes = {"pool": pool(), "pond": {"type": "tank", "area": 2.0, "level": 2.0}}
+    case = scene(nodes, {"sluice": valve("pool.outlet", "pond", 0.5)}, 1.0, PLANE, [], 0.1)
+    checks = fvsolve.build(fvsolve.load(case)).checks
+    assert checks["step_set_by"].startswith("links.sluice: ") and checks["step"] < 1e-4
+    case["links"]["sluice"]["area"] = 1e-5
+    checks = fvsolve.build(fvsolve.load(case)).checks
+    assert checks["step_set_by"] == "one of pond, pool"

@@ -65,7 +65,8 @@ lbf s/in: pound_force*second/inch | m3/s/Pa: meter**3/second/pascal | l/s/bar: l
 l/min/bar: liter/minute/bar | L/min/bar: liter/minute/bar | ml/min/bar: milliliter/minute/bar
 cm3/s/bar: centimeter**3/second/bar | cm3/min/bar: centimeter**3/minute/bar | J: joule
 kJ: kilojoule | MJ: megajoule | kWh: kilowatt_hour | W: watt | kW: kilowatt | MW: megawatt
-hp: horsepower | Hz: 1/second | kHz: 1000/second | 1/s: 1/second | rad: radian | deg: degree
+hp: horsepower | Hz: 1/second | kHz: 1000/second | 1/s: 1/second | 1/min: 1/minute | 1/h: 1/hour | 1/day: 1/day
+Pa s/m: pascal*second/meter | rad: radian | deg: degree
 rad/s: radian/second | rpm: revolution/minute | RPM: revolution/minute | N m: newton*meter
 Nm: newton*meter | kN m: kilonewton*meter | kNm: kilonewton*meter | lbf ft: pound_force*foot
 lbf in: pound_force*inch | kg m2: kilogram*meter**2 | kgm2: kilogram*meter**2 | g m2: gram*meter**2
@@ -79,7 +80,8 @@ PINT_SI = {
     "m/s": "meter/second", "m/s2": "meter/second**2", "kg/m3": "kilogram/meter**3", "Pa s": "pascal*second",
     "K": "kelvin", "-": "dimensionless", "m2/s": "meter**2/second", "kg": "kilogram",
     "kg/s": "kilogram/second",
-    "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "rad": "radian",
+    "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "1/s": "1/second", "rad": "radian",
+    "Pa s/m": "pascal*second/meter",
     "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2", "C": "coulomb", "F": "farad",
 }  # fmt: skip
 

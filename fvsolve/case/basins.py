@@ -90,6 +90,8 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
         pool, key = nodes.get(line.basin), ("output", "lines", name)
         if not re.fullmatch(r"[\w-]+", name):
             yield key, f"{show(name)} is no name; a name has letters, digits, _ and -"
+        if line.basin in nodes and pool is None:
+            continue  # at fault itself
         if not isinstance(pool, Pool):
             pools = [one for one, kind in nodes.items() if isinstance(kind, Pool)]
             yield (*key, "basin"), f"no basin named {show(line.basin)}; basins are {listing(pools) or 'none'}"

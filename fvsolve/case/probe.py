@@ -51,6 +51,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     part, name, quantity, place = match.groups()
     parts = [part] if part else [part for part in ("nodes", "links") if name in kinds[part]]
     parts = [part for part in parts if name in kinds[part]]
+    if not parts and kinds["nodes"].get(name.partition(".")[0], name) is None:
+        return None  # a patch of a basin that is at fault
     if not parts:
         names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
         what = {"nodes": "node", "links": "link"}.get(part or "", "part")

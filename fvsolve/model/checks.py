@@ -19,6 +19,8 @@ TRIED = 1e-3  # of what counts as a small deviation: the states whose rates are 
 LONG = 1e-3  # [s] that a timing takes at least
 SECONDS_PER_STEP = 5e-7  # beside the rates
 LOCAL = 0.05  # by which sound at a pressure may be quicker than at the reference, where the law is not linear
+QUICKER = 0.1  # share of the greatest rate that a valve must make to be what sets the step
+MOST_TRIED = 100
 STIFF = 3.0  # times as many steps as waves ask for: from there on an implicit method is worth a try
 
 
@@ -130,10 +132,27 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
+    valve, least = quick_valve(model, rate) if method_named(numerics.method).explicit else ("", rate)
+    if valve:
+        others = f", {rate / least:.3g} times quicker than all else" if least > 0.0 else ""
+        return numerics.courant / rate, f"links.{valve}: its flow answers at once to what it joins{others}"
     part = quick_parts(model) + (", quicker than every pipe cell" if len(own) else "")
     if len(own) and rate > STIFF * own.max():
         part += f', {rate / own.max():.3g} times; rtol with method = "rodas-5p" does not follow it'
     return numerics.courant / rate, part
+
+
+def quick_valve(model, rate: float) -> tuple[str, float]:
+    """The valve between two places that store without which the greatest rate is least, and that rate [1/s]."""
+    valves, found, least = model.tables[rec.I_VALVES], "", rate * (1 - QUICKER)
+    for k in np.flatnonzero((valves["solve"] == rec.ALONE) & (valves["device"] < 0))[:MOST_TRIED]:
+        size, valves["conductance"][k] = float(valves["conductance"][k]), 0.0
+        start = model.case.numerics.start
+        without = float(model.evaluate(start, model.start, start)[1][rec.RATE])
+        valves["conductance"][k] = size
+        if without < least:
+            found, least = model.valve_names[k], without
+    return found, least
 
 
 def velocities(model) -> np.ndarray:

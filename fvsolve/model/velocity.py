@@ -91,13 +91,13 @@ def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _by_name(mesh: Mesh, expression: str, **parameters) -> np.ndarray:
     if expression not in EXPRESSIONS:
         close = did_you_mean(str(expression), EXPRESSIONS)
-        raise ValueError(f'"{expression}" is no velocity{close}; there are {listing(EXPRESSIONS)}')
+        raise ValueError(f'"{expression}" is no velocity; there are {listing(EXPRESSIONS)}{close}')
     function = EXPRESSIONS[expression]
     known = dict(list(inspect.signature(function).parameters.items())[2:])
     for name in parameters:
         if name not in known:
             close = did_you_mean(name, known)
-            raise ValueError(f'velocity "{expression}" has no {name}{close}; it takes {listing(known)}')
+            raise ValueError(f'velocity "{expression}" has no {name}; it takes {listing(known)}{close}')
     missing = [name for name, p in known.items() if p.default is p.empty and name not in parameters]
     if missing:
         raise ValueError(f'velocity "{expression}" wants {listing(missing)} as well')

@@ -60,6 +60,8 @@ class Line:
         self.lost = np.array([one[0].size == 0 for one in read])
         self.columns = [Column(name, "length", "m") for name in ("distance", "x", "y")]
         self.columns += [column(name, dimension, case) for name, dimension in fields.items()]
+        labels = {name: scalar.unit for name, scalar in case.scalars.items()} if basin.scalars else {}
+        self.columns += [column(name, "number", case, label) for name, label in labels.items()]
 
     def text(self, fields: dict[str, np.ndarray]) -> str:
         """The file of a frame."""

@@ -41,7 +41,7 @@ class Patch(Table):
     ] = None
     boundary: Annotated[str | None, Choice("boundary", ("wall", "open"), "a wall if left out")] = None
     impedance: Annotated[
-        float | None, Quantity("number", nonnegative, "of the boundary to waves, pressure over velocity [Pa s/m]")
+        float | None, Quantity("impedance", nonnegative, "of the boundary to waves, pressure over velocity [Pa s/m]")
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars that the given velocity brings in")] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"),)
@@ -106,9 +106,9 @@ class Start(Table):
     """What a basin starts from where that is not rest."""
 
     level: Annotated[Formula | None, Shaped("length", "of the free surface above the elevation [m]")] = None
-    pressure: Annotated[Formula | None, Shaped("number", "of a liquid above that at rest [Pa]")] = None
-    u: Annotated[Formula, Shaped("number", "velocity along x [m/s]")] = even(0.0)
-    v: Annotated[Formula, Shaped("number", "velocity along y [m/s]")] = even(0.0)
+    pressure: Annotated[Formula | None, Shaped("pressure_drop", "of a liquid above that at rest [Pa]")] = None
+    u: Annotated[Formula, Shaped("velocity", "velocity along x [m/s]")] = even(0.0)
+    v: Annotated[Formula, Shaped("velocity", "velocity along y [m/s]")] = even(0.0)
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,16 @@ class Velocity:
         return self.said
 
 
+PARAMETERS: dict[str, Value] = {  # of velocities by name
+    "expression": Text(),
+    **dict.fromkeys(("u", "v", "speed"), Quantity("velocity")),
+    **dict.fromkeys(("size", "width", "height", "y0", "south", "north"), Quantity("length")),
+    **dict.fromkeys(("centre", "origin"), Rows("length", length=2)),
+    "angular_velocity": Quantity("angular_velocity"),
+    "rate": Quantity("rate"),
+}
+
+
 class Flowing(Value):
     """A velocity: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
 
@@ -137,8 +147,11 @@ class Flowing(Value):
         if isinstance(given, Velocity):
             return given
         ways = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
+        if "expression" in ways and not {"stream", "file"} & {*ways}:
+            ways = ["expression"]  # which may have parameters u and v
         if not ways or (len(ways) > 1 and ways != ["u", "v"]):
-            raise ValueError(f"{show(given)}; wanted {self.about}")
+            has = f"has {listing(given) or 'nothing'}" if isinstance(given, dict) else f"{show(given)} is no velocity"
+            raise ValueError(f"{has}; wanted {self.about}")
         found = {key: value for key, value in given.items() if key != "period"}
         period, said = None, dict(given)
         if "period" in given:
@@ -149,7 +162,18 @@ class Flowing(Value):
         if faults:
             raise Misfit(faults)
         if way in ("u, v", "stream"):
-            found = {key: Shaped("number").read(found.get(key, 0.0), setting) for key in known}
+            of = "number" if way == "stream" else "velocity"
+            found = {key: Shaped(of).read(found.get(key, 0.0), setting) for key in known}
+        elif way == "expression":
+            for key, one in found.items():
+                try:
+                    found[key] = PARAMETERS[key].read(one, setting) if key in PARAMETERS else one
+                except Misfit as error:
+                    faults += [((key, *below), message) for below, message in error.faults]
+                except ValueError as error:
+                    faults.append(((key,), str(error)))
+            if faults:
+                raise Misfit(faults)
         elif way == "file":
             said["file"] = File("").read(found["file"], setting)
             found = {"file": setting.files[said["file"]]}

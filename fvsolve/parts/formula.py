@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.series import copy_name, find_file
+from fvsolve.parts.series import copy_name, find_file, read_rows
 from fvsolve.parts.value import Misfit, Quantity, Range, Setting, Value, anything
 from fvsolve.units import show
 
@@ -72,7 +73,7 @@ class Shaped(Value):
         if not isinstance(given, str):
             return even(Quantity(self.dimension, self.range).read(given, setting))
         try:
-            return even(Quantity(self.dimension, self.range).read(given, setting))
+            return even(Quantity(self.dimension, self.range).read(plain(given), setting))
         except ValueError as error:
             if given[:1].isdigit() and not any(sign in given for sign in "*/+-()"):
                 raise
@@ -83,15 +84,27 @@ class Shaped(Value):
             raise ValueError(f'{show(given)}; wanted {{ file = "NAME.csv" }}, columns x, y and the value')
         try:
             path = find_file(given["file"], setting)
-            columns = np.genfromtxt(path, delimiter=",", skip_header=1, ndmin=2)
-            if columns.shape[1] != 3 or len(columns) < 3 or not np.isfinite(columns).all():
-                raise ValueError(f"{path.name}: wanted a header, and three rows at least of x [m], y [m] and the value")
+            columns = read_points(path)
         except ValueError as error:
             raise Misfit([(("file",), str(error))]) from None
         return Formula({"file": copy_name(path, setting)}, Samples(columns))
 
     def json(self) -> dict[str, Any]:
         return {"type": ["number", "string", "object"]}
+
+
+def read_points(path: Path) -> np.ndarray:
+    """Rows x [m], y [m], value below a header : float64[n, 3]; ValueError names the line at fault."""
+    _, rows = read_rows(path)
+    found = np.zeros((len(rows), 3))
+    for k, (number, row) in enumerate(rows):
+        values = [plain(one) for one in row]
+        if len(row) != 3 or not all(isinstance(one, float) and np.isfinite(one) for one in values):
+            raise ValueError(f"{path.name}, line {number}: {show(','.join(row))}; wanted x [m], y [m] and the value")
+        found[k] = values
+    if len(found) < 3:
+        raise ValueError(f"{path.name}: {len(found)} points; wanted three at least")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +121,32 @@ class Samples:
         return np.where(np.isnan(found), NearestNDInterpolator(places, values)(x, y), found)
 
 
+def plain(text: str) -> Any:
+    """A text that is a number alone, a formula too, as that number."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def open_bracket(text: str) -> str:
+    """What is wrong with the brackets of a text, "" where nothing is."""
+    depth = 0
+    for sign in text:
+        depth += (sign == "(") - (sign == ")")
+        if depth < 0:
+            return "a bracket is closed that was not opened"
+    return "a bracket is left open" if depth else ""
+
+
 def parsed(text: str, otherwise: str = "") -> Formula:
     """The formula of a text; ValueError where it says anything but arithmetic of x, y, pi and FUNCTIONS."""
     about = f"{show(text)} is no formula of x and y"
     try:
         tree = ast.parse(text.replace("^", "**"), mode="eval")
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        if any(sign in text for sign in "*+()"):  # no quantity
+            raise ValueError(f"{about}: {open_bracket(text) or getattr(error, 'msg', error)}") from None
         raise ValueError(otherwise or about) from None
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):

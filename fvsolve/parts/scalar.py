@@ -17,7 +17,7 @@ class Scalar(Table):
     unit: Annotated[str, Text("a label, for headers")] = "-"
     initial: Annotated[float, Number(about="wherever nothing else is said")] = 0.0
     diffusivity: Annotated[float, Quantity("diffusivity", nonnegative, "along pipes [m2/s]")] = 0.0
-    decay: Annotated[float, Number(nonnegative, "rate at which it falls to ambient [1/s]")] = 0.0
+    decay: Annotated[float, Quantity("rate", nonnegative, "at which it falls to ambient [1/s]")] = 0.0
     ambient: Annotated[float, Number(about="what it decays to")] = 0.0
 
 

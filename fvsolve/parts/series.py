@@ -46,7 +46,7 @@ def read_columns(
     `time` and `value` name columns by header, with or without the unit; None is the first and the second.
     Raises ValueError with the line of the file where one is at fault.
     """
-    header, rows = _read_rows(path)
+    header, rows = read_rows(path)
     time_column, value_column = _column(header, time, 0, path), _column(header, value, 1, path)
     t = _numbers(rows, time_column, header, "time", path, setting)
     v = _numbers(rows, value_column, header, dimension, path, setting)
@@ -57,7 +57,8 @@ def _neighbours(path: Path) -> list[str]:
     return [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
 
 
-def _read_rows(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+def read_rows(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header, and of each row its line and its cells; ValueError where there is neither."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:

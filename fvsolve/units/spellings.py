@@ -76,6 +76,8 @@ DIMENSIONS = {
     "energy": Dimension("an energy", "J", "3 J"),
     "power": Dimension("a power", "W", "3 kW"),
     "frequency": Dimension("a frequency", "Hz", "3 Hz"),
+    "rate": Dimension("a rate", "1/s", "0.5 1/day", base="frequency"),
+    "impedance": Dimension("an impedance", "Pa s/m", "1.5e6 Pa s/m"),
     "position": Dimension("a position", "m", "120 mm", base="length"),
     "stiffness": Dimension("a stiffness", "N/m", "50 N/mm"),
     "damping": Dimension("a damping", "N s/m", "200 N s/m"),
@@ -176,7 +178,8 @@ SPELLINGS: dict[str, dict[str, Any]] = {
     "force": {"N": 1, "kN": 1000, "MN": 10**6, "kgf": GRAVITY, "lbf": POUND_FORCE},
     "energy": {"J": 1, "kJ": 1000, "MJ": 10**6, "kWh": 3.6e6},
     "power": {"W": 1, "kW": 1000, "MW": 10**6, "hp": 550 * FOOT * POUND_FORCE},
-    "frequency": {"Hz": 1, "kHz": 1000, "1/s": 1},
+    "frequency": {"Hz": 1, "kHz": 1000, "1/s": 1, "1/min": (1, MINUTE), "1/h": (1, HOUR), "1/day": (1, DAY)},
+    "impedance": {"Pa s/m": 1},
     "stiffness": {
         "N/m": 1, "N/mm": 1000, "N/um": 10**6, "kN/m": 1000, "kN/mm": 10**6, "MN/m": 10**6,
         "lbf/in": POUND_FORCE / INCH,

@@ -103,6 +103,7 @@ def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outsi
     empty for the others, and gone where the diffusion was given the same work. The sum is that of rates times areas.
     """
     m, last = nx + 1, ny * nx
+    diffusivity = diffusivity if depth.size == 0 else 0.0
     for j in range(ny):
         for side in range(2):
             turn, face = (factor, j * m) if side == 0 else (-factor, j * m + nx)

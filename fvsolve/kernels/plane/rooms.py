@@ -40,6 +40,14 @@ def wanted(basin, dydt):
     return dydt.size > 0 or basin["through"] >= 0
 
 
+@njit(forceinline=True)
+def rates_of(plane, basin, dydt):
+    """Where rates of its cells go: into dydt or, where nobody asks for them, aside."""
+    at = basin["y"] if dydt.size > 0 else basin["unused"]
+    to = dydt if dydt.size > 0 else plane
+    return to[at : at + 3 * basin["n"]]
+
+
 @njit
 def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
     """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
@@ -70,9 +78,7 @@ def shallow_grids(t, y, dydt, out, handle):
         if f >= 0:  # scalars are carried by them
             flow_x, flow_y = plane[f : f + many], plane[f + many : f + many + (ny + 1) * nx]
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        rates = dydt[o : o + 3 * n]
-        if dydt.size == 0:
-            rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+        rates = rates_of(plane, basin, dydt)
         rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         rate = shallow.grid_rates(
             st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
@@ -95,9 +101,7 @@ def acoustic_grids(t, y, dydt, out, handle):
             continue
         n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
         through = basin["through"]
-        rates = dydt[o : o + 3 * n]
-        if dydt.size == 0:
-            rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+        rates = rates_of(plane, basin, dydt)
         rate = liquid.grid_rates(
             basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
             plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
@@ -115,9 +119,7 @@ def full_grid(tables, b, table, y, dydt, out):
     plane, basin = tables[I_PLANE], tables[I_BASINS][b]
     n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
     through = basin["through"]
-    rates = dydt[o : o + 3 * n]
-    if dydt.size == 0:
-        rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+    rates = rates_of(plane, basin, dydt)
     rate = liquid_log.grid_rates(
         basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], nx, ny,
         plane[k : k + nx], plane[k + nx : k + nx + ny],
@@ -151,9 +153,7 @@ def shallow_meshes(t, y, dydt, out, handle):
         n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
         plan = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n))
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        rates = dydt[o : o + 3 * n]
-        if dydt.size == 0:
-            rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+        rates = rates_of(plane, basin, dydt)
         rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         flow = plane[:0]
         if f >= 0:  # scalars are carried by them
@@ -171,9 +171,7 @@ def liquid_mesh(tables, b, table, y, dydt, out):
     """Rates of a liquid on a mesh, of its waves or, with no table, under laws linear and log."""
     plane, integers, basin = tables[I_PLANE], tables[I_INTEGERS], tables[I_BASINS][b]
     n, o, through = basin["n"], basin["y"], basin["through"]
-    rates = dydt[o : o + 3 * n]
-    if dydt.size == 0:
-        rates = plane[basin["unused"] : basin["unused"] + 3 * n]
+    rates = rates_of(plane, basin, dydt)
     rate = liquid_faces.liquid_rates(
         tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
         plane[basin["mesh"] :],
