@@ -9,8 +9,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import THIN
+from fvsolve.kernels.plane.behind import counted, through_patch, weight
 from fvsolve.kernels.plane.diffusion import scalar_sources
-from fvsolve.kernels.plane.patches import counted, through_patch, weight
 from fvsolve.kernels.records import (
     CELL_SCALAR,
     GIVEN_FLOW,

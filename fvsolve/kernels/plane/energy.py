@@ -12,8 +12,8 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.plane.behind import counted, weight
 from fvsolve.kernels.plane.friction import FASTEST
-from fvsolve.kernels.plane.patches import counted, weight
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     CARRIED_GRID,

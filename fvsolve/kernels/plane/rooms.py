@@ -40,14 +40,6 @@ def wanted(basin, dydt):
     return dydt.size > 0 or basin["through"] >= 0
 
 
-@njit(forceinline=True)
-def rates_of(plane, basin, dydt):
-    """Where rates of its cells go: into dydt or, where nobody asks for them, aside."""
-    at = basin["y"] if dydt.size > 0 else basin["unused"]
-    to = dydt if dydt.size > 0 else plane
-    return to[at : at + 3 * basin["n"]]
-
-
 @njit
 def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
     """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
@@ -78,7 +70,8 @@ def shallow_grids(t, y, dydt, out, handle):
         if f >= 0:  # scalars are carried by them
             flow_x, flow_y = plane[f : f + many], plane[f + many : f + many + (ny + 1) * nx]
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        rates = rates_of(plane, basin, dydt)
+        to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+        rates = to[first : first + 3 * n]
         rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         rate = shallow.grid_rates(
             st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
@@ -101,7 +94,8 @@ def acoustic_grids(t, y, dydt, out, handle):
             continue
         n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
         through = basin["through"]
-        rates = rates_of(plane, basin, dydt)
+        to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+        rates = to[first : first + 3 * n]
         rate = liquid.grid_rates(
             basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
             plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
@@ -119,7 +113,8 @@ def full_grid(tables, b, table, y, dydt, out):
     plane, basin = tables[I_PLANE], tables[I_BASINS][b]
     n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
     through = basin["through"]
-    rates = rates_of(plane, basin, dydt)
+    to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+    rates = to[first : first + 3 * n]
     rate = liquid_log.grid_rates(
         basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], nx, ny,
         plane[k : k + nx], plane[k + nx : k + nx + ny],
@@ -153,7 +148,8 @@ def shallow_meshes(t, y, dydt, out, handle):
         n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
         plan = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n))
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        rates = rates_of(plane, basin, dydt)
+        to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+        rates = to[first : first + 3 * n]
         rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         flow = plane[:0]
         if f >= 0:  # scalars are carried by them
@@ -171,7 +167,8 @@ def liquid_mesh(tables, b, table, y, dydt, out):
     """Rates of a liquid on a mesh, of its waves or, with no table, under laws linear and log."""
     plane, integers, basin = tables[I_PLANE], tables[I_INTEGERS], tables[I_BASINS][b]
     n, o, through = basin["n"], basin["y"], basin["through"]
-    rates = rates_of(plane, basin, dydt)
+    to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+    rates = to[first : first + 3 * n]
     rate = liquid_faces.liquid_rates(
         tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
         plane[basin["mesh"] :],
