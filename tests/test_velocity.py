@@ -126,7 +126,7 @@ def test_a_stream_function_from_a_file_leaves_no_divergence(tmp_path, mixed):
 @pytest.mark.parametrize(
     "velocity, words",
     [
-        ({"expression": "rotaton"}, 'no velocity; did you mean "rotation"'),
+        ({"expression": "rotaton"}, 'no velocity; there are .*; did you mean "rotation"'),
         ({"expression": "rotation", "centre": (0, 0)}, "wants angular_velocity as well"),
         ({"expression": "shear", "rate": 1.0, "slope": 2.0}, "has no slope; it takes rate, u, y0"),
         ({"expression": "swirl", "size": 0.0}, "not finite at"),
