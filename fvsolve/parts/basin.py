@@ -10,7 +10,7 @@ from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import Named, Table, at_most_one
+from fvsolve.parts.table import Named, Table, at_most_one, read_keys
 from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
 from fvsolve.units import show
 
@@ -165,15 +165,8 @@ class Flowing(Value):
             of = "number" if way == "stream" else "velocity"
             found = {key: Shaped(of).read(found.get(key, 0.0), setting) for key in known}
         elif way == "expression":
-            for key, one in found.items():
-                try:
-                    found[key] = PARAMETERS[key].read(one, setting) if key in PARAMETERS else one
-                except Misfit as error:
-                    faults += [((key, *below), message) for below, message in error.faults]
-                except ValueError as error:
-                    faults.append(((key,), str(error)))
-            if faults:
-                raise Misfit(faults)
+            own = {key: one for key, one in found.items() if key in PARAMETERS}
+            found |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
         elif way == "file":
             said["file"] = File("").read(found["file"], setting)
             found = {"file": setting.files[said["file"]]}
