@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pytest import approx
 from scipy.special import erfc
-from truth.carried import NONE, SCHEMES, Carried, carried, means
+from truth.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 
 from fvsolve.kernels.plane import diffusion
 from fvsolve.mesh import rectangle
@@ -221,7 +221,7 @@ def test_what_comes_in_through_the_boundary_is_what_there_is_more_inside(scheme,
             first, last = s.size + np.cumsum([0, case.flow_x.size])
             excesses = case.work[first:last], case.work[last : last + case.flow_y.size]
         size, flows = (case.nx, case.ny, case.kx, case.ky), (-0.7, case.flow_x, case.flow_y, case.depth, case.outside)
-        diffusion.ring_rates(*size, 0.01, *flows, *excesses, s, ring)
+        ring_rates(*size, 0.01, *flows, *excesses, s, ring)
         assert share.sum() == approx(ring.sum(), abs=1e-13 * np.abs(share).sum())
 
 
@@ -294,13 +294,12 @@ def test_the_rates_that_set_the_step_are_those_of_plain_grids():
     assert most == approx(2.0 * 0.1 * (1.0 / 0.5**2 + 1.0 / 0.25**2))
 
 
-def test_decay_leads_to_the_ambient_value_and_sources_are_added():
-    depth, s = np.array([1.0, 2.0, 0.0]), np.array([3.0, 4.0, 0.0])
-    rate, source = np.ones(3), np.array([0.0, 0.5, 0.0])
-    assert diffusion.scalar_sources(0.1, 2.0, depth, source, s, rate) == 0.1
-    assert rate == approx([1.0 - 0.1, 1.5, 1.0])
+def test_decay_leads_to_the_ambient_value():
+    depth, s, rate = np.array([1.0, 2.0, 0.0]), np.array([3.0, 4.0, 0.0]), np.ones(3)
+    diffusion.add_decay(0.1, 2.0, depth, s, rate)
+    assert rate == approx([1.0 - 0.1, 1.0, 1.0])
     rate = np.zeros(3)
-    diffusion.scalar_sources(0.1, 2.0, NONE, NONE, s, rate)
+    diffusion.add_decay(0.1, 2.0, NONE, s, rate)
     assert rate == approx([-0.1, -0.2, 0.2])
 
 

@@ -10,7 +10,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import THIN
 from fvsolve.kernels.plane.behind import counted, through_patch, weight
-from fvsolve.kernels.plane.diffusion import scalar_sources
+from fvsolve.kernels.plane.diffusion import add_decay
 from fvsolve.kernels.records import (
     CELL_SCALAR,
     GIVEN_FLOW,
@@ -155,7 +155,7 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
         for i in range(n):
             high = depth[i] if depth.size > 0 else 1.0
             lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
-        scalar_sources(scalar["decay"], scalar["ambient"], depth, depth[:0], s, rate)
+        add_decay(scalar["decay"], scalar["ambient"], depth, s, rate)
         out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
     for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
         if patches[p]["basin"] == b and patches[p]["open"] == 0:

@@ -1,6 +1,6 @@
-"""What scalars do beside being carried: spread, decay, come from sources. Knows cells of a grid; adds to rates.
+"""What scalars do beside being carried: spread and decay. Knows cells of a grid; adds to rates.
 
-s_t = div(D depth grad c) - decay (s - depth ambient) + source, for amounts s = depth c per area.
+s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
 """
 
 from fvsolve.jit import inner, njit
@@ -87,47 +87,7 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
 
 
 @njit
-def enters(come, excess, slender, diffusivity, outside, depth, s):
-    """What comes in through a face with a flow, and by diffusion; slender : half the cell's width over the face's."""
-    own = s / max(depth, THIN)
-    if come > 0.0:
-        return come * outside + excess + diffusivity * depth / slender * (outside - own)
-    return come * own + excess
-
-
-@njit
-def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, ax, ay, s, ring):
-    """What comes in through every face of the boundary, float64[ring], carried and by diffusion [m2/s times a value].
-
-    ax, ay : the excesses that `add_fifth_order` leaves, work[n:] in the order of flow_x and then of flow_y;
-    empty for the others, and gone where the diffusion was given the same work. The sum is that of rates times areas.
-    """
-    m, last = nx + 1, ny * nx
-    diffusivity = diffusivity if depth.size == 0 else 0.0
-    for j in range(ny):
-        for side in range(2):
-            turn, face = (factor, j * m) if side == 0 else (-factor, j * m + nx)
-            k, i = (j * nx, 0) if side == 0 else ((j + 1) * nx - 1, nx - 1)
-            h = depth[k] if depth.size > 0 else 1.0
-            more = turn * ax[face] if ax.size > 0 else 0.0
-            at = side * ny + j
-            ring[at] = enters(turn * flow_x[face], more, 0.5 * ky[j] / kx[i], diffusivity, outside[at], h, s[k])
-    for i in range(nx):
-        for side in range(2):
-            turn, face = (factor, i) if side == 0 else (-factor, last + i)
-            k, j = (i, 0) if side == 0 else (last - nx + i, ny - 1)
-            h = depth[k] if depth.size > 0 else 1.0
-            more = turn * ay[face] if ay.size > 0 else 0.0
-            at = 2 * ny + side * nx + i
-            ring[at] = enters(turn * flow_y[face], more, 0.5 * kx[i] / ky[j], diffusivity, outside[at], h, s[k])
-
-
-@njit
-def scalar_sources(decay, ambient, depth, source, s, rate):
-    """Add decay [1/s] towards an ambient value and a source per area, empty for none; return the decay."""
-    if decay != 0.0:
-        for i in range(s.size):
-            rate[i] -= decay * (s[i] - (depth[i] if depth.size > 0 else 1.0) * ambient)
-    for i in range(source.size):
-        rate[i] += source[i]
-    return decay
+def add_decay(decay, ambient, depth, s, rate):
+    """Add decay [1/s] towards an ambient value."""
+    for i in range(s.size):
+        rate[i] -= decay * (s[i] - (depth[i] if depth.size > 0 else 1.0) * ambient)
