@@ -20,7 +20,7 @@ LONG = 1e-3  # [s] that a timing takes at least
 SECONDS_PER_STEP = 5e-7  # beside the rates
 LOCAL = 0.05  # by which sound at a pressure may be quicker than at the reference, where the law is not linear
 QUICKER = 0.1  # share of the greatest rate that a valve must make to be what sets the step
-MOST_TRIED = 100
+MOST_TRIED = 100  # valves
 STIFF = 3.0  # times as many steps as waves ask for: from there on an implicit method is worth a try
 
 
@@ -145,11 +145,13 @@ def step_and_reason(model) -> tuple[float | None, str]:
 def quick_valve(model, rate: float) -> tuple[str, float]:
     """The valve between two places that store without which the greatest rate is least, and that rate [1/s]."""
     valves, found, least = model.tables[rec.I_VALVES], "", rate * (1 - QUICKER)
+    start = model.case.numerics.start
     for k in np.flatnonzero((valves["solve"] == rec.ALONE) & (valves["device"] < 0))[:MOST_TRIED]:
         size, valves["conductance"][k] = float(valves["conductance"][k]), 0.0
-        start = model.case.numerics.start
-        without = float(model.evaluate(start, model.start, start)[1][rec.RATE])
-        valves["conductance"][k] = size
+        try:
+            without = float(model.evaluate(start, model.start, start)[1][rec.RATE])
+        finally:
+            valves["conductance"][k] = size
         if without < least:
             found, least = model.valve_names[k], without
     return found, least
