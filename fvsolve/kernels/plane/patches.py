@@ -79,24 +79,21 @@ def patch_pressures(t, y, dydt, out, handle):
     for k in range(tables[I_PATCHES].size):
         patch = tables[I_PATCHES][k]
         basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
-        water = basin["kind"] <= SHALLOW_FACES
-        if water:
+        if basin["kind"] <= SHALLOW_FACES:
             stored, depth, volume, squares = water_behind(tables, patch, y)
-            slope, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
-            pressure = slope * stored
+            slope, content, had = st["rho"] * st["gravity"], st["rho"] * patch["area"], to_be_had(depth)
             spread = patch["area"] * squares / (volume * volume) if volume > HARDLY * patch["area"] else 1.0
-            slope, had = slope * spread, to_be_had(depth)
         else:
-            stored, had = mean_deviation(tables, patch, y), 1.0
+            stored, spread, had = mean_deviation(tables, patch, y), 1.0, 1.0
             slope, content = basin["speed"] * basin["speed"], basin["thickness"] * patch["area"]
-            pressure = slope * stored
+        pressure = slope * stored
         if st["law"] == LAW_LOG and basin["density"] > 0.0:
             strain = stored / basin["density"]
             pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["had"] + node["row"]] = had
-        out[layout["stiffness"] + node["row"]] = slope / content
+        out[layout["stiffness"] + node["row"]] = slope * spread / content
 
 
 @njit
