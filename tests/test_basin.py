@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
+from scipy.optimize import brentq
 from truth.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 
 import fvsolve
@@ -97,6 +98,32 @@ def test_small_waves_slosh_at_the_periods_of_long_waves(mode):
         late.append(abs(after[1]))
     assert lost[1] < 3e-4 and lost[0] / lost[1] > 2.0**2.8
     assert late[1] < 2e-3 and late[0] / late[1] > 2.0**1.8
+
+
+def test_a_dam_over_a_step_of_the_bed_keeps_the_error_that_the_page_tells():
+    """Exact: a fan to h, u on the left, flow and energy kept over the step, a shock on the right. It does not fall."""
+    left, right, rise = 1.0, 0.4, 0.2
+
+    def beside(h):
+        u = 2.0 * (math.sqrt(GRAVITY * left) - math.sqrt(GRAVITY * h))
+        flow, head = h * u, h + u * u / (2.0 * GRAVITY) - rise
+        over = brentq(lambda d: d + flow**2 / (2.0 * GRAVITY * d * d) - head, (flow**2 / GRAVITY) ** (1 / 3), left)
+        return h, u, over, flow / over
+
+    def amiss(h):
+        _, _, d, u = beside(h)
+        return u - (d - right) * math.sqrt(0.5 * GRAVITY * (1.0 / d + 1.0 / right))
+
+    exact, off = np.array(beside(brentq(amiss, 0.75, 0.999))), []
+    for cells in (100, 200):
+        bed, start = f"where(x < 20, 0, {rise})", {"level": f"where(x < 20, {left}, {right + rise})"}
+        depth, velocity = depths(alone(basin((40.0, 0.4), (cells, 2), 1.0, bed=bed, start=start), 3.0))
+        x = (np.arange(cells) + 0.5) * 40.0 / cells
+        west, east = (x > 18.8) & (x < 19.4), (x > 20.6) & (x < 21.5)
+        found = [f[0, side].mean() for side in (west, east) for f in (depth, velocity[..., 0])]
+        off.append(np.array(found) / exact - 1.0)
+    assert np.abs(off).max() < 0.017 and np.abs(off[1]).min() > 0.002
+    assert off[1] == approx(off[0], rel=0.15)
 
 
 def test_a_mirrored_and_a_turned_basin_have_the_same_bits():
