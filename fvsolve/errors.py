@@ -21,6 +21,31 @@ class Fault:
         return f"{where}{self.place}: {self.message}" if self.place else f"{where}{self.message}"
 
 
+@dataclass(frozen=True)
+class Notice:
+    """What is legal but to be known: one of the `warnings` of a case or a run.
+
+    kind : "start", "mesh", "step-limit", "growth", "ledger", "range", ...; place : part or section, "nodes.a"; key : of
+    it, or None; value, limit : numbers that are compared, SI, or None; ok : False where the numbers of a run are wrong
+    """
+
+    kind: str
+    place: str
+    text: str
+    key: str | None = None
+    value: float | None = None
+    limit: float | None = None
+    ok: bool = True
+
+    def __str__(self) -> str:
+        return self.text
+
+    def plain(self) -> dict:
+        """As JSON says it."""
+        return {"kind": self.kind, "place": self.place, "key": self.key, "value": self.value, "limit": self.limit,
+                "ok": self.ok, "text": self.text}  # fmt: skip
+
+
 class FvsolveError(Exception):
     """Base of every error fvsolve raises on purpose; `str` is what a person reads."""
 

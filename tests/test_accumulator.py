@@ -171,7 +171,7 @@ def test_the_pattern_holds_every_coupling():
 def test_an_empty_start_is_said():
     case = swing(0.0, 1.0, probes=["a.pressure"])
     case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5}
-    assert "a: empty at the start" in " ".join(model_of(case).warnings)
+    assert "a: empty at the start" in " ".join(one.text for one in model_of(case).warnings)
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

@@ -201,7 +201,7 @@ def test_open_at_the_start_it_says_so():
     links = {"m": pipe("lake", "v", 100.0, 0.1, 1000.0, 4), "n": pipe("v", "low", 100.0, 0.1, 1000.0, 4)}
     nodes = {"lake": lake(0.0), "v": {"type": "air-valve", "elevation": 2.0, "inlet": 0.05, "outlet": 0.05}}
     model = fvsolve.build(fvsolve.load(scene(nodes | {"low": lake(0.0)}, links, 1.0, {})))
-    (said,) = [warning for warning in model.warnings if warning.startswith("v: the air valve is open at the start")]
+    (said,) = [one.text for one in model.warnings if one.text.startswith("v: the air valve is open at the start")]
     assert f"{RHO * 9.80665 * 2.0:.4g} Pa below ambient" in said
 
 

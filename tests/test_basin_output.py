@@ -427,8 +427,8 @@ def test_what_a_mesh_leaves_unsaid_is_noted(tmp_path):
     points, cells = shaken()
     path = write(tmp_path / "mm.msh", 1e7 * np.array(points), cells)
     model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
-    assert any("basin block: the mesh is" in note and 'unit = "mm"' in note for note in model.warnings)
-    assert any("the file names no group of lines" in note for note in model.warnings)
+    assert any("basin block: the mesh is" in note.text and 'unit = "mm"' in note.text for note in model.warnings)
+    assert any("the file names no group of lines" in note.text for note in model.warnings)
 
 
 def test_a_summary_counts_the_cells_of_basins():

@@ -53,7 +53,7 @@ def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B00
     model = model_of(load_case(case, set))
     found, warning = model.checks, beyond_courant(model)
     if warning is not None:
-        found = found | {"warnings": [*found["warnings"], warning]}
+        found = found | {"warnings": [*found["warnings"], warning.plain()]}
     if as_json:
         print_json(found)
     else:

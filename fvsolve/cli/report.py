@@ -47,8 +47,7 @@ def result(one) -> None:
         _line(console, _claim(claim), "green" if claim["ok"] else "bold red")
     for measured in said["comparisons"]:
         _line(console, _comparison(measured))
-    for warning in said["warnings"]:
-        _line(console, f"note: {warning}")
+    _notices(console, said["warnings"])
     when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
     _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
     if one.directory:
@@ -96,9 +95,13 @@ def checks(case, found: dict) -> None:
             _line(console, f"friction of {name} remembers: {_memory(one['unsteady'])}")
     for text in found["moving"]:
         _line(console, f"moves from the start: {text}")
-    for text in found["warnings"]:
-        _line(console, f"note: {text}")
+    _notices(console, found["warnings"])
     _line(console, _step(found))
+
+
+def _notices(console, warnings: list[dict]) -> None:
+    for one in warnings:
+        _line(console, f"note: {one['text']}", None if one["ok"] else "bold red")
 
 
 def _memory(one: dict) -> str:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fvsolve.errors import CaseError, Fault
+from fvsolve.errors import CaseError, Fault, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
@@ -59,7 +59,7 @@ class Scene:
         self.moving_names = {f"{name}.{place}" for name in cylinders for place in "AB"}
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.faults: list[Fault] = []
-        self.warnings: list[str] = []
+        self.warnings: list[Notice] = []
         self.size = self.tanks = self.cells = 0
         self.state_names: list[str] = []
         self.scale: list[float] = []

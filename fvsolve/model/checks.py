@@ -62,7 +62,7 @@ def checks(model) -> dict[str, Any]:
         "basins": {one.name: basin_facts(one) for one in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
-        "moving": model.steady["moving"], "warnings": model.warnings,
+        "moving": model.steady["moving"], "warnings": [one.plain() for one in model.warnings],
     }  # fmt: skip
 
 

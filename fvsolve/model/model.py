@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import FIFTH
 from fvsolve.model.scalars import node_values, pipe_values
@@ -66,7 +67,7 @@ class Model:
     body_names: list[str]
     elevation: dict[str, float]
     probes: list[Any]
-    warnings: list[str]
+    warnings: list[Notice]
     steady: dict[str, Any]  # what the start looks like, for `check`
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
     devices: list[tuple]  # (name, part, what it is lowered by), as their table has them

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.errors import listing
+from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.emitters import LEAST_DROP, emitter_drop, emitter_flow, emitter_step
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
@@ -290,7 +290,8 @@ class Start:
             self.scene.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
                              'and frictionless ways between unequal heads, or use "rest"')  # fmt: skip
         if self.answer.split:
-            self.scene.warnings.append("loops without friction: flow in them is the least-norm split")
+            text = "loops without friction: flow in them is the least-norm split"
+            self.scene.warnings.append(Notice("start", "links", text))
         self.scene.check()
 
     def freeze_factors(self) -> None:
@@ -306,8 +307,8 @@ class Start:
             else:
                 e = row["roughness"]
                 factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
-                self.scene.warnings.append(f"{name}: no flow at the start; its steady factor is the fully rough one, "
-                                           f"{factor:.4g}")  # fmt: skip
+                text = f"{name}: no flow at the start; its steady factor is the fully rough one, {factor:.4g}"
+                self.scene.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
             row["loss"] += row["rough"] * factor
             row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
 

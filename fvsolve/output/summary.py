@@ -39,7 +39,7 @@ def described(summary, model) -> dict:
         "seconds": float(summary.seconds),
         "seconds_setup": float(summary.seconds_setup),
         "cost": plain(summary.cost),
-        "warnings": [*model.warnings, *summary.warnings],
+        "warnings": [one.plain() for one in (*model.warnings, *summary.warnings)],
     }
 
 

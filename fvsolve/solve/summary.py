@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model
 
@@ -60,7 +61,7 @@ class Summary:
     seconds_setup: float = 0.0
     events: list[Event] = field(default_factory=list)
     cavities: list[Cavity] = field(default_factory=list)  # that the law `mixture` followed
-    warnings: list[str] = field(default_factory=list)  # of what came about, beside those of the model
+    warnings: list[Notice] = field(default_factory=list)  # of what came about, beside those of the model
 
     @property
     def steps(self) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from fvsolve.case.basins import behind
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
@@ -140,8 +141,8 @@ class Basin:
             row["spacing"] = scene.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
             if row["scheme"] not in (rec.UPWIND, rec.MUSCL):
-                scene.warnings.append(f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; "
-                                      "muscl is taken there")  # fmt: skip
+                text = f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; muscl is taken there"
+                scene.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
                 row["scheme"] = rec.MUSCL
             floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = scene.to_plane(floats), mesh.left.size
@@ -163,7 +164,8 @@ class Basin:
         for name in self.scalars:
             scene.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
         self.memory = 8 * (scene.plane_size + len(scene.integers) + scene.size - before)
-        scene.warnings += [f"basin {self.name}: {note}" for note in mesh.notes]
+        place = f"nodes.{self.name}"
+        scene.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
 
     def lower_scalars(self, scene, row) -> None:
         """Reserve what scalars are carried by and in, and values beyond the boundary."""

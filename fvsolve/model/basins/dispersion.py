@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.errors import Notice
+
 WRONG = 0.01  # share of the speed from which a word is due
 SEEN, MATTERS = 1e-6, 1e-3  # of the depth, root mean square of a surface: given at the start, come about in a run
 
@@ -89,10 +91,15 @@ def said(basin, found: Waves) -> str:
     )
 
 
-def warnings(basins, y: np.ndarray) -> list[str]:
+def notice(basin, found: Waves, when: str = "") -> Notice:
+    """That they are too short, and when."""
+    return Notice("dispersion", f"nodes.{basin.name}", said(basin, found) + when, None, float(found.wrong), WRONG)
+
+
+def warnings(basins, y: np.ndarray) -> list[Notice]:
     """Of basins whose waves are too short at the start y of a model."""
     pairs = [(basin, waves(basin, basin.of(y))) for basin in surfaces(basins)]
-    return [said(basin, found) for basin, found in pairs if found is not None and found.wrong > WRONG]
+    return [notice(basin, found) for basin, found in pairs if found is not None and found.wrong > WRONG]
 
 
 def surfaces(basins) -> list:
@@ -119,7 +126,7 @@ class Watch:
             if basin.name not in self.found or one.wrong > self.found[basin.name][1].wrong:
                 self.found[basin.name] = t, one
 
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Notice]:
         """One for each basin where they are too short."""
         found = [(basin, *self.found[basin.name]) for basin in self.basins if basin.name in self.found]
-        return [f"{said(basin, one)}, at {t:.4g} s" for basin, t, one in found if one.wrong > WRONG]
+        return [notice(basin, one, f", at {t:.4g} s") for basin, t, one in found if one.wrong > WRONG]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import accumulator as law
 from fvsolve.kernels.devices.codes import ACCUMULATOR
@@ -52,8 +53,9 @@ class Accumulator(Device, kind="accumulator"):
         node["stiffness"] = stiff if shed > 0.0 and neck else part.exponent * p / (fluid.density * gas)
         if neck and shed >= 0.0:
             name = list(scene.case.places)[row["node"]].removesuffix(".inside")
-            scene.warnings.append(f"{name}: empty at the start, where its precharge, {first:.6g} Pa, is not below "
-                                  f"the pressure, {p:.6g} Pa")  # fmt: skip
+            text = (f"{name}: empty at the start, where its precharge, {first:.6g} Pa, is not below the pressure, "
+                    f"{p:.6g} Pa")  # fmt: skip
+            scene.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
         return []
 
     def above(self, model, part, row) -> float:

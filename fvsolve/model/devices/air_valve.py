@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import air_valve as law
 from fvsolve.kernels.devices.codes import AIR_VALVE
@@ -53,7 +54,8 @@ class AirValve(Device, kind="air-valve"):
         name = list(start.case.places)[row["node"]].removesuffix(".inside")
         if short <= law.RELUCTANCE:
             return []
-        start.scene.warnings.append(f"{name}: the air valve is open at the start, {short:.4g} Pa below ambient")
+        text = f"{name}: the air valve is open at the start, {short:.4g} Pa below ambient"
+        start.scene.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(short), 0.0))
         return [f"air valve {name}: {short:.4g} Pa below ambient, so it opens"]
 
     def squares(self, model, part, row, y, out):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import disc as law
 from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
@@ -129,7 +130,8 @@ class ReliefDisc(Lifting, kind=""):
 
     def tell(self, start, name, x):
         if x > 0.0:
-            start.scene.warnings.append(f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1")
+            text = f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1"
+            start.scene.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
 
 
 class ReliefSwing(ReliefDisc, kind=""):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fvsolve.errors import Notice
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.linear.frozen import FROZEN_AS
@@ -10,7 +11,7 @@ from fvsolve.studies.stability.grid import advection_limit
 SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
 
 
-def beyond_courant(model) -> str | None:
+def beyond_courant(model) -> Notice | None:
     """What to expect of a case whose step on pipes is beyond the limit of advection on a long pipe; None within it.
 
     A limited scheme is taken for the linear one that it is where all is smooth.
@@ -28,7 +29,9 @@ def beyond_courant(model) -> str | None:
         return None
     about = f", where it is {scheme}," if scheme != numerics.scheme else ""
     limit = f"{one.limit:.6g} is the limit" if one.limit > 0.0 else "there is none that does not grow"
-    return (
+    text = (
         f"Courant number {courant:.6g}: with {numerics.scheme}{about} and {method.name} {limit} on a long pipe; "
         "expect it to blow up (fvsolve stability says how soon)"
     )
+    key = "courant" if numerics.step is None else "step"
+    return Notice("step-limit", "numerics", text, key, float(courant), float(one.limit))
