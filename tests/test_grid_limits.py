@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
+from fvsolve.limits.boxes import negative_point, value
+from fvsolve.limits.grid import advection_limit, advection_limits, growth_of, limit_of
+from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers import METHODS, analyse, method_named
 from fvsolve.steppers.tableau import tableau
-from fvsolve.studies.stability.boxes import negative_point, value
-from fvsolve.studies.stability.grid import advection_limit, advection_limits, growth_of, limit_of
-from fvsolve.studies.stability.symbol import WEIGHTS, real_part, square, symbol, weights_of
 
 EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.explicit]
 IMPLICIT = [name for name, one in METHODS.items() if name == one.name and not one.explicit]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fvsolve.kernels.limiters import slope_monotonized_central, slope_van_leer
+from fvsolve.limits.grid import advection_limit
+from fvsolve.limits.symbol import WEIGHTS, weights_of
 from fvsolve.steppers import METHODS
-from fvsolve.studies.stability.grid import advection_limit
 from fvsolve.studies.stability.limited import FROZEN, limited_limit, measured, monotone_limit, starts
 from fvsolve.studies.stability.periodic import Circle, measured_limit, measured_limits
-from fvsolve.studies.stability.symbol import WEIGHTS, weights_of
 
 EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.explicit]
 

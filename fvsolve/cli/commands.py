@@ -47,13 +47,12 @@ def run(
 def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B006
     """What was understood of a case, how it starts, what it will cost."""
     from fvsolve.cli import report
+    from fvsolve.limits.step import step_limits
     from fvsolve.run import model_of
-    from fvsolve.studies.stability.warning import beyond_courant
 
     model = model_of(load_case(case, set))
-    found, warning = model.checks, beyond_courant(model)
-    if warning is not None:
-        found = found | {"warnings": [*found["warnings"], warning.plain()]}
+    found = model.checks
+    found["warnings"] += [one.plain() for one in step_limits(model)]
     if as_json:
         print_json(found)
     else:

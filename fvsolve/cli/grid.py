@@ -9,10 +9,10 @@ from pathlib import Path
 from fvsolve.cli import terminal
 from fvsolve.cli.app import print_json
 from fvsolve.cli.studying import listed, told, writable
-from fvsolve.studies.stability.grid import AdvectionLimit, advection_limits
+from fvsolve.limits.grid import AdvectionLimit, advection_limits
+from fvsolve.limits.symbol import WEIGHTS
 from fvsolve.studies.stability.limited import LIMITED, LimitedLimit, limited_limits
 from fvsolve.studies.stability.periodic import THRESHOLD, Measured, measured_limits
-from fvsolve.studies.stability.symbol import WEIGHTS
 
 FEW = 8  # pairs that get a line each
 SET_BY = {

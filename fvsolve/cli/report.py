@@ -146,7 +146,7 @@ def _step(found: dict) -> str:
 
 def _ledger(ledger: dict) -> str:
     kept = f"remainder {_number(ledger['remainder'])}"
-    return f"{kept}, {_number(ledger['relative'])} of the contents" if "relative" in ledger else kept
+    return f"{kept}, {_number(ledger['relative'])} of the largest term" if "relative" in ledger else kept
 
 
 def _claim(one: dict) -> str:

@@ -17,6 +17,7 @@ LIMITERS = {
     "van-leer": rec.VAN_LEER,
     "monotonized-central": rec.MONOTONIZED_CENTRAL,
 }
+FROZEN_AS = {"muscl": "fromm", "weno5": "upwind5"}  # what limited schemes are where all is smooth
 ORDER = {name: degree + 1 for name, (_, degree) in (LINEAR | FAMILIES).items()}
 
 

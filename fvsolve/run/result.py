@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.errors import FvsolveError, RunError, did_you_mean
+from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
 from fvsolve.output.column import Column
 from fvsolve.output.fields import read_series
 
@@ -64,8 +64,8 @@ class Result:
     """Probes over time and what is to be said about them, in the units of `[output]`.
 
     `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
-    `.reason`, `.ok`, `.marks`, `.ledger`, `.extremes`, `.envelope`, `.expectations`, `.comparisons`; all but
-    the arrays as plain data in `result.summary`. `result.directory` is where it is on disk, or None.
+    `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.expectations`, `.comparisons`;
+    all but the arrays as plain data in `result.summary`. `result.directory` is where it is on disk, or None.
     """
 
     def __init__(
@@ -88,13 +88,18 @@ class Result:
 
     @property
     def ok(self) -> bool:
-        """True if the run came to its end."""
+        """True if the run came to its end, and no warning says that its numbers are wrong."""
         return self.summary["ok"]
 
     @property
     def marks(self) -> list[Mark]:
         """First place and time from which results are not to be trusted, one per cause."""
         return [Mark(**one) for one in self.summary["marks"]]
+
+    @property
+    def warnings(self) -> list[Notice]:
+        """What is legal but to be known; one whose `ok` is False makes the run's False."""
+        return [Notice(**one) for one in self.summary["warnings"]]
 
     @property
     def ledger(self) -> dict:
@@ -177,7 +182,8 @@ class Result:
             self._table[:, 1:],
             list(self.units.items()),
             time_unit=self._time.unit,
-            marks=[(self._time.from_si(one.time), f"{one.place} {one.what}") for one in self.marks],
+            marks=[(self._time.from_si(one.time), f"{one.place} {one.what}") for one in self.marks]
+            + [(self.t[0], f"{one.place} {one.kind}") for one in self.warnings if not one.ok and len(self.t)],
             measured=self._measured(),
             title=self.summary["title"],
         )

@@ -12,6 +12,7 @@ from fvsolve.model import Model, State
 from fvsolve.model.basins.dispersion import Watch
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.soundness import Soundness
 from fvsolve.solve.summary import (
     Event,
     Summary,
@@ -26,6 +27,7 @@ from fvsolve.steppers import orders as told
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
+FEW = 16.0  # steps at a time where they are beyond a limit, so that growth is seen early
 PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS, rec.I_ARMED)
 
 
@@ -70,7 +72,9 @@ class Run:
         model.tables[rec.I_MARKS][:] = np.nan
         model.tables[rec.I_ARMED][:] = 0.0
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.waves = Watch(model)
+        self.waves, self.soundness = Watch(model), Soundness(model)
+        if self.soundness.predicted:
+            self.budget = FEW
         self.processor = 0.0  # seconds of CPU time of the steps of this process
         self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
         if not self.fresh:
@@ -223,6 +227,8 @@ class Run:
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
+            if grown := self.soundness.look(self.loop.t, self.loop.now):
+                return grown
             if code == told.FIELD:
                 count = self.loop.memory[told.NEXT_FIELD] - 1
                 due = self.start + count * self.loop.orders[told.FIELD_EVERY]
@@ -240,7 +246,8 @@ class Run:
     def pause(self, spent: float) -> None:
         """Between chunks: report, save, and aim at a tenth of a second for the next."""
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
-        self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, 1e9))
+        most = FEW if self.soundness.predicted else 1e9
+        self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
         if self.progress is not None:
             self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[told.STEPS]))
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
@@ -307,10 +314,12 @@ class Run:
         ledger = loop.stepper.ledger[: loop.stepper.ledger.size // 2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[: len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
+        warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers)]
+        ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(
-            reason, reason == "finished", loop.t, find_marks(model), ledgers, find_extremes(model),
+            reason, ok, loop.t, find_marks(model), ledgers, find_extremes(model),
             find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.setup,
-            [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), self.waves.warnings(),
+            [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), warnings,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

@@ -64,6 +64,11 @@ class Summary:
     warnings: list[Notice] = field(default_factory=list)  # of what came about, beside those of the model
 
     @property
+    def finished(self) -> bool:
+        """Whether it came to its end, right or wrong: what studies go by, which judge for themselves."""
+        return self.reason == "finished"
+
+    @property
     def steps(self) -> int:
         """Accepted steps."""
         return self.counts.get("steps", 0)
@@ -131,8 +136,13 @@ def find_envelope(model: Model) -> dict[str, dict[str, np.ndarray]]:
     return found
 
 
+def relative(remainder: float, largest: float) -> float:
+    """A remainder over the largest of what was there, is there, came in and went out; 0 of nothing."""
+    return abs(remainder) / largest if largest > 0.0 else float(remainder != 0.0)
+
+
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
-    """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the contents."""
+    """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the largest term."""
     nodes = model.tables[rec.I_NODES]
     initial, change = model.contents(y)
     passes = {int(row["node"]) for row in model.tables[rec.I_PATCHES] if row["open"]}
@@ -143,14 +153,16 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     outside = [(name, float(x)) for i, name, x, row in named
                if row["kind"] in (rec.FIXED, rec.JUNCTION) or i in passes]  # fmt: skip
     remainder = change - float(np.sum(ledger))
+    come, gone = sum(x for _, x in outside if x > 0), sum(-x for _, x in outside if x < 0)
+    largest = max(initial, initial + change, come, gone, float(spilled), float(made_up))
     return {
         "initial": initial,
         "final": initial + change,
-        "inflow": sum(x for _, x in outside if x > 0),
-        "outflow": sum(-x for _, x in outside if x < 0),
+        "inflow": come,
+        "outflow": gone,
         "spilled": float(spilled),
         "made_up": float(made_up),
         "by_node": {name: x for name, x in outside if x != 0.0},
         "remainder": remainder,
-        "relative": abs(remainder) / initial if initial > 0 else 0.0,
+        "relative": relative(remainder, largest),
     }

@@ -11,6 +11,11 @@ from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.run import model_of
 
 
+def grown(reason: str) -> bool:
+    """Whether a run ended because its numbers grew without end."""
+    return "not finite" in reason or "has grown to" in reason
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """How a run ended and what it holds, in SI; a refused one has only its reason.
@@ -105,7 +110,7 @@ def _once(model, y, run) -> Outcome:
     rows = np.concatenate([np.empty((0, 1 + len(model.probes))), *sink.blocks])
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(
-        summary.reason, summary.ok, False, summary.t, made.loop.now.copy(), rows, names, summary.counts,
+        summary.reason, summary.finished, False, summary.t, made.loop.now.copy(), rows, names, summary.counts,
         summary.seconds, made.processor, model,
     )  # fmt: skip
 

@@ -13,13 +13,13 @@ from typing import Any
 
 from fvsolve.case.text import inline
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.studies.outcome import refusal
+from fvsolve.studies.outcome import grown, refusal
 from fvsolve.studies.points import Points
 
-FIRST = ("ok", "reason", "t [s]", "marks")
+FIRST = ("ok", "reason", "t [s]", "marks", "warnings")
 LAST = ("expectations", "steps", "seconds")
 REFUSED = "refused: "
-KEPT = {"row": 2}  # counts up when a row holds something else: older ones on disk are not reused
+KEPT = {"row": 3}  # counts up when a row holds something else: older ones on disk are not reused
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Sweep:
 
     keys : the keys that vary
     rows : their values, `ok`, `reason`, `t [s]`, `marks` (the first thing that the model could not follow, in words,
-    or nothing); of each probe `min(...)`, `max(...)`, their times and `final(...)` in
+    or nothing); `warnings` as in the summary; of each probe `min(...)`, `max(...)`, their times and `final(...)` in
     the units of `[output]`, None where the run ended in a value that is not finite; `expectations` (whether all hold),
     `steps`, `seconds` of stepping
     reused : how many rows were there before
@@ -57,6 +57,8 @@ class Sweep:
             writer.writerows({name: self._cell(name, x) for name, x in row.items()} for row in self.rows)
 
     def _cell(self, name: str, value: Any) -> Any:
+        if name == "warnings":
+            return "; ".join(one["text"] for one in value or ())
         return pasted(value) if name in self.keys else "" if value is None else value
 
 
@@ -195,7 +197,8 @@ def row_of(source, settings: dict) -> dict[str, Any]:
         raise KeyboardInterrupt
     row = {"ok": result.ok, "reason": result.reason, "t [s]": result.summary["t"]}
     row["marks"] = min(result.marks, key=lambda mark: mark.time).text if result.marks else ""
-    blown = result.reason.startswith("stopped: a value is not finite")  # the numbers before it mean nothing
+    row["warnings"] = result.summary["warnings"]
+    blown = grown(result.reason)  # the numbers before it mean nothing
     for name, one in result.extremes.items():
         unit = f"[{result.units[name]}]"
         said = {f"min({name}) {unit}": one.least, f"t_min({name}) [s]": one.t_least}

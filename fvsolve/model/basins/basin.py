@@ -64,6 +64,37 @@ class Basin:
         """Least and greatest of what tells of its waves at the start, SI."""
         raise NotImplementedError
 
+    def pace(self, y: np.ndarray) -> tuple[float, float]:
+        """Greatest rate [1/s] of its waves, or of what it carries, at a model's state y, and the share of x in it."""
+        velocity, speed = self.speeds(self.of(y))
+        if not self.is_grid:
+            own, other = self.mesh.left, self.mesh.right[: self.mesh.inner]
+            across = np.abs(np.einsum("fd,fd->f", velocity[own, :2], self.mesh.normal)) + speed[own]
+            through = np.bincount(own, across * self.mesh.length, self.n)
+            through += np.bincount(other, (across * self.mesh.length)[: other.size], self.n)
+            return float((0.5 * through / self.mesh.area).max()), 1.0
+        grid = self.mesh.grid
+        kx, ky = np.tile(1.0 / np.diff(grid.x), grid.ny), np.repeat(1.0 / np.diff(grid.y), grid.nx)
+        along, across = kx * (np.abs(velocity[:, 0]) + speed), ky * (np.abs(velocity[:, 1]) + speed)
+        worst = int(np.argmax(along + across))
+        rate = float(along[worst] + across[worst])
+        return rate, float(along[worst]) / rate if rate > 0.0 else 1.0
+
+    def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity float64[n, 3] and speed of waves float64[n] at deviations float64[quantities, n] [m/s]."""
+        raise NotImplementedError
+
+    @property
+    def waving(self) -> bool:
+        """Whether there are waves of its own, beside what is carried."""
+        return bool(self.quantities)
+
+    @property
+    def scheme(self) -> str:
+        """The scheme that its kernels take."""
+        name = self.case.numerics.scheme
+        return name if name == "upwind" or (name in FIFTH and self.is_grid) else "muscl"
+
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         """Fill what a probe of a field is, beside the cells that it reads; scalar fields are its physics' own."""
         row["kind"], row["scale"] = MOVES[field], 1.0

@@ -72,6 +72,9 @@ class FreeSurface(Basin, physics="free-surface"):
         velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
         return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
 
+    def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.fields(y)["velocity"], np.sqrt(self.case.gravity * self.depth_of(y))
+
     def ranges(self) -> dict[str, tuple[float, float]]:
         depth = self.depth + self.start()[0]
         low, high = float(depth.min()), float(depth.max())

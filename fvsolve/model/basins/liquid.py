@@ -97,6 +97,10 @@ class Liquid(Basin, physics="liquid"):
         velocity = np.column_stack([y[1] / density, y[2] / density, np.zeros(self.n)])
         return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
 
+    def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        moved = 0.0 if self.linear else 1.0  # law linear has no velocity beside that of its waves
+        return moved * self.fields(y)["velocity"], np.full(self.n, self.speed)
+
     def ranges(self) -> dict[str, tuple[float, float]]:
         return {"wave_speed": (self.speed, self.speed)}
 

@@ -26,11 +26,13 @@ class Transport(Basin, physics="transport"):
             along, across = abs(flow_x).reshape(grid.ny, -1), abs(flow_y).reshape(-1, grid.nx)
             through = np.maximum(along[:, 1:], along[:, :-1]) + np.maximum(across[1:], across[:-1])
             row["fastest"] = (kx * ky[:, None] * through).max()
+            worst = np.unravel_index(np.argmax(kx * ky[:, None] * through), through.shape)
+            self.share = float(np.maximum(along[:, 1:], along[:, :-1])[worst] / max(through[worst], 1e-300))
         else:
             row["flows"], inner = scene.to_plane(flows), mesh.inner
             through = np.bincount(mesh.left, np.abs(flows), self.n)
             through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
-            row["fastest"] = (0.5 * through / mesh.area).max()
+            row["fastest"], self.share = (0.5 * through / mesh.area).max(), 1.0
         self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
@@ -65,6 +67,9 @@ class Transport(Basin, physics="transport"):
 
     def start(self) -> np.ndarray:
         return np.zeros((0, self.n))
+
+    def pace(self, y: np.ndarray) -> tuple[float, float]:
+        return float(self.row["fastest"]), self.share
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         return {}

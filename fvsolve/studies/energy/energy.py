@@ -175,7 +175,7 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     settings = {key: getattr(numerics, key) for key in ("scheme", "method", "courant", "step", "rtol")}
     reason = "interrupted" if summary.reason.startswith("interrupted") else summary.reason
     return Energy(
-        reason, summary.ok, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
+        reason, summary.finished, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
         lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1) - dead.sum(axis=1) - kept,
         totals[:, -1], supplied - kept - dissipated, available(run.model),
         float(run.model.tables[rec.I_SETTINGS][0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,

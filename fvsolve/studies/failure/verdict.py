@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.studies.accuracy.timing import GIVEN_UP
+from fvsolve.studies.outcome import grown
 
 STABLE, RINGING, COARSE, WRONG, BLOWN, REFUSED, SKIPPED = (
     "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
@@ -55,7 +56,7 @@ def verdict(one: Measures, shorter: Callable[[], Measures], tolerance: float) ->
     """
     if one.reason.startswith(GIVEN_UP):
         return SKIPPED
-    if one.refused or (not one.ok and "not finite" not in one.reason):
+    if one.refused or (not one.ok and not grown(one.reason)):
         return REFUSED
     if not one.ok or not one.farthest <= FAR:
         return BLOWN

@@ -10,10 +10,10 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
 from fvsolve.kernels.schedules import schedule_value
+from fvsolve.model.schemes import FROZEN_AS
 from fvsolve.studies.outcome import outcome, prepared
 
 LIMITED = ("muscl", "weno5")  # schemes without a derivative at a constant state
-FROZEN_AS = {"muscl": "fromm", "weno5": "upwind5"}  # what they are where all is smooth
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,12 +16,12 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.errors import FvsolveError
+from fvsolve.limits.grid import AdvectionLimit, limit_of
+from fvsolve.limits.symbol import WEIGHTS, Weights
 from fvsolve.model.schemes import LIMITERS
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.tableau import method_named
-from fvsolve.studies.stability.grid import AdvectionLimit, limit_of
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
-from fvsolve.studies.stability.symbol import WEIGHTS, Weights
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
 CLOSE = 1e-3  # of a measured limit: it does not hang on the Courant number smoothly

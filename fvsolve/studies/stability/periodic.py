@@ -16,6 +16,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
+from fvsolve.limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.model.schemes import scheme_settings
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.analysis.facts import analyse
@@ -23,7 +24,6 @@ from fvsolve.steppers.ode import watchers
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
-from fvsolve.studies.stability.symbol import WEIGHTS, symbol, weights_of
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000

@@ -225,7 +225,7 @@ class Maker:
 
 def on_a_long_pipe(scheme: str, method) -> float:
     """Von Neumann's limit, a Courant number."""
-    from fvsolve.studies.stability.grid import advection_limit
+    from fvsolve.limits.grid import advection_limit
 
     return advection_limit(scheme, method.name).limit
 

@@ -17,13 +17,13 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.errors import FvsolveError
+from fvsolve.limits.boxes import negative_point, value
+from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability import a_stable
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
 from fvsolve.steppers.exact.polynomial import Polynomial, sign
 from fvsolve.steppers.exact.sturm import count_roots, odd_part
 from fvsolve.steppers.tableau import METHODS, Method, method_named
-from fvsolve.studies.stability.boxes import negative_point, value
-from fvsolve.studies.stability.symbol import WEIGHTS, real_part, square, symbol, weights_of
 
 RAYS = 240  # waves whose roots are looked at first
 ZOOMS, ZOOM_RAYS = 9, 17

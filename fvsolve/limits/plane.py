@@ -1,0 +1,63 @@
+"""The limit of waves and of what is carried on a uniform grid in the plane (von Neumann). Knows schemes and methods.
+
+Waves p, u, v of speed c, each direction split into its characteristics: with z(theta) = a + i b the scheme's symbol and
+shares w_x + w_y = 1 of the rate c / dx + c / dy, a wave of phases (theta_x, theta_y) goes by du/dt = rate M u,
+
+    M = [ w_x a_x + w_y a_y   i w_x b_x   i w_y b_y ]
+        [ i w_x b_x           w_x a_x     0         ]
+        [ i w_y b_y           0           w_y a_y   ]
+
+and what is carried by w_x z(theta_x) + w_y z(theta_y). A Courant number at which one wave is found to grow is unstable,
+whatever the others do: beyond what is found here growth is proved; below, only phases between those tried are not.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from fvsolve.limits.symbol import symbol, weights_of
+from fvsolve.steppers.analysis.stability_function import stability_function
+from fvsolve.steppers.tableau import method_named
+
+PHASES = 33  # from 0 to pi, of one direction; of the other from -pi to pi
+GROWTH = 1e-9  # of |R| - 1 that is taken for growth
+MOST, HALVINGS = 64.0, 40
+
+
+@functools.lru_cache(maxsize=64)
+def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> float:
+    """The greatest Courant number, rate times step, up to which no wave grows; 0 where there is none.
+
+    share : of the rate, in x; waves : of p, u, v, else of what is carried. Raises FvsolveError for a scheme
+    without weights.
+    """
+    z, r = modes(scheme, share, waves), stability_function(method_named(method))
+
+    def holds(courant: float) -> bool:
+        return bool(np.abs(r(courant * z)).max() <= 1.0 + GROWTH)
+
+    low, high = 0.0, 1.0 / 64.0
+    while high <= MOST and holds(high):
+        low, high = high, 2.0 * high
+    if low == 0.0:
+        return 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def modes(scheme: str, share: float, waves: bool) -> np.ndarray:
+    """Eigenvalues of M over all pairs of phases, for a rate of one."""
+    weights = weights_of(scheme)
+    x, y = np.meshgrid(np.linspace(0.0, np.pi, PHASES), np.linspace(-np.pi, np.pi, 2 * PHASES - 1))
+    zx, zy = share * symbol(weights, x), (1.0 - share) * symbol(weights, y)
+    if not waves:
+        return zx + zy
+    m = np.zeros((*zx.shape, 3, 3), dtype=complex)
+    m[..., 0, 0], m[..., 1, 1], m[..., 2, 2] = zx.real + zy.real, zx.real, zy.real
+    m[..., 0, 1] = m[..., 1, 0] = 1j * zx.imag
+    m[..., 0, 2] = m[..., 2, 0] = 1j * zy.imag
+    return np.linalg.eigvals(m)

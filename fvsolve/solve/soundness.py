@@ -1,0 +1,100 @@
+"""Whether a run's numbers may be right: steps beyond a limit, growth, ledgers that do not close. Knows no files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
+from fvsolve.limits.step import step_limits
+
+MOST = 1e6  # times what drives a scene: what is beyond has grown by itself
+OPEN = 1e-8  # of the largest term of a ledger: what does not close to that is wrong
+DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # keys of nodes that are schedules
+
+
+class Soundness:
+    """What is watched while a model runs: the pace of its basins, and the size of its waves.
+
+    largest : float64[n]  what no state may exceed: MOST times the largest of the spread of the start, the range of what
+    is given over time, and the jump that stopping the start's flows makes (Joukowsky); inf where nothing is known
+    """
+
+    def __init__(self, model) -> None:
+        self.model = model
+        self.moving = model.basins if model.case.numerics.step is not None else []
+        self.rates: dict[str, float] = {}
+        self.predicted = step_limits(model)
+        self.largest = MOST * drives(model)
+        self.grown: Notice | None = None
+
+    def look(self, t: float, y: np.ndarray) -> str:
+        """At a state: keep the pace of basins; why the run has to stop, or nothing."""
+        for basin in self.moving:
+            self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.pace(y)[0])
+        ratio = np.abs(y) / self.largest
+        if not np.any(ratio > 1.0):
+            return ""
+        at = int(np.argmax(ratio))
+        name, times = self.model.state_names[at], MOST * float(ratio[at])
+        text = (f"{name} has grown to {times:.3g} times what drives it at t = {t:.6g} s; the step is beyond the "
+                "method's limit: halve it")  # fmt: skip
+        self.grown = Notice(
+            "growth", name.partition("[")[0], text, None, float(abs(y[at])), float(self.largest[at]), False
+        )
+        return f"stopped: {text}"
+
+    def warnings(self, ledgers: dict) -> list[Notice]:
+        """All notices of a run that ended."""
+        found = step_limits(self.model, self.rates) if self.moving else list(self.predicted)
+        found += [] if self.grown is None else [self.grown]
+        return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]
+
+
+def unclosed(name: str, ledger: dict) -> list[Notice]:
+    """A notice where a ledger's remainder is beyond round-off."""
+    relative = ledger.get("relative", 0.0)
+    if relative <= OPEN:  # one that is not a number is not closed
+        return []
+    text = (
+        f"{name} ledger: {ledger['remainder']:.6g} remain, {relative:.3g} of its largest term; wanted {OPEN:g} at most"
+    )
+    return [Notice("ledger", name, text, "remainder", float(relative), OPEN, False)]
+
+
+def drives(model) -> np.ndarray:
+    """The largest of what drives each state of pipes and basins, inf for others : float64[n]."""
+    found, linear = np.full(model.y_size, np.inf), model.case.properties
+    pressure, flow = given(model)
+    pipes = model.tables[rec.I_PIPES]
+    flow = max([flow, *np.abs(pipes["flow"])])
+    if len(pipes):
+        pressure = max(pressure, flow / float(pipes["admittance"].min()))
+    for mesh, row in zip(model.pipes, pipes, strict=True):
+        own = found[row["y"] : row["y"] + 2 * mesh.cells]
+        own[:] = np.maximum(
+            max(pressure * float(row["admittance"]), flow), model.scale[row["y"] : row["y"] + 2 * mesh.cells]
+        )
+    for basin in model.basins:
+        states, scales = basin.of(found), basin.of(model.scale)
+        ratio = 1.0 + pressure / (linear.density * model.case.gravity)
+        for own, scale, start in zip(states, scales, basin.of(model.start), strict=True):
+            own[:] = np.maximum(ratio * scale, np.ptp(start))
+    return found
+
+
+def given(model) -> tuple[float, float]:
+    """Range of pressures [Pa] and greatest mass flow [kg/s] that the start and schedules of nodes bring."""
+    rho, gravity = model.case.properties.density, model.case.gravity
+    at_start = model.tables[rec.I_NODES]["pressure"]
+    pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
+    for node in model.case.nodes.values():
+        for key, kind in DRIVES.items():
+            values = getattr(getattr(node, key, None), "value", None)
+            if not isinstance(values, np.ndarray) or not values.size:
+                continue
+            if kind == "flow":
+                flow = max(flow, rho * float(np.abs(values).max()))
+            else:
+                pressures.append(float(np.ptp(values)) * (rho * gravity if kind == "head" else 1.0))
+    return max(pressures), flow

@@ -1,0 +1,214 @@
+"""A run that is wrong says so by itself: steps beyond limits, growth, ledgers; sound ones are left in peace."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fvsolve
+from fvsolve.limits.grid import advection_limit
+from fvsolve.limits.plane import plane_limit
+from fvsolve.limits.step import step_limits
+from fvsolve.run import model_of
+from fvsolve.solve.soundness import OPEN, Soundness, unclosed
+from fvsolve.studies import sweep
+from tests.truth.scenes import scene
+
+MAIN = "cases/valve-closure.toml"
+
+
+def said(result, kind: str) -> list:
+    return [one for one in result.warnings if one.kind == kind]
+
+
+def main_case(**numerics):
+    return {f"numerics.{key}": value for key, value in numerics.items()}
+
+
+def closing(cells: int = 40, beta: float = 2.2e9, **numerics) -> dict:
+    """A frictionless main whose valve shuts at once after a while."""
+    fluid = {"name": "user", "density": 1000.0, "bulk_modulus": beta, "viscosity": 1e-3, "vapor_pressure": 0.0}
+    speed = math.sqrt(beta / 1000.0)
+    nodes = {
+        "lake": {"type": "reservoir", "pressure": 201325.0},
+        "gate": {"type": "junction", "demand": {"time": [0.0, 0.5], "value": [1e-3, 0.0], "kind": "step"}},
+    }
+    pipe = {"type": "pipe", "from": "lake", "to": "gate", "length": speed, "diameter": 0.3, "wall": "stiff",
+            "cells": cells, "friction": {"model": "none"}}  # fmt: skip
+    return scene(nodes, {"main": pipe}, 3.0, numerics, ["gate.pressure"], 0.1, fluid={**fluid, "law": "linear"})
+
+
+@pytest.mark.parametrize("setting", ["numerics.step=0.1", "numerics.courant=1.25"])
+def test_the_main_case_beyond_its_limit_is_not_ok_grown_or_not(setting, fvs, tmp_path):
+    code, out, *_ = fvs("run", MAIN, "--set", setting, "--out", str(tmp_path / "run"))
+    told = json.loads((tmp_path / "run" / "summary.json").read_text())
+    (limit,) = [one for one in told["warnings"] if one["kind"] == "step-limit"]
+    assert code == 1 and not told["ok"] and not limit["ok"] and limit["place"] == "links.main"
+    assert limit["limit"] == pytest.approx(advection_limit("fromm", "ssp-rk3").limit, rel=1e-12)
+    assert limit["value"] > limit["limit"] and "or less" in limit["text"]
+    assert "not to be trusted" in " ".join(out.split())
+    before = json.loads(fvs("check", MAIN, "--set", setting, "--json")[1])
+    assert [one for one in before["warnings"] if one["kind"] == "step-limit"] == [limit]
+
+
+def test_what_grows_without_end_stops_and_the_ledger_says_so_too():
+    found = fvsolve.run(MAIN, set={"numerics.step": 0.1, "output.fields": 0})
+    assert found.reason.startswith("stopped: ") and "has grown to" in found.reason
+    assert [one.ok for one in said(found, "growth")] == [False]
+    assert [one.ok for one in said(found, "ledger")] == [False]
+
+
+@pytest.mark.parametrize("pair", ["upwind euler", "upwind rk4", "upwind5 rk4", "upwind3 ssp-rk3"])
+def test_exactly_at_the_limit_is_sound_and_just_beyond_it_is_not(pair):
+    scheme, method = pair.split()
+    limit = advection_limit(scheme, method).limit
+    for factor, ok in ((1.0, True), (1.001, False)):
+        result = fvsolve.run(closing(scheme=scheme, method=method, courant=factor * limit))
+        assert result.ok is ok and len(said(result, "step-limit")) == (not ok), (factor, result.warnings)
+
+
+def test_a_limit_said_as_a_step_is_that_of_its_courant_number():
+    case = closing(scheme="upwind", method="euler", courant=1.2)
+    (by_courant,) = said(fvsolve.run(case), "step-limit")
+    case["numerics"].pop("courant")
+    (by_step,) = said(fvsolve.run(case | {"numerics": {**case["numerics"], "step": 1.2 / 40}}), "step-limit")
+    assert (by_step.key, by_courant.key) == ("step", "courant")
+    assert by_step.value == pytest.approx(by_courant.value, rel=1e-12) and by_step.limit == by_courant.limit
+    assert "give numerics.step = 0.025 s or less" in by_step.text
+
+
+def test_an_estimate_that_is_hardly_passed_is_doubtful_and_beyond_five_percent_wrong():
+    limit = advection_limit("fromm", "ssp-rk3").limit
+    for factor, ok in ((1.02, True), (1.06, False)):
+        (one,) = step_limits(model_of(closing(scheme="muscl", method="ssp-rk3", courant=factor * limit)))
+        assert one.ok is ok and "an estimate" in one.text
+
+
+def test_implicit_methods_and_error_control_have_no_limit():
+    assert not step_limits(model_of(closing(scheme="upwind", method="implicit-euler", courant=20.0)))
+    assert not step_limits(model_of(closing(scheme="upwind5", method="dormand-prince", rtol=1e-4)))
+
+
+def test_slow_growth_that_no_run_of_this_length_shows_is_left_in_peace():
+    """upwind5 with ssp-rk2 grows at every step, by a few 1e-5 of the worst wave at Courant 0.3."""
+    assert advection_limit("upwind5", "ssp-rk2").limit == 0.0
+    assert not step_limits(model_of(closing(scheme="upwind5", method="ssp-rk2", courant=0.1)))
+    (one,) = step_limits(model_of(closing(scheme="upwind5", method="euler", courant=0.5)))
+    assert not one.ok and "there is none that does not grow" in one.text
+
+
+@pytest.mark.parametrize("beta", [1e5, 1e6, 1e7])
+def test_soft_fluids_pass(beta):
+    result = fvsolve.run(closing(beta=beta, scheme="upwind", method="euler", courant=1.0))
+    assert result.ok and not said(result, "growth")
+    jump = 1e-3 / (math.pi / 4 * 0.3**2) * 1000.0 * math.sqrt(beta / 1000.0)
+    assert result.extremes["gate.pressure"].greatest == pytest.approx(201325.0 + jump, rel=1e-9)
+
+
+def test_water_at_a_step_beyond_its_limit_is_said_by_check_and_run(fvs):
+    found = json.loads(fvs("check", "sloshing-tank", "--set", "numerics.courant=2.2", "--json")[1])
+    (one,) = [w for w in found["warnings"] if w["kind"] == "step-limit"]
+    assert one["place"] == "nodes.tank" and one["value"] == 2.2 and one["limit"] == pytest.approx(2.0, rel=1e-6)
+    result = fvsolve.run("cases/sloshing-tank.toml", set={"numerics.courant": 2.2, "numerics.end": 2.5, "expect": {}})
+    assert not result.ok and said(result, "step-limit")
+    assert fvsolve.run("cases/sloshing-tank.toml", set={"numerics.courant": 1.9, "numerics.end": 2.5, "expect": {}}).ok
+
+
+def test_water_that_gets_deeper_in_a_run_is_watched_at_fixed_steps():
+    """A step that holds for the start's depth is beyond the limit of the wave that comes in."""
+    pool = {"type": "basin", "size": [10.0, 1.0], "cells": [40, 4], "level": 0.1, "patches": {"in": {"side": "west"}}}
+    flow = {"time": [0.0, 1.0], "value": [0.0, 2.0], "kind": "linear"}
+    nodes = {"pool": pool, "feed": {"type": "inflow", "flow": flow}}
+    link = {"type": "valve", "from": "feed", "to": "pool.in", "area": 1.0}
+    case = scene(
+        nodes, {"tap": link}, 3.0, {"scheme": "upwind", "method": "euler", "step": 0.1}, ["pool.depth@5,0.5"], 0.1
+    )
+    model = model_of(case)
+    assert not step_limits(model)
+    result = fvsolve.run(case)
+    assert not result.ok and said(result, "step-limit") + said(result, "growth")
+
+
+@pytest.mark.parametrize("scheme, method", [("upwind", "euler"), ("upwind5", "rk4"), ("fromm", "ssp-rk3")])
+def test_limits_in_the_plane_are_those_along_a_line_where_all_goes_along_it(scheme, method):
+    """Phases are tried at 33 points, so that the limit of one between them is met to a few parts in 1e3."""
+    line = advection_limit(scheme, method).limit
+    assert plane_limit(scheme, method, 1.0) == pytest.approx(line, rel=2e-3)
+    assert plane_limit(scheme, method, 1.0, waves=False) == pytest.approx(line, rel=2e-3)
+    assert plane_limit(scheme, method, 0.5) >= line * (1 - 1e-6)
+
+
+@pytest.mark.parametrize("scheme, method", [("upwind", "euler"), ("upwind5", "rk4")])
+def test_a_liquid_in_the_plane_holds_below_its_predicted_limit_and_grows_beyond_it(scheme, method):
+    limit = plane_limit(scheme, method, 0.5)
+    rng = np.random.default_rng(3)
+    box = {
+        "type": "basin",
+        "physics": "liquid",
+        "size": [1.0, 1.0],
+        "cells": [16, 16],
+        "pressure": 3e5,
+        "thickness": 0.1,
+    }
+    for factor, grows in ((0.98, False), (1.05, True)):
+        case = scene({"box": box}, {}, 1.0, {"scheme": scheme, "method": method, "step": 1.0}, ["box.pressure@0.5,0.5"])
+        rate = model_of(case).basins[0].pace(model_of(case).start)[0]
+        case["numerics"] |= {"step": factor * limit / rate, "end": 300 * limit / rate}
+        case["output"]["every"] = 100 * limit / rate
+        model = model_of(case)
+        noise = replace(model, start=model.scale * rng.standard_normal(model.y_size))
+        y, h = noise.start, case["numerics"]["step"]
+        stages = {"euler": 1, "rk4": 4}[method]
+        for _ in range(300):
+            y = stepped(model, y, h, stages)
+        assert bool(np.abs(y).max() > 1e3 * np.abs(noise.start).max()) is grows
+        assert bool(step_limits(model)) is grows
+
+
+def stepped(model, y, h, stages):
+    """One step of Euler or of the classical method, in numpy."""
+    k1 = model.rhs(0.0, y)
+    if stages == 1:
+        return y + h * k1
+    k2 = model.rhs(0.0, y + 0.5 * h * k1)
+    k3 = model.rhs(0.0, y + 0.5 * h * k2)
+    k4 = model.rhs(0.0, y + h * k3)
+    return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+def test_a_planted_leak_is_not_ok():
+    ledger = {"initial": 1.0, "final": 1.0, "remainder": 1e-7, "relative": 1e-7}
+    (one,) = unclosed("mass", ledger)
+    assert not one.ok and one.kind == "ledger" and one.limit == OPEN
+    assert unclosed("mass", ledger | {"relative": float("nan")}) and not unclosed("mass", ledger | {"relative": 1e-9})
+
+
+def test_relative_is_over_what_came_in_where_a_scene_starts_empty():
+    tank = {"type": "tank", "area": 1.0, "level": 0.0, "elevation": 0.0}
+    nodes = {"feed": {"type": "inflow", "flow": 0.01, "elevation": 0.0}, "tank": tank}
+    link = {"type": "valve", "from": "feed", "to": "tank", "area": 0.1}
+    ledger = fvsolve.run(scene(nodes, {"tap": link}, 10.0, {}, ["tank.level"], 1.0)).ledger["mass"]
+    assert ledger["initial"] == 0.0 and ledger["inflow"] == pytest.approx(100.0, rel=1e-9)
+    assert ledger["relative"] == abs(ledger["remainder"]) / ledger["inflow"]
+
+
+def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
+    found = sweep(closing(scheme="upwind", method="euler"), {"numerics.courant": [1.0, 1.1]}, out=tmp_path)
+    sound, beyond = found.rows
+    assert sound["ok"] and sound["warnings"] == [] and not beyond["ok"]
+    assert [one["kind"] for one in beyond["warnings"]][0] == "step-limit"
+    rows = list(csv.DictReader(Path(tmp_path / "sweep.csv").open(encoding="utf-8")))
+    assert rows[0]["warnings"] == "" and "Courant number 1.1" in rows[1]["warnings"]
+
+
+def test_what_must_not_be_exceeded_follows_the_start_and_what_is_given():
+    """1 l/s of 1000 kg/m3: no wave below a million times 1 kg/s is growth, and none beyond it is anything else."""
+    watch = Soundness(model_of(closing(scheme="upwind", method="euler", courant=1.0)))
+    assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
+    assert not watch.look(0.0, 0.99 * watch.largest) and watch.look(0.0, 1.01 * watch.largest).startswith("stopped: ")
