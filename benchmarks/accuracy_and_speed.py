@@ -12,7 +12,7 @@ from math import exp, log
 from pathlib import Path
 from time import perf_counter
 
-from fvsolve.cli import shipped
+from fvsolve.case import shipped
 from fvsolve.studies.accuracy.chart import Chart, chart
 from fvsolve.studies.accuracy.files import write
 from fvsolve.studies.accuracy.pareto import crossing

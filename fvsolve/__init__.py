@@ -22,4 +22,5 @@ _HOMES = {
     "tableau": "steppers.tableau",
 }
 
+__version__ = "0.1.0"
 __all__ = offer(__name__, _HOMES)  # noqa: PLE0605

@@ -101,6 +101,11 @@ def argument(function: Callable) -> Callable:
     return Argument(function) if hasattr(function, "overloads") else function
 
 
+def cold() -> bool:
+    """Whether nothing of this version has been compiled on this machine yet."""
+    return not _disabled() and not any(_code_folder().rglob("*.nbi"))
+
+
 def _disabled() -> bool:
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 

@@ -35,7 +35,7 @@ def depths(case: dict) -> tuple[np.ndarray, np.ndarray]:
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
     nx, ny = case["nodes"]["pool"]["cells"]
-    found = model.frame(state.y, model.new_out())["pool"]
+    found = model.fields(state.y, model.new_out())["pool"]
     return found["depth"].reshape(ny, nx), found["velocity"].reshape(ny, nx, 3)
 
 
@@ -74,7 +74,7 @@ def test_a_dam_breaks_as_in_the_exact_solution(low):
 def test_a_lake_at_rest_does_not_move_by_one_bit_on_a_bank_and_behind_a_shut_valve():
     case = alone(basin((20.0, 10.0), (40, 20), 1.0, bed="0.13*x + 0.07*y"), 20.0)
     model = fvsolve.build(fvsolve.load(case))
-    assert (model.frame(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0).sum() > 100  # dry bank
+    assert (model.fields(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0).sum() > 100  # dry bank
     state = fvsolve.advance(model, fvsolve.initial_state(model), 20.0)
     assert not state.y.any()
 
@@ -169,7 +169,7 @@ def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero(
     case = scene(nodes, {"tap": valve("pool.outlet", "out", 0.02)}, 60.0, PLANE, ["tap.flow"], 1.0)
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 60.0)
-    depth = model.frame(state.y, model.new_out())["pool"]["depth"]
+    depth = model.fields(state.y, model.new_out())["pool"]["depth"]
     assert depth.min() >= 0.0 and depth.max() < 5e-3
     result = fvsolve.run(case)
     mass = result.ledger["mass"]

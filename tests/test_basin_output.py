@@ -108,7 +108,7 @@ def test_probes_between_centres_are_bilinear_in_what_frames_hold():
     model = fvsolve.build(fvsolve.load(case))
     y = random_state(model, 0.3)
     found = dict(zip(probes, model.observe(0.0, y), strict=True))
-    frame = model.frame(y, model.new_out())["pool"]
+    frame = model.fields(y, model.new_out())["pool"]
     assert (frame["depth"] == 0.0).sum() > 20
     u, v, _ = frame["velocity"].T
     nx, ny = CELLS
@@ -132,7 +132,7 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
     y = random_state(model, 1e-3)
     found = np.zeros(len(probes))
     observe_basins(0.0, y, model.new_out(), make_handle((*model.tables, calls.empty_calls(1))), found)
-    frame = model.frame(y, model.new_out())["block"]
+    frame = model.fields(y, model.new_out())["block"]
     for k, values in zip(cells, found.reshape(-1, 4), strict=True):
         u, v, _ = frame["velocity"][k]
         assert values == approx([frame["pressure"][k], u, v, np.hypot(u, v)], rel=1e-11)
@@ -289,7 +289,7 @@ def test_a_line_across_a_hole_has_nothing_there(tmp_path):
     })  # fmt: skip
     model = fvsolve.build(case)
     line = Line(case.output.lines["cut"], model.basins[0], case)
-    rows = line.text(model.frame(model.start, model.new_out())["block"]).splitlines()
+    rows = line.text(model.fields(model.start, model.new_out())["block"]).splitlines()
     found = [float(row.split(",")[3]) for row in rows[1:]]  # the hole has its ends, 1 m and 2 m, as its outline
     assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)
 
@@ -304,7 +304,7 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     path = write(tmp_path / "block.msh", *shaken())
     model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
     basin = model.basins[0]
-    fields = model.frame(random_state(model, 1e-3), model.new_out())["block"]
+    fields = model.fields(random_state(model, 1e-3), model.new_out())["block"]
     points, cells = shape(basin, np.zeros(2))
     data = {name: parted(values, cells) for name, values in fields.items()}
     write_frame(tmp_path / "block.vtu", points, cells, data, basin.units)

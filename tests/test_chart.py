@@ -127,7 +127,7 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
     """Gauss points of the exact field in every cell; pressures over the range that the pipe's pressure has had."""
     point = next(p for p in closing.points if p.setting.name == "upwind rk4" and p.setting.cells == 20)
     ended = outcome(line(), point.setting.keys)
-    frame = ended.model.frame(ended.y, ended.model.evaluate(END, ended.y)[1])["main"]
+    frame = ended.model.fields(ended.y, ended.model.evaluate(END, ended.y)[1])["main"]
     truth, nodes = line_rays(), np.polynomial.legendre.leggauss(4)
     exact = np.zeros((2, 20))
     for i in range(20):

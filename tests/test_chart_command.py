@@ -38,7 +38,7 @@ def test_json_is_one_object_with_every_point_unrounded(fvs, folder):
 
 
 def test_the_lines_that_are_printed_reach_the_target_when_run(fvs, folder, tmp_path):
-    from fvsolve.cli import shipped
+    from fvsolve.case import shipped
 
     code, said, _ = fvs("chart", "two-tanks", *GIVEN, "--target", "1e-4", "--out", folder)
     lines = said.partition("cell_time\n")[2].strip()

@@ -234,7 +234,7 @@ def test_a_leak_planted_in_the_ledger_is_found(monkeypatch):
 )  # fmt: skip
 def test_the_ledgers_of_shipped_cases_close(name, near):
     """With error control to what the tolerance allows; where fronts are smeared, half a percent is numerical."""
-    from fvsolve.cli import shipped
+    from fvsolve.case import shipped
 
     found = energy(shipped.find(name))
     assert found.ok
@@ -273,7 +273,7 @@ def test_what_a_tank_below_the_port_could_give_is_what_filling_it_to_the_port_se
 )  # fmt: skip
 def test_no_part_ever_holds_less_than_nothing(name, law):
     """What could be had at the start and the change since then are one energy, that is not negative."""
-    from fvsolve.cli import shipped
+    from fvsolve.case import shipped
 
     found = energy(shipped.find(name), {"fluid.law": law})
     for part, change in found.stored.items():

@@ -45,7 +45,7 @@ def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
 
 
 def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
-    from fvsolve.cli import shipped
+    from fvsolve.case import shipped
 
     found = energy(shipped.find("three-way-junction"), {"numerics.method": "gauss-4", "numerics.end": 2.0})
     assert np.abs(found.newton).max() > 1e-12 * found.through > 10.0 * np.abs(found.step).max()

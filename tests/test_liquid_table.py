@@ -201,7 +201,7 @@ def test_probes_and_frames_have_the_isentropes_pressures(holes):
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
     model = fvsolve.build(fvsolve.load(scene({"pool": pool}, {}, 1.0, numerics, probes, 0.1, fluid=FLUID)))
     frame, found, own = (
-        model.frame(model.start, model.new_out())["pool"],
+        model.fields(model.start, model.new_out())["pool"],
         model.observe(0.0, model.start),
         model.basins[0],
     )

@@ -59,7 +59,7 @@ def at_end(case: dict) -> tuple:
     """(model, fields of the last state)."""
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"])
-    return model, model.frame(state.y, model.evaluate(state.t, state.y)[1])
+    return model, model.fields(state.y, model.evaluate(state.t, state.y)[1])
 
 
 def through(cells: int, **numerics) -> float:
@@ -370,7 +370,7 @@ def test_a_controller_sets_what_flows_in_also_beyond_what_the_case_says():
     model = fvsolve.build(fvsolve.load(case_of(nodes, {"a": line("lake", "tap", 1.0, 20)}, 9.0)))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 3.0)
     state = fvsolve.advance(model, state, 8.0, {"lake.dye": 5.0})
-    assert model.frame(state.y, model.evaluate(state.t, state.y)[1])["a"]["dye"] == approx(5.0, rel=1e-6)
+    assert model.fields(state.y, model.evaluate(state.t, state.y)[1])["a"]["dye"] == approx(5.0, rel=1e-6)
 
 
 FAULTS = [

@@ -15,10 +15,11 @@ from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactS
 from fvsolve.fluid import Fluid
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.table import plain
+from fvsolve.shown import Shown
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+@dataclass(frozen=True, eq=False, repr=False)
+class Case(Shown):
     """A hydraulic scene, frozen; SI, pressures absolute [Pa]. Two cases are equal if they say the same.
 
     properties : the fluid's numbers at its reference state
@@ -49,6 +50,20 @@ class Case:
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
     folder: Path | None = field(repr=False)
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
+
+    picture = "fvsolve.draw.objects:case_figure"
+
+    def said(self) -> str:
+        basins = f", {len(self.meshes)} basins" if self.meshes else ""
+        return (f"{self.name!r}: {len(self.nodes)} nodes, {len(self.links)} links{basins}, {self.fluid.name} under law "
+                f"{self.fluid.law}, {self.numerics.start:g} to {self.numerics.end:g} s")  # fmt: skip
+
+    def listed(self) -> dict[str, list]:
+        parts = {**{("node", name): one for name, one in self.nodes.items()},
+                 **{("link", name): one for name, one in self.links.items()}}  # fmt: skip
+        joins = [", ".join(map(str, getattr(one, "ports", {}).values())) for one in parts.values()]
+        kinds = [one.kind for one in parts.values()]
+        return {"part": [name for _, name in parts], "is": [what for what, _ in parts], "type": kinds, "joins": joins}
 
     @property
     def files(self) -> list[Path]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, check, scalars, text
+from fvsolve.case import basins, check, scalars, shipped, text
 from fvsolve.case.case import Case, default_cells
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
@@ -55,7 +55,7 @@ TOP = {
 
 
 def load(source: str | Path | Mapping[str, Any] | Case, set: Mapping[str, Any] | None = None) -> Case:
-    """The case of a TOML file, a dict shaped like one, or a case, with the dotted keys of `set` overridden.
+    """The case of a TOML file, the name of a shipped one, a dict shaped like a file, or a case, `set` overriding keys.
 
     Numbers come out in SI, pressures absolute [Pa]. Raises CaseError with every fault: line, key path, what
     was found, what was wanted and the nearest valid name.
@@ -65,8 +65,15 @@ def load(source: str | Path | Mapping[str, Any] | Case, set: Mapping[str, Any] |
             return source
         raw = Raw(read_raw(source.raw).table, source.name, source.path, source.folder)
     else:
-        raw = read_raw(source)
+        raw = read_raw(named(source))
     return _Reader(raw, set or {}).case()
+
+
+def named(source: Any) -> Any:
+    """A source; where it is text that names no file but a shipped case, that case's file."""
+    if isinstance(source, str) and not Path(source).exists() and source in shipped.names():
+        return shipped.find(source)
+    return source
 
 
 def _alternatives() -> list[tuple[str, ...]]:

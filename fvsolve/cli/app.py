@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import sys
 from typing import Annotated
 
 import typer
@@ -18,6 +20,24 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+
+def _version(asked: bool) -> None:
+    if asked:
+        import fvsolve
+
+        print(f"fvsolve {fvsolve.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def all_commands(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and leave")
+    ] = False,
+) -> None:
+    """Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out."""
+
+
 Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 One = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override a key: links.main.cells=400")]
@@ -26,10 +46,10 @@ Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard 
 
 def load_case(name: str, overrides: list[str]):
     """The case, overridden; an override that is none is one more fault of it."""
-    from fvsolve.case import load
-    from fvsolve.cli import shipped
+    from fvsolve.case import load, shipped
 
     path = shipped.find(name)
+    _tell_of_compiling()
     settings, faults = _overrides(overrides)
     try:
         case = load(path, settings)
@@ -38,6 +58,15 @@ def load_case(name: str, overrides: list[str]):
     if faults:
         raise CaseError(faults, path.name)
     return case
+
+
+@functools.cache
+def _tell_of_compiling() -> None:
+    from fvsolve.jit import cold
+
+    if cold():
+        said = "the first run on this machine compiles the solver, some 10 to 30 s; once, it is kept for all later runs"
+        print(f"fvsolve: {said}", file=sys.stderr)
 
 
 def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:

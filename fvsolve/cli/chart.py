@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, told
+from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
 
 
@@ -45,9 +45,7 @@ def chart(
     folder = folder_of(found, "chart", out)
     sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
     with told() as progress:
-        made = study(
-            found, None, listed(scheme, "--scheme"), listed(method, "--method"), *sizes, target, folder, progress
-        )
+        made = study(found, None, listed(scheme, "--scheme"), methods_of(method), *sizes, target, folder, progress)
     paths = write(made, folder)
     if as_json:
         print_json(made.plain() | {"files": paths})

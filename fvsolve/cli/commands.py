@@ -62,7 +62,8 @@ def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B00
 @app.command("list")
 def list_cases(as_json: Json = False) -> None:
     """List the shipped cases."""
-    from fvsolve.cli import report, shipped
+    from fvsolve.case import shipped
+    from fvsolve.cli import report
 
     titles = shipped.titles()
     if as_json:
@@ -80,7 +81,8 @@ def new(
     wave_speed: Annotated[str | None, typer.Option(metavar="A", help='of all pipes (default "1200 m/s")')] = None,
 ) -> None:
     """Copy a shipped case and the files it uses; or with --from write the case NAME of an EPANET network."""
-    from fvsolve.cli import imported, shipped
+    from fvsolve.case import shipped
+    from fvsolve.cli import imported
 
     if source is not None:
         imported.write(source, name, file, hour, wave_speed)
@@ -160,7 +162,7 @@ def view(
 
 def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
     """Case -> its run directory; FvsolveError where two would have the same one."""
-    from fvsolve.cli import shipped
+    from fvsolve.case import shipped
 
     found, taken = {}, {}
     for name in cases:

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, told
+from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
 
 Asked = Annotated[str | None, typer.Argument(metavar="[CASE]", help="a case; without one, schemes and methods alone")]
@@ -34,7 +34,7 @@ def energy(
     as_json: Json = False,
 ) -> None:
     """What energy came in, where it is, what was dissipated, and what the numbers made of it."""
-    schemes, methods = listed(scheme, "--scheme"), listed(method, "--method")
+    schemes, methods = listed(scheme, "--scheme"), methods_of(method)
     if case is None:
         refuse({"--port": port, "--out": out, "--set": set})
         claims(schemes, methods, as_json)

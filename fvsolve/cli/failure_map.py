@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Out, folder_of, listed, told
+from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
 from fvsolve.units import parse
 
@@ -35,7 +35,7 @@ def map_(
     folder = folder_of(read_case, "map", out)
     with told() as progress:
         found = failures(
-            read_case, listed(scheme, "--scheme"), listed(method, "--method"), _numbers("--courant", courant),
+            read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
             _steps(step), _key(key), tolerance, Points(folder), progress,
         )  # fmt: skip
     files = _written(found, folder)

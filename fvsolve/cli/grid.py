@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fvsolve.cli import terminal
 from fvsolve.cli.app import print_json
-from fvsolve.cli.studying import listed, told, writable
+from fvsolve.cli.studying import listed, methods_of, told, writable
 from fvsolve.limits.grid import AdvectionLimit, advection_limits
 from fvsolve.limits.symbol import WEIGHTS
 from fvsolve.studies.stability.limited import LIMITED, LimitedLimit, limited_limits
@@ -38,7 +38,7 @@ def without_case(
     With `cells` or `steps` explicit methods are measured on a periodic pipe too, limited schemes always; growth is
     quoted at `courant`; CSV files go to `out`, where given. Raises FvsolveError for names that are none.
     """
-    named, methods = listed(scheme, "--scheme") or None, listed(method, "--method") or None
+    named, methods = listed(scheme, "--scheme") or None, methods_of(method) or None
     linear = None if named is None else [name for name in named if name not in LIMITED]
     runs, limited = _measured(named, linear, methods, cells, steps)
     limits = advection_limits(linear, methods, courant) if linear is None or linear else []

@@ -6,7 +6,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from fvsolve.cli import shipped
+from fvsolve.case import shipped
 from fvsolve.cli.app import value_of
 from fvsolve.errors import FvsolveError, listing
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fvsolve.cli import terminal
+from fvsolve.cli.studying import method_from
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.exact.polynomial import Polynomial, sign
@@ -37,7 +38,7 @@ def one(name: str, out: Path | None) -> Said:
     """One method: its tableau, R(s), facts and a picture of its stability region, which is written."""
     from fvsolve.draw.region import region_figure
 
-    method = method_named(name)
+    method = method_named(method_from(name))
     facts = analyse(method)
     path = out or Path(f"{name}.png")
     if path.suffix.lower() not in PICTURES:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -12,14 +11,13 @@ import typer
 
 from fvsolve.cli import terminal
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, told
+from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.studies.accuracy.picture import NORMS, SHOWN, title, unit
 
 COLUMNS = (
     "scheme", "method", "reference", "variable", "unit", "norm", "cells", "size", "step [s]", "error", "order", "mark",
     "fitted order", "spread", "steps", "rhs", "cell updates", "seconds",
 )  # fmt: skip
-SHOWN = 3  # variables with a table of their own on the terminal; all are in order.csv
-NORMS = ("L1", "L2", "max")
 
 
 @app.command()
@@ -43,7 +41,7 @@ def order(
     scene = load_case(case, overrides)
     folder = folder_of(scene, "order", out)
     points, found = Points(folder), []
-    pairs = [(s, m) for s in listed(scheme, "--scheme") or [None] for m in listed(method, "--method") or [None]]
+    pairs = [(s, m) for s in listed(scheme, "--scheme") or [None] for m in methods_of(method) or [None]]
     with told() as progress:
         for one, other in pairs:
             found.append(study(scene, refine=refine, key=key, levels=levels, cells=cells, scheme=one, method=other,
@@ -60,42 +58,12 @@ def order(
 
 def draw(folder: Path, found) -> list[Path]:
     """A picture of every study."""
-    from fvsolve.draw.order import order_figure
-
     files = []
     for one in found:
         name = "order.png" if len(found) == 1 else f"order-{one.scheme}-{one.method}.png"
-        sizes = [row.level.size for row in one.rows]
-        curves = {
-            f"{variable} [{unit(variable, one.units)}]": {
-                norm: ([row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows], fits[norm])
-                for norm in NORMS
-            }
-            for variable, fits in list(one.fits.items())[: 2 * SHOWN]
-        }
-        figure = order_figure(sizes, curves, one.plan.measure, f"{one.case}: {title(one)}; {one.words}")
-        figure.savefig(folder / name)
+        one.plot(folder / name)
         files.append(folder / name)
     return files
-
-
-def title(one) -> str:
-    """Scheme, method and how it is refined."""
-    scheme = f"{one.scheme}, " if one.rows[0].level.cells else ""
-    return f"{scheme}{one.method}, {one.plan.words}"
-
-
-def unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
-    """SI unit of a variable, as `known` of a study or its part has it; of a scalar, a label of the case's, none."""
-    from fvsolve.parts import KINDS
-    from fvsolve.units import DIMENSIONS
-
-    if variable in known:
-        return known[variable]
-    quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
-    kinds = [kind for group in KINDS.values() for kind in group.values()]
-    return next((DIMENSIONS[own[quantity]].si for kind in kinds
-                 for own in (kind.quantities, getattr(kind, "along", {})) if quantity in own), "-")  # fmt: skip
 
 
 def write_table(path: Path, found) -> Path:

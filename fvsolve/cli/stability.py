@@ -11,7 +11,7 @@ import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.linearise import At, Before, time_of
-from fvsolve.cli.studying import Out, folder_of, listed, told
+from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 
 PICTURES = 12  # pairs beyond which no picture is drawn
 FILE = {  # columns of stability.csv
@@ -53,7 +53,7 @@ def stability(
         found = ask(
             read,
             listed(scheme, "--scheme"),
-            listed(method, "--method"),
+            methods_of(method),
             time_of(at),
             before,
             steps or STEPS,

@@ -26,6 +26,29 @@ def listed(text: str | None, option: str = "") -> list[str] | None:
     return found
 
 
+def methods_of(text: str | None) -> list[str] | None:
+    """`--method A,B` as names; a word that is a file holds a tableau, which is a method by the name of the file."""
+    names = listed(text, "--method")
+    return None if names is None else [method_from(name) for name in names]
+
+
+def method_from(word: str) -> str:
+    """The name of a method; of a file that holds its tableau as text, the file's own, known from then on."""
+    from fvsolve.steppers.tableau import METHODS, tableau
+
+    path = Path(word)
+    if word in METHODS or not path.is_file():
+        return word
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
+    try:
+        return tableau(path.stem, text, source=str(path)).name
+    except FvsolveError as error:
+        raise FvsolveError(f"{path}: {error}") from None
+
+
 def folder_of(case, study: str, out: Path | None) -> Path:
     """Where a study of a case leaves its files: runs/NAME.STUDY by default, created."""
     return writable(out or Path("runs") / f"{case.name}.{study}")

@@ -12,6 +12,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import FIFTH
 from fvsolve.model.scalars import node_values, pipe_values
+from fvsolve.shown import Shown
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
@@ -34,17 +35,25 @@ class PipeMesh:
     elevation: np.ndarray
 
 
-@dataclass
-class State:
+@dataclass(repr=False)
+class State(Shown):
     """Time [s], the flat vector y, and the integrator's memory in one flat array (empty: a fresh start)."""
 
     t: float
     y: np.ndarray
     memory: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
+    picture = "fvsolve.draw.objects:state_figure"
 
-@dataclass(frozen=True, eq=False)
-class Model:
+    def said(self) -> str:
+        return f"at t = {self.t:g} s: {self.y.size} numbers"
+
+    def listed(self) -> dict[str, np.ndarray]:
+        return {"y": self.y}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Shown):
     """A case made ready; frozen.
 
     tables : the arrays that kernels read, in the order of `kernels.records.TABLES`
@@ -74,6 +83,15 @@ class Model:
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
     basins: list[Basin]  # as their table has them
+
+    picture = "fvsolve.draw.objects:model_figure"
+
+    def said(self) -> str:
+        cells = f", {self.all_cells} cells" if self.all_cells else ""
+        return f"of {self.case.name!r}: {self.y_size} states{cells}, {len(self.probes)} probes"
+
+    def listed(self) -> dict[str, Any]:
+        return {"state": self.state_names, "start": self.start, "scale": self.scale}
 
     @property
     def y_size(self) -> int:
@@ -254,7 +272,7 @@ class Model:
 
         return np.array([wall_area(self.tables[rec.I_SETTINGS][0], row, float(p)) for p in pressure])
 
-    def frame(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
+    def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI."""
         found, rho = {}, self.case.properties.density
         linear = self.case.fluid.law == "linear"

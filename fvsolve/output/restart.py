@@ -46,11 +46,12 @@ def identity(case) -> dict[str, str]:
 
 def versions(case) -> dict[str, str]:
     """Versions that the numbers of a run depend on."""
+    import fvsolve
     from fvsolve import jit
 
     numba = sys.modules.get("numba")
     return {
-        "fvsolve": _package_version(),
+        "fvsolve": fvsolve.__version__,
         "sources": jit.source_hash(),
         "python": sys.version.split()[0],
         "numpy": np.__version__,
@@ -99,12 +100,3 @@ def _check(path: Path, found: dict[str, str], wanted: dict[str, str]) -> None:
             f"{path} was written by other versions, so the run would not go on bit for bit: {listed}; "
             "start again with --force, or go on with the versions of then"
         )
-
-
-def _package_version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("fvsolve")
-    except PackageNotFoundError:
-        return "not installed"

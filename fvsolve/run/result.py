@@ -12,6 +12,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
 from fvsolve.output.column import Column
 from fvsolve.output.fields import read_series
+from fvsolve.shown import Shown
 
 
 class Mark(NamedTuple):
@@ -60,7 +61,7 @@ class Comparison(NamedTuple):
     t_computed_peak: float | None
 
 
-class Result:
+class Result(Shown):
     """Probes over time and what is to be said about them, in the units of `[output]`.
 
     `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
@@ -259,6 +260,11 @@ class Result:
         """One probe in SI, pressures absolute: float64[rows]."""
         return self.column(probe).to_si(self[probe])
 
-    def __repr__(self) -> str:
+    def said(self) -> str:
         said = self.summary
-        return f"<Result {said['case']!r}: {self.reason}, t = {said['t']:g} s, {len(self.units)} probes>"
+        return f"{said['case']!r}: {self.reason}, t = {said['t']:g} s, {len(self.units)} probes"
+
+    def listed(self) -> dict[str, list]:
+        """Of every probe: unit, least and greatest with their times."""
+        found = {"probe": self.probes, "unit": list(self.units.values())}
+        return found | {key: [getattr(one, key) for one in self.extremes.values()] for key in Extremes._fields}

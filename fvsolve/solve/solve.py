@@ -143,7 +143,7 @@ class Run:
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.waves.look(t, y)
-        self.sink.field(t, self.model.frame(y, out))
+        self.sink.field(t, self.model.fields(y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows and frames that are due at a jump or at the end, which are written apart."""

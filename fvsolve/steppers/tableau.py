@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
@@ -155,10 +156,14 @@ class Method:
 
 
 def tableau(
-    name: str, text: str, source: str = "user", dense: Sequence = (), start_weight: str | None = None,
-    numbers: Mapping[str, tuple[str, float]] | None = None, digits: int | None = None,
+    name: str, text: str | Sequence, b: Sequence | None = None, c: Sequence | None = None, *, source: str = "user",
+    dense: Sequence = (), start_weight: str | None = None, numbers: Mapping[str, tuple[str, float]] | None = None,
+    digits: int | None = None,
 ) -> Method:  # fmt: skip
-    """A method from its Butcher array in text; it is known by `name` everywhere from then on.
+    """A method from its Butcher array, in text or as A, b, c; it is known by `name` everywhere from then on.
+
+    A : [s, s], b : [s], or two rows, the second embedded; c : [s], the sums of rows of A where left out; integers,
+    fractions and floating-point numbers, the last taken as rounded in their last digit.
 
     Rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, with an embedded solution, a second such row. Entries
     have no blanks: `1/3`, `0.161`, `(88-7sqrt(6))/360`, or expressions in `numbers`, for example
@@ -169,10 +174,39 @@ def tableau(
     """
     if name in OWN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'"{name}" is not free: it is empty or names a method of the package; choose another name')
+    if b is not None:
+        text = printed(text, b, c)
+    elif not isinstance(text, str):
+        raise FvsolveError(f'method "{name}": A alone is no method; give tableau(name, A, b) or tableau(name, A, b, c)')
     method = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     method.exact  # noqa: B018  (raises)
     METHODS[name] = method
     return method
+
+
+def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:
+    """The text of a Butcher array that is given as numbers; FvsolveError for shapes that are none."""
+    a, b = np.atleast_2d(np.asarray(a, dtype=object)), np.atleast_2d(np.asarray(b, dtype=object))
+    s = a.shape[0]
+    if a.shape != (s, s) or b.ndim != 2 or b.shape[0] > 2 or b.shape[1] != s:
+        raise FvsolveError(f"A is {a.shape}, b {b.shape}; wanted s x s and s, or two rows of s where one is embedded")
+    if c is None:
+        c = [sum(map(_number, row), Fraction(0)) for row in a]
+    c = np.atleast_1d(np.asarray(c, dtype=object))
+    if c.shape != (s,):
+        raise FvsolveError(f"c is {c.shape}; wanted {s} numbers")
+    rows = [f"{_entry(left)} | {' '.join(map(_entry, row))}" for left, row in zip(c, a, strict=True)]
+    return "\n".join([*rows, "---", *(f"| {' '.join(map(_entry, row))}" for row in b)])
+
+
+def _number(x) -> Fraction:
+    return Fraction(x) if isinstance(x, (int, Fraction, np.integer)) else Fraction(repr(float(x)))
+
+
+def _entry(x) -> str:
+    if isinstance(x, (float, np.floating)):
+        return f"{Decimal(repr(float(x))):f}"
+    return str(_number(x))
 
 
 def declare(

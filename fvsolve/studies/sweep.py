@@ -13,6 +13,7 @@ from typing import Any
 
 from fvsolve.case.text import inline
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.shown import Shown
 from fvsolve.studies.outcome import grown, refusal
 from fvsolve.studies.points import Points
 
@@ -22,8 +23,8 @@ REFUSED = "refused: "
 KEPT = {"row": 3}  # counts up when a row holds something else: older ones on disk are not reused
 
 
-@dataclass(frozen=True)
-class Sweep:
+@dataclass(frozen=True, repr=False)
+class Sweep(Shown):
     """Rows in the order of the values, the last key fastest; a value that a run does not have is None.
 
     keys : the keys that vary
@@ -37,6 +38,15 @@ class Sweep:
     keys: tuple[str, ...]
     rows: list[dict[str, Any]]
     reused: int
+
+    picture = "fvsolve.draw.objects:sweep_figure"
+
+    def said(self) -> str:
+        wrong = sum(not row["ok"] for row in self.rows)
+        return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {wrong} of them not ok"
+
+    def listed(self) -> dict[str, list]:
+        return {name: [row.get(name) for row in self.rows] for name in self.columns}
 
     @property
     def columns(self) -> list[str]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
 from fvsolve.errors import CaseError, FvsolveError, listing
+from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import from_files
 from fvsolve.studies.accuracy.distance import Distance, distance, track
@@ -44,8 +45,8 @@ class Aim:
         return found
 
 
-@dataclass(frozen=True)
-class Chart:
+@dataclass(frozen=True, repr=False)
+class Chart(Shown):
     """Error against cost of a case, with the floor below which it means nothing."""
 
     case: str
@@ -60,6 +61,16 @@ class Chart:
     aim: Aim | None = None
     told: tuple[str, ...] = field(default=())
     left_out: tuple[str, ...] = field(default=())  # schemes that do not follow the fluid
+
+    picture = "fvsolve.studies.accuracy.files:figure"
+
+    def said(self) -> str:
+        return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
+
+    def listed(self) -> dict[str, list]:
+        names = ("trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates", "steps", "ok", "reason")
+        own = {key: [getattr(one.setting, key) for one in self.points] for key in ("scheme", "method", "cells", "size")}
+        return own | {key: [getattr(one, key) for one in self.points] for key in names}
 
     def curves(self) -> dict[str, list[Point]]:
         """Points by name of scheme and method, from coarse to fine."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.shown import Shown
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan
@@ -34,8 +36,8 @@ class Row:
         return {**said, **cost, "reason": self.reason, "errors": self.errors}
 
 
-@dataclass(frozen=True)
-class Order:
+@dataclass(frozen=True, repr=False)
+class Order(Shown):
     """An order study of one scheme and method.
 
     fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> the reference's own error
@@ -54,6 +56,21 @@ class Order:
     own: dict[str, dict[str, float]]
     notes: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
+
+    picture = "fvsolve.studies.accuracy.picture:order_picture"
+
+    def said(self) -> str:
+        return f"of {self.case!r}: {self.scheme}, {self.method}, {len(self.rows)} rows against {self.kind}"
+
+    def listed(self) -> dict[str, list]:
+        """Of every row: cells, step [s], cost, and errors by variable and norm, SI."""
+        found: dict[str, list] = {"cells": [row.level.cells for row in self.rows]}
+        found |= {"size": [row.level.size for row in self.rows], "step": [row.level.step for row in self.rows]}
+        for name, norms in self.fits.items():
+            for norm in norms:
+                key = f"{name} {norm}"
+                found[key] = [row.errors.get(name, {}).get(norm, math.nan) for row in self.rows]
+        return found | {"rhs": [row.rhs for row in self.rows], "seconds": [row.seconds for row in self.rows]}
 
     @property
     def variables(self) -> tuple[str, ...]:

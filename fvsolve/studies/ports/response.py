@@ -48,8 +48,8 @@ class Response:
         """Of u and y."""
         return ("Pa", "m3/s") if self.kind == "admittance" else ("m3/s", "Pa")
 
-    def __call__(self, s) -> np.ndarray:
-        """H at complex numbers s [1/s]."""
+    def __call__(self, s):
+        """H at complex numbers s [1/s]; a number of a number, an array of an array."""
         return self.transfer(s)
 
     def plain(self) -> dict:

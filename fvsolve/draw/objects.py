@@ -1,0 +1,120 @@
+"""Pictures of a case, its states, a sweep: what `.plot()` shows. Knows numbers and matplotlib; runs nothing."""
+
+from __future__ import annotations
+
+import math
+
+from fvsolve.draw import style
+
+NAMED = 40  # nodes up to which names are written
+PANELS = 4  # columns of a sweep that are drawn
+
+
+def case_figure(case):
+    """Nodes and links of a case: at their positions where all have one, else in columns by distance from the first."""
+    at = places(case)
+    figure = style.figure(4.5)
+    axes = figure.subplots()
+    axes.set_axis_off()
+    for name, link in case.links.items():
+        ends = [at[place] for place in link_places(link) if place in at]
+        for one in ends[1:]:
+            axes.plot(*zip(ends[0], one, strict=True), color=style.MUTED, linewidth=1.0, zorder=1)
+        if len(ends) > 1 and len(case.links) <= NAMED:
+            middle = [sum(x) / len(ends) for x in zip(*ends, strict=True)]
+            axes.text(*middle, f"{name} ({link.kind})", fontsize=7, color=style.MUTED, ha="center", va="bottom")
+    for k, kind in enumerate(dict.fromkeys(node.kind for node in case.nodes.values())):
+        own = [at[name] for name, node in case.nodes.items() if node.kind == kind]
+        axes.scatter(*zip(*own, strict=True), s=40, label=kind, color=style.COLOURS[k % len(style.COLOURS)], zorder=2)
+    for name in case.nodes if len(case.nodes) <= NAMED else ():
+        axes.annotate(
+            name, at[name], xytext=(0, 7), textcoords="offset points", fontsize=8, color=style.INK, ha="center"
+        )
+    axes.margins(0.1)
+    style.legend(axes)
+    style.title(figure, case.title or case.name)
+    return figure
+
+
+def link_places(link) -> list[str]:
+    """Names of the nodes that a link touches; of a place that a node owns, the node."""
+    return [str(place).partition(".")[0] for place in link.ports.values()]
+
+
+def places(case) -> dict[str, tuple[float, float]]:
+    """Where each node is drawn."""
+    given = {name: node.position for name, node in case.nodes.items()}
+    if all(one is not None for one in given.values()):
+        return {name: (float(one[0]), float(one[1])) for name, one in given.items()}
+    near: dict[str, list[str]] = {name: [] for name in case.nodes}
+    for link in case.links.values():
+        touched = [name for name in link_places(link) if name in near]
+        for one in touched:
+            near[one] += [other for other in touched if other != one]
+    depth: dict[str, int] = {}
+    for first in near:
+        waiting = [] if first in depth else [first]
+        depth.setdefault(first, 0)
+        while waiting:
+            one = waiting.pop(0)
+            fresh = [other for other in near[one] if other not in depth]
+            depth |= dict.fromkeys(fresh, depth[one] + 1)
+            waiting += fresh
+    rows: dict[int, int] = {}
+    found = {}
+    for name, column in depth.items():
+        row = rows[column] = rows.get(column, -1) + 1
+        found[name] = (float(column), float(math.ceil(row / 2) * (1 if row % 2 else -1)))
+    return found
+
+
+def model_figure(model):
+    """Heads at the nodes of a model at its start."""
+    names = model.node_names
+    heads = [one["head"] for one in model.checks["nodes"].values()]
+    return bars(names, heads, "head at the start [m]", model.case.title or model.case.name)
+
+
+def state_figure(state):
+    """All numbers of a state by their place in the vector."""
+    figure = style.figure(3.0)
+    axes = figure.subplots()
+    axes.plot(state.y, color=style.COLOURS[0], linewidth=1.0)
+    style.dress(axes)
+    axes.set_xlabel("number of the state", fontsize=8.5, color=style.INK)
+    style.title(figure, f"state at t = {state.t:g} s")
+    return figure
+
+
+def sweep_figure(sweep):
+    """Greatest values of the first probes over the first key that varies, or over the runs."""
+    names = [name for name in sweep.columns if name.startswith(("max(", "min("))][:PANELS]
+    key, rows = sweep.keys[0], sweep.rows
+    numbers = all(isinstance(row[key], (int, float)) for row in rows) and len(sweep.keys) == 1
+    x = [float(row[key]) for row in rows] if numbers else list(range(len(rows)))
+    figure = style.figure(0.7 + 1.8 * max(len(names), 1))
+    panels = figure.subplots(max(len(names), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(panels, names, strict=False):
+        values = [row.get(name) for row in rows]
+        y = [math.nan if value is None else float(value) for value in values]
+        axes.plot(x, y, marker="o", markersize=4, color=style.COLOURS[0], linewidth=1.0)
+        style.dress(axes)
+        axes.margins(x=0.03)
+        axes.set_ylabel(name, fontsize=8, color=style.INK)
+    panels[-1].set_xlabel(key if numbers else "run", fontsize=8.5, color=style.INK)
+    return figure
+
+
+def bars(names, values, label: str, title: str):
+    """One bar a name, the first of many."""
+    names, values = list(names)[:NAMED], list(values)[:NAMED]
+    figure = style.figure(0.9 + 0.22 * max(len(names), 3))
+    axes = figure.subplots()
+    axes.barh(range(len(names)), values, color=style.COLOURS[0], height=0.6)
+    style.dress(axes)
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    axes.invert_yaxis()
+    axes.ticklabel_format(axis="x", scilimits=(-4, 5))
+    axes.set_xlabel(label, fontsize=8.5, color=style.INK)
+    style.title(figure, title)
+    return figure

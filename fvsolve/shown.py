@@ -1,0 +1,57 @@
+"""How objects show themselves at a prompt and in a notebook: a line, a table, a picture. Draws nothing itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib import import_module
+from typing import Any, ClassVar
+
+SHOWN = 12  # rows of a table in a notebook; `.frame()` has them all
+
+
+class Shown:
+    """What has a line (`said`), a table (`listed`) and a picture (`picture`, "module:function" that draws it)."""
+
+    picture: ClassVar[str] = ""
+
+    def said(self) -> str:
+        """What it is, in some words."""
+        raise NotImplementedError
+
+    def listed(self) -> Mapping[str, Sequence[Any]]:
+        """Its table, by columns, in the units it has."""
+        raise NotImplementedError
+
+    def frame(self):
+        """Its table as a pandas DataFrame; FvsolveError where pandas is not installed."""
+        from fvsolve.errors import FvsolveError
+
+        try:
+            import pandas
+        except ImportError:
+            raise FvsolveError(f"{type(self).__name__}.frame() needs pandas: pip install pandas") from None
+        return pandas.DataFrame(dict(self.listed()))
+
+    def plot(self, path=None):
+        """Its picture as a matplotlib Figure, also written to `path` where one is given."""
+        module, _, name = self.picture.partition(":")
+        figure = getattr(import_module(module), name)(self)
+        if path is not None:
+            figure.savefig(path)
+        return figure
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.said()}>"
+
+    def _repr_html_(self) -> str:
+        columns = {name: list(values) for name, values in self.listed().items()}
+        rows = list(zip(*columns.values(), strict=True))
+        head = "".join(f"<th>{escape(str(name))}</th>" for name in columns)
+        body = "".join("<tr>" + "".join(f"<td>{escape(_cell(x))}</td>" for x in row) + "</tr>" for row in rows[:SHOWN])
+        more = f"<p>{len(rows) - SHOWN} more rows in .frame()</p>" if len(rows) > SHOWN else ""
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)

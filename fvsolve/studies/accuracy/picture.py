@@ -1,0 +1,42 @@
+"""The picture of an order study, and the words and units in it. Knows studies; leaves the drawing to `draw`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+SHOWN = 3  # variables with a table of their own on the terminal; all are in order.csv
+NORMS = ("L1", "L2", "max")
+
+
+def order_picture(one):
+    """Errors over the size of cells or steps, a panel a variable, a line a norm: a matplotlib Figure."""
+    from fvsolve.draw.order import order_figure
+
+    sizes = [row.level.size for row in one.rows]
+    curves = {
+        f"{variable} [{unit(variable, one.units)}]": {
+            norm: ([row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows], fits[norm]) for norm in NORMS
+        }
+        for variable, fits in list(one.fits.items())[: 2 * SHOWN]
+    }
+    return order_figure(sizes, curves, one.plan.measure, f"{one.case}: {title(one)}; {one.words}")
+
+
+def title(one) -> str:
+    """Scheme, method and how it is refined."""
+    scheme = f"{one.scheme}, " if one.rows[0].level.cells else ""
+    return f"{scheme}{one.method}, {one.plan.words}"
+
+
+def unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
+    """SI unit of a variable, as `known` of a study or its part has it; of a scalar, a label of the case's, none."""
+    from fvsolve.parts import KINDS
+    from fvsolve.units import DIMENSIONS
+
+    if variable in known:
+        return known[variable]
+    quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
+    kinds = [kind for group in KINDS.values() for kind in group.values()]
+    return next((DIMENSIONS[own[quantity]].si for kind in kinds
+                 for own in (kind.quantities, getattr(kind, "along", {})) if quantity in own), "-")  # fmt: skip

@@ -1,0 +1,131 @@
+"""What objects show at a prompt, in a notebook, as a table and as a picture; names that may stand for files."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from fractions import Fraction
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import fvsolve
+from fvsolve import advance, build, initial_state, load, run, tableau
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers import METHODS
+from fvsolve.studies import chart, order, response, sweep
+
+CASE = "two-tanks"
+ROW = "0 |\n1 | 1\n--+--\n | 1/2 1/2\n"
+
+
+@pytest.fixture(scope="module")
+def objects():
+    case = load(CASE)
+    model = build(case)
+    state = advance(model, initial_state(model), 1.0)
+    return {
+        "Case": case, "Model": model, "State": state, "Result": run(model),
+        "Order": order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, method="rk4"),
+        "Sweep": sweep(CASE, {"numerics.rtol": [1e-4, 1e-5]}),
+        "Chart": chart(CASE, methods=["rk4"], step=[4.0, 2.0]),
+    }  # fmt: skip
+
+
+KINDS = ["Case", "Model", "State", "Result", "Order", "Sweep", "Chart"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_object_has_a_line_a_table_and_a_picture(objects, kind, tmp_path):
+    one = objects[kind]
+    line, page = repr(one), one._repr_html_()
+    assert line.startswith(f"<{kind} ") and len(line) < 160 and "\n" not in line
+    assert "<table>" in page and line.replace("<", "&lt;").partition(" ")[0] in page
+    frame = one.frame()
+    assert len(frame) > 0 and len(frame.columns) > 0
+    one.plot(tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").stat().st_size > 5000
+
+
+def test_tables_hold_the_numbers(objects):
+    assert objects["State"].frame()["y"].to_numpy() == pytest.approx(objects["State"].y, abs=0.0)
+    assert list(objects["Model"].frame()["state"]) == objects["Model"].state_names
+    assert list(objects["Sweep"].frame()["numerics.rtol"]) == [1e-4, 1e-5]
+    assert len(objects["Order"].frame()) == 3 and len(objects["Chart"].frame()) == len(objects["Chart"].points)
+
+
+def test_names_in_a_notebook_are_text_and_no_markup():
+    found = sweep(CASE, {"title": ["a<b>", "c"], "output.probes": [[]]})
+    assert "a<b>" not in found._repr_html_() and "a&lt;b&gt;" in found._repr_html_()
+
+
+def test_a_shipped_case_goes_by_its_name_as_on_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(CASE).summary["case"] == CASE
+    with pytest.raises(FvsolveError):
+        load("no-such-case")
+    (tmp_path / CASE).write_text("schema = 2\n")  # a file of that name is the file
+    with pytest.raises(FvsolveError, match="fault"):
+        load(CASE)
+
+
+def test_a_tableau_from_arrays_is_that_of_its_text():
+    text = tableau("shown-text", ROW)
+    for a in ([[0, 0], [1, 0]], np.array([[0.0, 0.0], [1.0, 0.0]])):
+        made = tableau("shown-array", a, [Fraction(1, 2), Fraction(1, 2)], [0, 1])
+        assert np.array_equal(made.a, text.a) and np.array_equal(made.b, text.b) and np.array_equal(made.c, text.c)
+        assert (made.order, made.stages) == (text.order, text.stages) == (2, 2)
+    assert tableau("shown-array", [[0, 0], [0.5, 0]], [0.0, 1.0]).order == 2  # c is the sums of rows
+    pair = tableau("shown-array", [[0, 0], [1, 0]], [[0.5, 0.5], [1.0, 0.0]], [0.0, 1.0])
+    assert pair.adaptive and (pair.order, pair.error_order) == (2, 1)
+
+
+def test_a_tableau_of_third_parts_in_floating_point_keeps_its_order():
+    a = [[0, 0, 0], [1 / 3, 0, 0], [0, 2 / 3, 0]]
+    assert tableau("shown-heun", a, [1 / 4, 0, 3 / 4]).order == METHODS["heun"].order == 3
+
+
+@pytest.mark.parametrize("a, b, c", [([[0, 0]], [1], None), ([[0]], [1, 2], None), ([[0]], [1], [0, 1])])
+def test_arrays_of_another_shape_are_refused(a, b, c):
+    with pytest.raises(FvsolveError, match="wanted"):
+        tableau("shown-wrong", a, b, c)
+    with pytest.raises(FvsolveError, match="A alone"):
+        tableau("shown-wrong", a)
+
+
+def test_a_file_of_a_printed_tableau_is_a_method_on_the_command_line(fvs, tmp_path):
+    path = tmp_path / "my-heun2.txt"
+    path.write_text(ROW)
+    code, out, _ = fvs("order", CASE, "--refine", "time", "--levels", "3", "--method", path, "--set", "numerics.step=4",
+                       "--out", tmp_path / "order", "--json")  # fmt: skip
+    assert code == 0 and "my-heun2" in out
+    assert json.loads(fvs("methods", path, "--out", tmp_path / "m.png", "--json")[1])["order"] == 2
+    path.write_text("0 | what\n")
+    code, _, err = fvs("methods", path)
+    assert code == 2 and "my-heun2.txt" in err
+
+
+def test_a_response_at_a_number_is_a_number():
+    found = response("pipe-tiny-chamber", "body", scheme="upwind")
+    assert isinstance(found(1j), complex) and np.shape(found([1j, 2j])) == (2,)
+    assert found([1j])[0] == found(1j)
+
+
+def test_the_version_is_said(fvs):
+    code, out, _ = fvs("--version")
+    assert code == 0 and out.strip() == f"fvsolve {fvsolve.__version__}"
+    assert files("fvsolve").joinpath("py.typed").is_file()
+    assert subprocess.run([sys.executable, "-c", "import fvsolve; print(fvsolve.__version__)"],
+                          capture_output=True, text=True).stdout.strip() == fvsolve.__version__  # fmt: skip
+
+
+def test_the_first_run_on_a_machine_says_that_it_compiles(fvs, tmp_path, monkeypatch):
+    from fvsolve import jit
+    from fvsolve.cli import app
+
+    app._tell_of_compiling.cache_clear()
+    monkeypatch.setattr(jit, "cold", lambda: True)
+    assert "compiles" in fvs("check", CASE)[2]
+    assert "compiles" not in fvs("check", CASE)[2]
