@@ -1,4 +1,4 @@
-"""What the tests share: warm kernels are timed apart, and pictures stay off screen."""
+"""What the tests share: pictures stay off screen, and no test leaves anything that the next one meets."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import os
 import sys
 
 import pytest
+
+from fvsolve.steppers.tableau import METHODS
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: its threads only get in each other's way
@@ -25,3 +27,21 @@ def fvs(monkeypatch, capsys):
         return left.value.code or 0, said.out, said.err
 
     return call
+
+
+@pytest.fixture(autouse=True)
+def alone(request):
+    """In any order: a test's methods go with it; folder, environment and its module's tables stay as they were."""
+    methods, before = dict(METHODS), surroundings(request.module)
+    yield
+    METHODS.clear()
+    METHODS.update(methods)
+    assert surroundings(request.module) == before
+
+
+def surroundings(module) -> tuple:
+    """What a test may read and a test before it could have written."""
+    tables = {
+        name: repr(one) for name, one in vars(module).items() if isinstance(one, (dict, list, set)) and name[0] != "_"
+    }
+    return os.getcwd(), {name: one for name, one in os.environ.items() if name != "PYTEST_CURRENT_TEST"}, tables

@@ -103,9 +103,6 @@ def test_the_page_has_no_other_rows_and_its_examples_run():
     rows = re.findall(r"^\| `([\w-]+)` \| \d", DOCS, re.MULTILINE)
     assert rows == NAMES
     found = {}
-    try:
-        for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
-            exec(example, found)
-    finally:
-        METHODS.pop("mine", None)
+    for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
+        exec(example, found)
     assert found["seen"] == pytest.approx(137.3, abs=0.05)

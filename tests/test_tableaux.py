@@ -104,10 +104,7 @@ def test_one_coefficient_that_is_off_by_its_last_digit_costs_the_order():
 
 
 def tableau_order(text: str) -> int:
-    try:
-        return tableau("changed", text).order
-    finally:
-        METHODS.pop("changed", None)
+    return tableau("changed", text).order
 
 
 def test_algebraic_numbers_are_those_of_the_books():
@@ -199,7 +196,6 @@ def test_a_named_number_is_the_root_that_was_asked_for():
     for near in (0.29, 1.7):
         m = tableau("user", text, numbers={"g": ("x^2-2x+1/2", near)})
         assert m.order == 2 and m.a[0, 0] == pytest.approx(near, abs=0.01)
-    del METHODS["user"]
 
 
 @pytest.mark.parametrize(

@@ -1,24 +1,31 @@
-"""Cases as dicts shaped like the file, for the tests. Knows the keys; knows no answer. All SI."""
+"""Cases as dicts shaped like the file, for the tests. Knows the keys; knows no answer. All SI.
+
+What all tests share is read-only, and every case is a copy of its own: a test may write into its case.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 AMBIENT = 101325.0
 GRAVITY = 9.80665
 RHO = 1000.0
-WATER = {
-    "name": "user",
-    "density": RHO,
-    "bulk_modulus": 2.2e9,
-    "viscosity": 1e-3,
-    "vapor_pressure": 2300.0,
-    "law": "linear",
-}
-SHARP = {"scheme": "upwind", "method": "euler", "courant": 1.0}  # exact where every cell takes one step
-SMOOTH = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
-NO_FRICTION = {"model": "none"}
+WATER = MappingProxyType(
+    {
+        "name": "user",
+        "density": RHO,
+        "bulk_modulus": 2.2e9,
+        "viscosity": 1e-3,
+        "vapor_pressure": 2300.0,
+        "law": "linear",
+    }
+)
+SHARP = MappingProxyType({"scheme": "upwind", "method": "euler", "courant": 1.0})  # exact: every cell takes one step
+SMOOTH = MappingProxyType({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
+NO_FRICTION = MappingProxyType({"model": "none"})
 
 
 def area(diameter: float) -> float:
@@ -28,7 +35,7 @@ def area(diameter: float) -> float:
 def scene(
     nodes: dict, links: dict, end: float, numerics: dict, probes: Any = (), every: float = 0.01, **top: Any
 ) -> dict:
-    """A whole case; `top` adds or replaces top-level tables."""
+    """A whole case, which shares nothing with what it is made of; `top` adds or replaces top-level tables."""
     case = {
         "schema": 1,
         "ambient_pressure": AMBIENT,
@@ -39,7 +46,14 @@ def scene(
         "numerics": {"end": end, **numerics},
         "output": {"every": every, "probes": list(probes)} if probes else {"every": every},
     }
-    return {**case, **top}
+    return copied({**case, **top})
+
+
+def copied(value: Any) -> Any:
+    """Tables and lists that nobody else holds."""
+    if isinstance(value, Mapping):
+        return {key: copied(one) for key, one in value.items()}
+    return [copied(one) for one in value] if isinstance(value, list) else value
 
 
 def reservoir(pressure: Any, **more: Any) -> dict:
