@@ -11,6 +11,7 @@ from fvsolve.output.envelope import read_envelope, with_start, write_envelope
 from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
 from fvsolve.output.lines import LineSeries, clear_lines
+from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary import read_summary
 
@@ -33,13 +34,20 @@ class RunDirectory:
             raise RunError("--resume goes on with a run and --force starts it again; state one of them")
         _refuse_names(model.case)
         self.who = identity(model.case)
-        self.restart = self._checkpoint() if resume else None
-        if self.restart is None:
-            _refuse(self.folder, force, resume)
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
         drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
+        if self.folder.exists() and not self.folder.is_dir():
+            raise RunError(f"{self.folder} is a file; state another place with --out DIR")
+        self.lock = locked(self.folder, "a run")
+        try:
+            self.restart = self._checkpoint() if resume else None
+            if self.restart is None and not force:
+                _refuse(self.folder)
+        except BaseException:
+            let_go(self.lock)
+            raise
 
     @property
     def ended(self) -> bool:
@@ -51,7 +59,8 @@ class RunDirectory:
 
     def begin(self, model, state) -> None:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
-        (self.folder / ENDED).unlink(missing_ok=True)
+        for name in (ENDED, *PICTURES):
+            (self.folder / name).unlink(missing_ok=True)
         if self.restart is None:
             self._start()
             self._write_case()
@@ -90,8 +99,11 @@ class RunDirectory:
             write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
 
     def close(self) -> None:
-        """Let go of open files, also when a run broke off."""
-        self.history.close()
+        """Let go of open files and of the directory, also when a run broke off."""
+        try:
+            self.history.close()
+        finally:
+            let_go(self.lock)
 
     def table(self):
         """`float64[rows, 1 + probes]`: time and probes as history.csv has them."""
@@ -102,8 +114,8 @@ class RunDirectory:
         return _envelope(self.folder)
 
     def files(self) -> list[str]:
-        """Names of the files that a reader will look for, as far as they are there."""
-        names = [*OWN, *PICTURES, *self.model.case.copies]
+        """Names of the files that a reader will look for, as far as they are there; pictures come after them."""
+        names = [*OWN, *self.model.case.copies]
         there = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
         return sorted([*there, ENDED])
 
@@ -116,7 +128,6 @@ class RunDirectory:
 
     def _start(self) -> None:
         clear(self.folder)
-        self.folder.mkdir(parents=True, exist_ok=True)
         self.history.start()
         if self.fields:
             self.fields.start()
@@ -162,11 +173,12 @@ def _refuse_names(case) -> None:
             raise RunError(f"{path} has the name of a file that every run writes; give it another name")
 
 
-def _refuse(folder: Path, force: bool, resume: bool) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise RunError(f"{folder} is a file; state another place with --out DIR")
-    if force or not folder.is_dir():
-        return
+def pictures(folder: Path) -> list[str]:
+    """Names of the pictures that are there."""
+    return [name for name in PICTURES if (folder / name).is_file()]
+
+
+def _refuse(folder: Path) -> None:
     if (folder / ENDED).exists():
         raise RunError(f"{folder} holds a run; replace it with --force, or keep it and state --out DIR")
     if (folder / "restart.npz").exists():

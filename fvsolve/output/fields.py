@@ -7,6 +7,7 @@ array carries its unit as VTK's own UNITS_LABEL.
 from __future__ import annotations
 
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class FieldSeries:
     def continue_from(self, frames: int) -> None:
         """Keep the first `frames` of a series, drop what came after its checkpoint."""
         listed = self.folder / "fields.pvd"
-        lines = listed.read_text().splitlines() if listed.is_file() else []
+        lines = listed.read_text(encoding="utf-8").splitlines() if listed.is_file() else []
         many = frames * (len(self.basins) + (1 if self.pipes else 0))
         kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:many]
         if len(kept) < many:
@@ -96,7 +97,7 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
     text = path.read_bytes()
     for name, unit in units.items():
         end = text.index(ARRAY, text.index(f' Name="{name}"'.encode()))
-        text = text[:end] + UNIT.format(unit).encode() + text[end:]
+        text = text[:end] + UNIT.format(escape(unit)).encode() + text[end:]
     path.write_bytes(text)
 
 

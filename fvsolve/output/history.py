@@ -23,7 +23,7 @@ class HistoryFile:
     def start(self) -> None:
         """Begin an empty file with its header."""
         self._file = open(self.path, "wb")
-        headers = ",".join(_quoted(one.header) for one in [self.time, *self.columns])
+        headers = ",".join(quoted(one.header) for one in [self.time, *self.columns])
         self._file.write(f"{headers}\n".encode())
 
     def continue_from(self, rows: int, size: int) -> None:
@@ -79,5 +79,6 @@ def read_table(path: Path) -> np.ndarray:
     return table if table.size else np.empty((0, names))
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """A header as CSV writes it."""
     return '"' + text.replace('"', '""') + '"' if any(sign in text for sign in ',"\n') else text

@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.errors import RunError
 from fvsolve.output.column import Column, column, converted
+from fvsolve.output.history import quoted
 
 AXES = {"u": 0, "v": 1}  # of velocities
 FILE = re.compile(r"(.+)-(\d{6,})\.csv")
@@ -67,7 +68,7 @@ class Line:
         """The file of a frame."""
         values = np.column_stack([self.places, *(self.along(one.name, fields) for one in self.columns[3:])])
         rows = [",".join(map(repr, row)) for row in converted(self.columns, values).tolist()]
-        return "\n".join([",".join(one.header for one in self.columns), *rows]) + "\n"
+        return "\n".join([",".join(quoted(one.header) for one in self.columns), *rows]) + "\n"
 
     def along(self, name: str, fields: dict[str, np.ndarray]) -> np.ndarray:
         """A field at the points, nan in holes : float64[points]."""
