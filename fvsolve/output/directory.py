@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 from fvsolve.errors import RunError
@@ -75,35 +77,50 @@ class RunDirectory:
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
-        self.history.write(t, values)
+        with self.writing():
+            self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
         """Write a frame of all pipes and basins at time `t` [s]."""
-        if self.lines:
-            self.lines.write(self.fields.frames, frame)
-        if self.fields:
-            self.fields.write(t, frame)
+        with self.writing():
+            if self.lines:
+                self.lines.write(self.fields.frames, frame)
+            if self.fields:
+                self.fields.write(t, frame)
 
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by one that knows this state and all rows and frames so far."""
-        size = self.history.flush()
-        frames = self.fields.frames if self.fields else 0
-        restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
-        write_restart(self.folder / "restart.npz", restart, self.who)
+        with self.writing():
+            size = self.history.flush()
+            frames = self.fields.frames if self.fields else 0
+            restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
+            write_restart(self.folder / "restart.npz", restart, self.who)
 
     def end(self, summary) -> None:
         """Close the history and write the envelope; summary.json is the caller's last word."""
-        self.history.close()
-        if summary.envelope:
-            envelope = with_start(summary.envelope, self.model)
-            write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
+        with self.writing():
+            self.history.close()
+            if summary.envelope:
+                envelope = with_start(summary.envelope, self.model)
+                write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
 
     def close(self) -> None:
         """Let go of open files and of the directory, also when a run broke off."""
         try:
-            self.history.close()
+            with self.writing():
+                self.history.close()
         finally:
             let_go(self.lock)
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """What cannot be written is told with its place: RunError."""
+        try:
+            yield
+        except OSError as error:
+            place = error.filename or self.folder
+            raise RunError(f"{place}: cannot be written: {error.strerror or error}; make room and go on with --resume, "
+                           "or state another place with --out DIR") from None  # fmt: skip
 
     def table(self):
         """`float64[rows, 1 + probes]`: time and probes as history.csv has them."""
@@ -122,6 +139,9 @@ class RunDirectory:
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
         found = read_restart(path, self.who) if path.is_file() else None
+        if found and found.y.size != self.model.y_size:
+            raise RunError(f"{path} holds {found.y.size} states, and the case has {self.model.y_size}; start the run "
+                           "again with --force")  # fmt: skip
         if found and found.t > self.model.case.numerics.end:
             raise RunError(f"{path} is at t = {found.t:.6g} s, after numerics.end; start again with --force")
         return found
@@ -136,7 +156,8 @@ class RunDirectory:
 
     def _write_case(self) -> None:
         case = self.model.case
-        (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
+        with self.writing():
+            (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
         for name, path in case.copies.items():
             copy = self.folder / name
             if copy.resolve() != Path(path).resolve():

@@ -52,8 +52,8 @@ class HistoryFile:
     def close(self) -> None:
         """Close the file; closing twice does no harm."""
         if self._file is not None:
-            self._file.close()
-            self._file = None
+            file, self._file = self._file, None
+            file.close()
 
 
 def read_headers(path: Path) -> list[tuple[str, str]]:
@@ -76,6 +76,8 @@ def read_table(path: Path) -> np.ndarray:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
         except ValueError as error:
             raise RunError(f"{path} cannot be read: {error}") from None
+    if table.size and table.shape[1] != names:
+        raise RunError(f"{path} cannot be read: {table.shape[1]} numbers in a row under {names} headers")
     return table if table.size else np.empty((0, names))
 
 

@@ -33,6 +33,7 @@ class LineSeries:
         for name in self.lines:
             if frames and not self.path(name, frames - 1).is_file():
                 raise RunError(f"{self.folder} lacks frames of {name}; start the run again with --force")
+        self.folder.mkdir(exist_ok=True)
         clear_lines(self.folder.parent, frames)
 
     def write(self, number: int, frame: dict) -> None:

@@ -27,11 +27,11 @@ class Points:
         self.reused = 0
         self.lock = None if folder is None else locked(Path(folder), "a study")
         if self.path is not None and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
+            for line in self.path.read_text(encoding="utf-8", errors="replace").splitlines():
                 try:
                     point = json.loads(line)
                     self.found[point["key"]] = point["found"]
-                except (ValueError, KeyError):  # the last line of a study that was killed
+                except (ValueError, KeyError, TypeError):  # the last line of a study that was killed
                     continue
 
     def __enter__(self) -> Points:

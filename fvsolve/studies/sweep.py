@@ -94,10 +94,11 @@ def sweep(
         finally:
             made = Sweep(tuple(vary), [found[at] for at in sorted(found)], points.reused)
             refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in made.rows}
-            if len(made.rows) == len(combinations) and len(refused) == 1 and "" not in refused:
-                raise FvsolveError(f"all {len(combinations)} runs are {refused.pop()}")
-            if folder is not None and found:
+            useless = len(made.rows) == len(combinations) and len(refused) == 1 and "" not in refused
+            if folder is not None and found and not useless:
                 made.write(folder / "sweep.csv")
+    if useless:
+        raise FvsolveError(f"all {len(combinations)} runs are {refused.pop()}")
     return made
 
 
