@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 # Control characters, marks of direction, ends of lines that are no "\n", halves of letters.
+LONGEST = 200  # letters of a name that are compared with others
 UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
@@ -95,7 +96,9 @@ def visible(text: str) -> str:
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """The valid name that was probably meant by `name`, or None."""
-    names = list(dict.fromkeys(names))
+    if len(name) > LONGEST:
+        return None
+    names = [one for one in dict.fromkeys(names) if len(one) <= LONGEST]
     folded = {other.casefold().replace("_", "-"): other for other in names}
     close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)
     return folded[close[0]] if close else None

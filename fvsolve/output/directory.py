@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from fvsolve.case.size import LEAST_TEXT, on_disk, size
 from fvsolve.errors import RunError
 from fvsolve.output.column import probe_columns, time_column
 from fvsolve.output.envelope import read_envelope, with_start, write_envelope
@@ -47,6 +48,8 @@ class RunDirectory:
             self.restart = self._checkpoint() if resume else None
             if self.restart is None and not force:
                 _refuse(self.folder)
+            if self.restart is None:
+                _refuse_size(self.folder, model.case)
         except BaseException:
             let_go(self.lock)
             raise
@@ -192,6 +195,13 @@ def _refuse_names(case) -> None:
     for name, path in case.copies.items():
         if name in (ENDED, *OWN, *PICTURES):
             raise RunError(f"{path} has the name of a file that every run writes; give it another name")
+
+
+def _refuse_size(folder: Path, case) -> None:
+    least, free = on_disk(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
+    if least > free:
+        raise RunError(f"{folder}: history.csv would take {size(least)} at least, and {size(free)} are free; wanted a "
+                       "longer [output] every, or another place with --out DIR")  # fmt: skip
 
 
 def pictures(folder: Path) -> list[str]:

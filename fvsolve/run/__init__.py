@@ -70,6 +70,8 @@ def model_of(case, set: Mapping | None = None):
             return build(case)
         except CaseError as error:
             raise located(error, case) from None
+        except MemoryError:
+            raise RunError(f"{case.name}: memory is too small for its model; wanted fewer cells") from None
     if set:
         raise RunError("a Model is made and cannot be overridden; give set= together with the case")
     return case
