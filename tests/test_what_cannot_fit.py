@@ -43,7 +43,8 @@ def test_basins_likewise():
 
 
 @pytest.mark.parametrize("settings", [
-    {"numerics.courant": 1e-3}, {"output.every": 1e-6}, {"links.main.cells": 10**5}, {"numerics.end": 1e12, "output.every": 1e9},
+    {"numerics.courant": 1e-3}, {"output.every": 1e-6}, {"links.main.cells": 10**5},
+    {"numerics.end": 1e12, "output.every": 1e9},
 ])  # fmt: skip
 def test_what_fits_is_let_alone(settings):
     assert fvsolve.load(branched(), settings)
