@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+# Control characters, marks of direction, ends of lines that are no "\n", halves of letters.
+LONGEST = 200  # letters of a name that are compared with others
+UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -84,9 +89,16 @@ class RunError(FvsolveError):
     """A run that cannot start or go on: a finished run in the way, a restart that does not fit, ..."""
 
 
+def visible(text: str) -> str:
+    """Text that steers no terminal: what cannot be seen stands as its escape, but for ends of lines and tabs."""
+    return UNSEEN.sub(lambda one: one[0].encode("unicode_escape").decode(), text)
+
+
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """The valid name that was probably meant by `name`, or None."""
-    names = list(dict.fromkeys(names))
+    if len(name) > LONGEST:
+        return None
+    names = [one for one in dict.fromkeys(names) if len(one) <= LONGEST]
     folded = {other.casefold().replace("_", "-"): other for other in names}
     close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)
     return folded[close[0]] if close else None

@@ -11,6 +11,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,8 @@ from typing import Any
 
 __all__ = ["argument", "beside", "cache_folder", "written_folder", "inner", "njit", "source_hash"]
 
+ROOM = 65536  # bytes that a folder must take to be one for caches
+DIGEST = hashlib.sha256().digest_size
 KEPT = 3  # generations of compiled code kept beside the present one
 
 PACKAGE = Path(__file__).resolve().parent
@@ -170,6 +173,7 @@ def _dispatcher() -> type:
                     self.enable_caching()
                 finally:
                     numba.config.CACHE_DIR = before
+                self._cache._cache_file.__class__ = _kept_file()
 
         @functools.cached_property
         def within(self) -> CPUDispatcher:
@@ -186,6 +190,44 @@ def _dispatcher() -> type:
             return CPUDispatcher
 
     return Dispatcher
+
+
+@functools.cache
+def _kept_file() -> type:
+    """Numba's files of one function, of which a damaged one is as one that is not there, and a full disk no end."""
+    from numba.core.caching import IndexDataCacheFile, dumps
+
+    class Kept(IndexDataCacheFile):
+        def _load_index(self) -> dict:
+            try:
+                return super()._load_index()
+            except Exception:  # whatever pickle makes of half a file
+                return {}
+
+        def _load_data(self, name: str) -> Any:
+            digest, data = (found := Path(self._data_path(name)).read_bytes())[:DIGEST], found[DIGEST:]
+            if hashlib.sha256(data).digest() != digest:
+                raise OSError(f"{name} is damaged")  # for numba to compile anew
+            return pickle.loads(data)
+
+        def _save_data(self, name: str, data: Any) -> None:
+            data = dumps(data)
+            with self._open_for_write(self._data_path(name)) as file:
+                file.write(hashlib.sha256(data).digest() + data)
+
+        def save(self, key: Any, data: Any) -> None:
+            try:
+                super().save(key, data)
+            except OSError as error:
+                _cannot_keep(error.strerror or str(error))
+
+    return Kept
+
+
+@functools.cache
+def _cannot_keep(why: str) -> None:
+    text = f"{cache_folder()}: compiled code cannot be kept: {why}; every start compiles it again until it can"
+    warnings.warn(f"{text}, or until FVSOLVE_CACHE names another folder", RuntimeWarning, stacklevel=2)
 
 
 @functools.cache
@@ -236,7 +278,8 @@ def _user() -> str:
 def _writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(ROOM))  # which a full disk refuses
+        return True
     except OSError:
         return False

@@ -487,7 +487,7 @@ BAD = {
         "back.csv: times out of order: 0.0 comes after 1.0",
     ),
     "schedule file, out of range": (opening('{ file = "wide.csv" }'), "opening.file: 2.0 is out of range"),
-    "schedule file, not text": (opening('{ file = "noise.csv" }'), "noise.csv is not UTF-8 text"),
+    "schedule file, not text": (opening('{ file = "noise.csv" }'), "noise.csv is not UTF-8 or UTF-16 text"),
     # characteristic
     "characteristic": (
         add("links.valve", 'characteristic = "linar"'),

@@ -144,10 +144,10 @@ def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity,
 @pytest.mark.parametrize(
     "text, words",
     [
-        (None, "cannot be read"),
-        ("", "header is empty"),
+        (None, "No such file"),
+        ("", "is empty; wanted a header"),
         ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; wanted x, y, u, v or x, y, psi"),
-        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "1,0,b"; wanted 3 numbers, x, y, psi'),
+        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is no number in column "psi"'),
         ("x,y,psi\n0,0,1\n1,0,2\n", "2 points; wanted at least three"),
         ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),
         ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not reach around 9 of 20 places of the mesh, the first"),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case.sections import Output
+from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
@@ -69,6 +70,10 @@ def mesh_of(basin: Basin, setting: Setting) -> Mesh:
 
     try:
         if basin.mesh is None:
+            many = math.prod(basin.cells or ())
+            if many * BASIN_CELL > free_memory():
+                said = f"{many:.3g} cells take about {size(many * BASIN_CELL)} of memory"
+                raise Misfit([(("cells",), f"{said}, and {size(free_memory())} are free; wanted fewer")])
             sides = {name: (one.side, *one.span) if one.span else one.side for name, one in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
             return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
@@ -88,6 +93,8 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
     """Faults of lines across basins; `nodes` are kinds, or what of a basin can be read."""
     for name, line in output.lines.items():
         pool, key = nodes.get(line.basin), ("output", "lines", name)
+        if len(name) > LONGEST_NAME:
+            yield key, f"has {len(name)} letters; wanted {LONGEST_NAME} at most"
         if not re.fullmatch(r"[\w-]+", name):
             yield key, f"{show(name)} is no name; a name has letters, digits, _ and -"
         if line.basin in nodes and pool is None:

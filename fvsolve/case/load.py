@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -9,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, check, scalars, shipped, text
-from fvsolve.case.case import Case, default_cells
+from fvsolve.case import basins, check, scalars, shipped, size, text
+from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, override, read_raw
@@ -76,6 +77,12 @@ def named(source: Any) -> Any:
     return source
 
 
+def crossing(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
+    """Time in which the quickest wave crosses a cell, in basins at 1 m/s [s]; inf without cells."""
+    times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if isinstance(link, Pipe)]
+    return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
+
+
 def _alternatives() -> list[tuple[str, ...]]:
     """Keys of which a table has one at most, over all tables."""
     models = [Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()]
@@ -125,6 +132,9 @@ class _Reader:
             numerics = numerics.filled(has_cells)
         self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
+        if None not in (numerics, output, properties) and not self.faults:
+            self.add(size.misfits(numerics, output, links, meshes))
+            self.add(size.standstill(numerics, crossing(links, meshes, properties)))
         named = self.table("exact", ExactSpec) if "exact" in self.raw.table else None
         self.stop()
         made = Case(
@@ -259,6 +269,8 @@ class _Reader:
         for name, part in self.group(group).items():
             if not re.fullmatch(r"[\w-]+", name):
                 self.fault((group, name), f"{show(name)} is no name; a name has letters, digits, _ and -")
+            if len(name) > size.LONGEST_NAME:
+                self.fault((group, name), f"has {len(name)} letters; wanted {size.LONGEST_NAME} at most")
             if not isinstance(part, dict):
                 self.fault((group, name), f"{show(part)} is no table; wanted one with a type")
                 continue

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+from fvsolve.case.size import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Basin, Chamber, Inflow, Pipe, Reservoir, Tank
 from fvsolve.units import show
@@ -26,6 +27,8 @@ TAKEN |= set(Pipe.along)
 def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
     """Faults of names, of values that parts cannot have, and of what scalars do not go with yet."""
     for name in scalars:
+        if len(name) > LONGEST_NAME:
+            yield ("scalars", name), f"has {len(name)} letters; wanted {LONGEST_NAME} at most"
         if not re.fullmatch(r"[\w-]+", name):
             yield ("scalars", name), f"{show(name)} is no name; a name has letters, digits, _ and -"
         elif name in TAKEN:

@@ -6,6 +6,8 @@ import json
 import re
 from typing import Any
 
+from fvsolve.errors import LONGEST
+
 
 def write(table: dict[str, Any]) -> str:
     """TOML text of nested dicts; tables down to the second level get a header, deeper ones stand in line."""
@@ -20,7 +22,8 @@ def path(keys: tuple[Any, ...]) -> str:
     """A key path as a message shows it: `links.main.length`, `output.probes[2]`."""
     text = ""
     for key in keys:
-        text += f"[{key}]" if isinstance(key, int) else ("." if text else "") + _key(str(key))
+        name = str(key) if len(str(key)) <= LONGEST else f"{str(key)[:57]}..."
+        text += f"[{key}]" if isinstance(key, int) else ("." if text else "") + _key(name)
     return text
 
 

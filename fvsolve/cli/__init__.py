@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from importlib import import_module
 
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
 
@@ -27,6 +28,9 @@ def main() -> None:
 
     0: done. 1: a run stopped early or an expectation failed. 2: bad input. 130: interrupted.
     """
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")  # a terminal of few letters ends no run
+    before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
         for room in COMMANDS:
             import_module(f"fvsolve.cli.{room}")
@@ -46,10 +50,12 @@ def main() -> None:
         _leave("out of memory: fewer cells, fewer probes, or a larger [output] every", 1)
     except Exception as error:  # a fault of ours: say where, so that it can be reported
         _leave(f"internal error in {_where(error)}: {type(error).__name__}: {error}; please report it", 1)
+    finally:
+        warnings.formatwarning = before
 
 
 def _leave(message: str, code: int) -> None:
-    print(message, file=sys.stderr)
+    print(visible(message), file=sys.stderr)
     sys.exit(code)
 
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Cases, Json, One, Set, app, load_case, print_json, value_of
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, visible
 
 
 @app.command()
@@ -26,13 +26,18 @@ def run(
     """Solve cases and write their run directories."""
     from fvsolve.cli import report
     from fvsolve.cli.progress import watched
+    from fvsolve.run import model_of
     from fvsolve.run import run as solve
+    from fvsolve.run.expected import expected
 
     results = []
     for name, place in _places(cases, out).items():
         case = load_case(name, set)
+        model = model_of(case)
+        if said := expected(model):
+            print(visible(said), file=sys.stderr, flush=True)
         with watched(case) as progress:
-            results.append(solve(case, out=place, force=force, resume=resume, progress=progress))
+            results.append(solve(model, out=place, force=force, resume=resume, progress=progress))
         if not as_json:
             report.result(results[-1])
         if results[-1].reason.startswith("interrupted"):

@@ -128,8 +128,8 @@ def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     from fvsolve.studies.points import Points
 
     folder = folder_of(case, "energy", out)
-    with told() as progress, stoppable() as watch:
-        rows = measured(case, schemes, methods, port, progress, Points(folder), watch)
+    with told() as progress, stoppable() as watch, Points(folder) as points:
+        rows = measured(case, schemes, methods, port, progress, points, watch)
     write_pairs(rows, folder / "pairs.csv")
     if as_json:
         print_json({"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]})

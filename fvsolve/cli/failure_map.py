@@ -33,10 +33,10 @@ def map_(
 
     read_case = load_case(case, set)
     folder = folder_of(read_case, "map", out)
-    with told() as progress:
+    with told() as progress, Points(folder) as points:
         found = failures(
             read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
-            _steps(step), _key(key), tolerance, Points(folder), progress,
+            _steps(step), _key(key), tolerance, points, progress,
         )  # fmt: skip
     files = _written(found, folder)
     if as_json:

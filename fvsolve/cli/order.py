@@ -40,9 +40,9 @@ def order(
 
     scene = load_case(case, overrides)
     folder = folder_of(scene, "order", out)
-    points, found = Points(folder), []
+    found = []
     pairs = [(s, m) for s in listed(scheme, "--scheme") or [None] for m in methods_of(method) or [None]]
-    with told() as progress:
+    with told() as progress, Points(folder) as points:
         for one, other in pairs:
             found.append(study(scene, refine=refine, key=key, levels=levels, cells=cells, scheme=one, method=other,
                                against=against, points=points, progress=progress))  # fmt: skip

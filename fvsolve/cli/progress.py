@@ -8,6 +8,8 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from fvsolve.errors import visible
+
 
 @contextmanager
 def watched(case) -> Iterator[Callable[[float, float, int], None]]:
@@ -69,14 +71,14 @@ class Bar:
         self.start, self.end = case.numerics.start, case.numerics.end
         self.first: tuple[float, float] | None = None
         self.shown = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             TextColumn("{task.fields[now]}"),
             TimeRemainingColumn(),
             console=Console(stderr=True),
             transient=True,
         )
-        self.task = self.shown.add_task(case.name, total=self.end - self.start, now="")
+        self.task = self.shown.add_task(visible(case.name), total=self.end - self.start, now="")
 
     def __call__(self, t: float, seconds: float) -> None:
         self.first = self.first or (t, seconds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fvsolve.cli.terminal import console as _console
 from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
+from fvsolve.output.directory import pictures
 
 ROWS = 20  # of a table at most; the rest is on disk
 PIPE = {
@@ -31,7 +32,7 @@ def result(one) -> None:
     said = one.summary
     console = _console()
     if said["title"]:
-        console.print(said["title"], style="bold", highlight=False)
+        _line(console, said["title"], "bold")
     _extremes(console, one)
     for mark in said["marks"]:
         _line(console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow")
@@ -51,7 +52,7 @@ def result(one) -> None:
     when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
     _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
     if one.directory:
-        _line(console, f"{one.directory}: {', '.join(said['files'])}")
+        _line(console, f"{one.directory}: {', '.join(sorted([*said['files'], *pictures(one.directory)]))}")
     if said["reason"].startswith("interrupted"):
         _line(console, "go on with the same command and --resume")
 

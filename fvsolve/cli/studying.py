@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, visible
 
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="folder of tables and pictures")]
 
@@ -77,7 +77,7 @@ def told(kept: bool = True) -> Iterator[Callable[[int, int, str], None]]:
     def progress(done: int, total: int, what: str) -> None:
         seen[:] = done, total
         if shows:
-            print(f"\r\033[K{done} of {total}: {what}", end="", file=sys.stderr, flush=True)
+            print(f"\r\033[K{done} of {total}: {visible(what)}", end="", file=sys.stderr, flush=True)
 
     try:
         yield progress

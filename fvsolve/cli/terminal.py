@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from fvsolve.errors import visible
+
 WIDTH = 160  # of output that goes to no terminal
 
 
@@ -15,8 +17,8 @@ def console():
 
 
 def line(where, text: str, style: str | None = None) -> None:
-    """One line, as it is."""
-    where.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
+    """One line, as it is: nothing in it is markup or steers the terminal."""
+    where.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
 
 
 def table(headers: list[str], rows: list[list[str]], where=None) -> None:
@@ -27,9 +29,9 @@ def table(headers: list[str], rows: list[list[str]], where=None) -> None:
     made = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
     for i, header in enumerate(headers):
         text = all(not _numeric(row[i]) for row in rows)
-        made.add_column(Text(header), justify="left" if text else "right", overflow="fold")
+        made.add_column(Text(visible(header)), justify="left" if text else "right", overflow="fold")
     for row in rows:
-        made.add_row(*(Text(cell) for cell in row))
+        made.add_row(*(Text(visible(cell)) for cell in row))
     (where or console()).print(made)
 
 

@@ -29,6 +29,7 @@ class Curve:
     bold: bool = False  # the program's default
 
 
+@style.as_it_stands
 def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence[str], floors, title: str = ""):
     """A panel per kind of error and of cost; shaded below the floor; what failed stands on the upper margin.
 

@@ -12,6 +12,7 @@ UNITS = ((1e9, "GJ"), (1e6, "MJ"), (1e3, "kJ"), (1.0, "J"), (1e-3, "mJ"), (1e-6,
 KINDS = {"stored": "Blues", "dissipated": "Oranges", "supplied": "Greens"}
 
 
+@style.as_it_stands
 def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None):
     """Three panels over time [s]: energy supplied by port, stored and dissipated by part, and lost to the numbers.
 

@@ -15,6 +15,7 @@ COLOURS = {
 DARK = ("stable", "wrong", "blown up", "refused")  # which white letters stand on
 
 
+@style.as_it_stands
 def failure_map_figure(found, title: str = ""):
     """Methods down, steps or values across, one panel a scheme; a bar where eigenvalues predict the limit."""
     tall = 0.30 * len(found.methods)

@@ -12,6 +12,7 @@ from fvsolve.draw import style
 MARKERS = {"": "o", "pre-asymptotic": "^", "floor": "v", "reference": "X", "off the line": "D"}
 
 
+@style.as_it_stands
 def order_figure(sizes: Sequence[float], curves: Mapping, measure: str, title: str = ""):
     """One pair of axes a variable: curves = {variable: {norm: (errors, fit)}}; a fit has `order`, `constant`, `marks`.
 

@@ -12,6 +12,7 @@ PIPES = 6  # pipes drawn at most, the longest
 POINTS = 4000  # rows drawn as they are; of longer tables least and greatest per bin
 
 
+@style.as_it_stands
 def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
     """Probes over time, one panel per quantity and unit.
 
@@ -36,6 +37,7 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     return figure
 
 
+@style.as_it_stands
 def envelope_figure(envelope, units, title=""):
     """Least and greatest head along each of the longest pipes, with elevation and the head at the start.
 

@@ -15,6 +15,7 @@ LEVELS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of |R|: how much a step damps
 SHADES = ("#0b6aa8", "#3f8abc", "#74abd0", "#a9cce3", "#d6e7f2")
 
 
+@style.as_it_stands
 def region_figure(r: Callable, title: str = ""):
     """Where |R(s)| <= 1, darker where a step damps more, s = h lambda; `r` takes an array of complex numbers."""
     left, right, high = _window(r)
@@ -28,8 +29,8 @@ def region_figure(r: Callable, title: str = ""):
     axes.contour(x, y, size, levels=[1.0], colors=[style.INK], linewidths=1.0)
     for line in (axes.axhline, axes.axvline):
         line(0.0, color=style.MUTED, linewidth=0.6)
-    axes.set_xlabel(r"Re $h\lambda$", fontsize=8.5, color=style.INK)
-    axes.set_ylabel(r"Im $h\lambda$", fontsize=8.5, color=style.INK)
+    axes.set_xlabel("Re hλ", fontsize=8.5, color=style.INK)
+    axes.set_ylabel("Im hλ", fontsize=8.5, color=style.INK)
     axes.ticklabel_format(style="plain")
     bar = figure.colorbar(filled, ax=axes, shrink=0.6, pad=0.02)
     bar.set_label("|R|", fontsize=8.5, color=style.INK)

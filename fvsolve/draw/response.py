@@ -7,6 +7,7 @@ import numpy as np
 from fvsolve.draw import style
 
 
+@style.as_it_stands
 def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=0.0, title: str = "", said: str = ""):
     """Bode plot of h over w with Re h below; bands where Re h < 0 shaded, poles on the axis as dotted lines.
 

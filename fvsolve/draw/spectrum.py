@@ -10,6 +10,7 @@ from fvsolve.draw import style
 from fvsolve.draw.region import region_figure
 
 
+@style.as_it_stands
 def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = None, title: str = ""):
     """Eigenvalues times the step over |R(s)| <= 1, and the boundary of the field of values times it where given."""
     made = region_figure(r, title)

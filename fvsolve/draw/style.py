@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
+from fvsolve.errors import visible
+
 INK, MUTED, HAIR = "#1f2933", "#6b7785", "#d9dee4"
 DOUBT = "#c2410c"  # marks: results are not to be trusted from there on
 # Told apart also by readers who see no red or green (after Wong 2011, Nature Methods 8:441).
 COLOURS = ("#0b6aa8", "#d1622b", "#12876f", "#8a4fa3", "#b8860b", "#4aa3d8", "#a3324a", "#5a6b2f")
 WIDTH = 9.0  # of a picture [inch]
 DPI = 150
+LONGEST = 200  # letters of a title
 
 
 def figure(height: float, width: float = WIDTH):
@@ -17,6 +23,25 @@ def figure(height: float, width: float = WIDTH):
 
     made = Figure(figsize=(width, height), dpi=DPI, facecolor="white", layout="constrained")
     FigureCanvasAgg(made)
+    return made
+
+
+def as_it_stands(make: Callable) -> Callable:
+    """A function that makes a figure, none of whose texts is markup: `$` is a dollar, but in powers on log axes."""
+
+    @functools.wraps(make)
+    def made(*arguments, **keywords):
+        from matplotlib.text import Text
+        from matplotlib.ticker import LogFormatter
+
+        figure = make(*arguments, **keywords)
+        powers = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
+                  if isinstance(axis.get_major_formatter(), LogFormatter)]  # fmt: skip
+        kept = {text for axis in powers for text in axis.findobj(Text) if text is not axis.label}
+        for text in set(figure.findobj(Text)) - kept:
+            text.set(parse_math=False, usetex=False)
+        return figure
+
     return made
 
 
@@ -62,5 +87,6 @@ def legend(axes) -> None:
 
 def title(made, text: str) -> None:
     """The title over a whole picture."""
+    text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
     if text:
-        made.suptitle(text, fontsize=10.5, color=INK, x=0.012, ha="left")
+        made.suptitle(visible(text), fontsize=10.5, color=INK, x=0.012, ha="left")

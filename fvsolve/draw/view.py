@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.errors import FvsolveError, did_you_mean, listing, visible
 
 SIZE, SMALL = (1500, 900), (1000, 600)  # of a picture, of an animation [pixels]
 TUBE = 0.006  # radius of a pipe as part of the picture's diagonal
@@ -139,7 +139,7 @@ class Scene:
                 self.coloured(plotter, mesh.cell_data_to_point_data() if plane else tube(mesh), plane)
         if self.rise != 1.0:
             caption += f"; heights drawn {self.rise:.3g} times"
-        plotter.add_text(caption, font_size=12, color=INK, position="upper_left")
+        plotter.add_text(unmarked(caption), font_size=12, color=INK, position="upper_left")
         if not self.seen:  # a camera that is set twice forgets its zoom
             _look(plotter, [*self.box[:4], self.rise * self.box[4], self.rise * self.box[5]], self.water)
             self.seen = True
@@ -161,9 +161,10 @@ class Scene:
     def coloured(self, plotter: Any, shape: Any, plane: bool) -> None:
         """A shape in the colours of its field, with lines of equal values where it is plane."""
         low, high = self.limits
+        title = unmarked(f"{self.field.replace('_', ' ')} [{self.unit}]")
         plotter.add_mesh(
             shape, scalars=self.field, cmap="viridis", clim=self.limits, smooth_shading=True,
-            scalar_bar_args={"title": f"{self.field.replace('_', ' ')} [{self.unit}]", "fmt": digits(low, high), **BAR},
+            scalar_bar_args={"title": title, "fmt": digits(low, high), **BAR},
         )  # fmt: skip
         if plane and self.contours and self.field in shape.point_data:
             levels = [low + (high - low) * (k + 1) / (self.contours + 1) for k in range(self.contours)]
@@ -177,6 +178,11 @@ BAR = {
     "color": INK, "n_labels": LABELS,  # none below the title
     "title_font_size": 22, "label_font_size": 18, "width": 0.5, "height": 0.09, "position_x": 0.25, "position_y": 0.03,
 }  # fmt: skip
+
+
+def unmarked(text: str) -> str:
+    """Text that VTK draws as it stands: `$` begins no formula."""
+    return visible(text).replace("$", "\\$")
 
 
 def read(file: str | Path, field: str) -> Any:

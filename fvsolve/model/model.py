@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.errors import Notice
+from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import FIFTH
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.shown import Shown
+from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
@@ -45,11 +46,37 @@ class State(Shown):
 
     picture = "fvsolve.draw.objects:state_figure"
 
+    def __post_init__(self) -> None:
+        self.t = given_time(self.t)
+        self.y, self.memory = given_numbers("y", self.y), given_numbers("memory", self.memory)
+        for name, array in (("y", self.y), ("memory", self.memory)):
+            if array.ndim != 1:
+                raise FvsolveError(f"{name} has shape {array.shape}; wanted one row of numbers")
+
     def said(self) -> str:
         return f"at t = {self.t:g} s: {self.y.size} numbers"
 
     def listed(self) -> dict[str, np.ndarray]:
         return {"y": self.y}
+
+
+def given_numbers(name: str, given: Any) -> np.ndarray:
+    """What is given as float64[...], itself where it is that; FvsolveError where it is not made of real numbers."""
+    try:
+        found = np.asarray(given)
+        if found.dtype.kind not in "fiu":
+            raise TypeError
+        return np.ascontiguousarray(found, dtype=np.float64) if found.ndim else found.astype(np.float64)
+    except (TypeError, ValueError):
+        raise FvsolveError(f"{name} = {show(given)} is not made of real numbers") from None
+
+
+def given_time(t: Any) -> float:
+    """A time [s]; FvsolveError where it is no finite number."""
+    found = given_numbers("t", t)
+    if found.ndim or not np.isfinite(found):
+        raise FvsolveError(f"t = {show(t)} is no time; wanted a finite number of seconds")
+    return float(found)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,6 +204,14 @@ class Model(Shown):
         """An array for what the rhs writes beside dydt."""
         return np.zeros(int(self.layout["size"]))
 
+    def given(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
+        """A time and a state as kernels take them; FvsolveError where they are none of this model."""
+        found = given_numbers("y", y)
+        if found.shape != (self.y_size,):
+            raise FvsolveError(f"y has shape {found.shape}; wanted a number for each of the {self.y_size} states that "
+                               "Model.state_names lists")  # fmt: skip
+        return given_time(t), found
+
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
         """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there."""
         armed = self.tables[rec.I_ARMED]
@@ -188,15 +223,16 @@ class Model(Shown):
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
+        t, y = self.given(t, y)
         self.tables[rec.I_SETTINGS][0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
-        y = np.ascontiguousarray(y, dtype=np.float64)
-        self.arm(float(t), y)
-        self.functions.rhs(float(t), y, dydt, out, self.handle)
+        self.arm(t, y)
+        self.functions.rhs(t, y, dydt, out, self.handle)
         return dydt, out
 
     def arm(self, t: float, y: np.ndarray) -> None:
         """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
+        t, y = self.given(t, y)
         armed, g = self.tables[rec.I_ARMED], np.zeros(self.tables[rec.I_ARMED].size)
         for _ in range(1 + 2 * len(self.events)):
             self.functions.events(t, y, self.handle, g)
@@ -207,7 +243,7 @@ class Model(Shown):
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
-        n = self.y_size
+        (t, y), n = self.given(t, y), self.y_size
         found = np.empty((n, n))
         for j in range(n):
             step = 1e-6 * (self.scale[j] + abs(y[j]))
@@ -219,6 +255,7 @@ class Model(Shown):
 
     def observe(self, t: float, y: np.ndarray, limit: float = np.inf) -> np.ndarray:
         """Values of all probes : float64[probes] [SI]."""
+        t, y = self.given(t, y)
         out = self.evaluate(t, y, limit)[1]
         values = np.zeros(len(self.probes))
         self.functions.observe(float(t), y, out, self.handle, values)
@@ -228,6 +265,10 @@ class Model(Shown):
 
     def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
         """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
+        waves = given_numbers("waves", waves)
+        if not 0 <= k < len(self.pipes) or waves.shape != (self.pipes[k].cells,):
+            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; wanted a number for each cell of one of "
+                               f"{len(self.pipes)} pipes, counted from 0")  # fmt: skip
         row = self.tables[rec.I_PIPES][k]
         if self.case.fluid.law == "linear":
             return self.profiles[k] + waves / row["admittance"]
@@ -239,6 +280,7 @@ class Model(Shown):
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
         """Head [m] of the case's fluid above datum, measured from ambient."""
+        pressure, elevation = given_numbers("pressure", pressure), given_numbers("elevation", elevation)
         ambient, gravity = self.case.ambient_pressure, self.case.gravity
         if self.case.fluid.law == "linear":
             return (pressure - ambient) / (self.case.properties.density * gravity) + elevation
@@ -273,7 +315,10 @@ class Model(Shown):
         return np.array([wall_area(self.tables[rec.I_SETTINGS][0], row, float(p)) for p in pressure])
 
     def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
-        """Fields of all pipes and pressures of all nodes at a state, SI."""
+        """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it."""
+        _, y = self.given(0.0, y)
+        if np.shape(out) != (int(self.layout["size"]),):
+            raise FvsolveError(f"out has shape {np.shape(out)}; wanted what Model.evaluate gives beside the rates")
         found, rho = {}, self.case.properties.density
         linear = self.case.fluid.law == "linear"
         for k, pipe in enumerate(self.pipes):
@@ -305,6 +350,7 @@ class Model(Shown):
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
         """Mass stored in the profile and by how much the state deviates from it [kg]."""
+        _, y = self.given(0.0, y)
         fluid, initial, change = self.case.properties, 0.0, 0.0
         for k, pipe in enumerate(self.pipes):
             row = self.tables[rec.I_PIPES][k]

@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fvsolve.errors import Fault, MeshError, did_you_mean, listing
+from fvsolve.parts.csv_rows import Misread, read_rows
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
 
+COLUMNS = (("x", "y", "u", "v"), ("x", "y", "psi"))  # of a file
+DIMENSIONS = {"x": "length", "y": "length", "u": "velocity", "v": "velocity", "psi": "diffusivity"}
 EXACT_BITS = 50  # of a stream function that are kept, so that sums of its differences are exact
 
 
@@ -60,8 +63,8 @@ def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
     """float64[f]: flow through every face per depth, along its normal [m2/s].
 
     velocity : one of {"expression": name, its parameters}, {"stream": float64[p] at the corners [m2/s]},
-    {"file": CSV with a header x, y, u, v or x, y, psi, interpolated linearly}; all but those of u and v have no
-    divergence in any cell, to the bit
+    {"file": CSV with a header x, y, u, v or x, y, psi, with units or in SI, interpolated linearly}; all but those of u
+    and v have no divergence in any cell, to the bit
     Raises ValueError for an expression, MeshError for a file.
     """
     kinds = {"expression": _by_name, "stream": _by_corners, "file": _by_file}
@@ -130,28 +133,18 @@ def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
 def _columns(path: Path) -> dict[str, np.ndarray]:
     """The columns of a CSV file by name."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeshError([Fault("", f"cannot be read: {error}")], str(path)) from error
-    names = [name.strip() for name in lines[0].split(",")] if lines else []
-    if set(names) not in ({"x", "y", "u", "v"}, {"x", "y", "psi"}):
-        text = f"its header is {', '.join(names) or 'empty'}; wanted x, y, u, v or x, y, psi"
-        raise MeshError([Fault("", text, 1)], str(path))
-    rows = []
-    for number, line in enumerate(lines[1:], 2):
-        if not line.strip():
-            continue
-        try:
-            row = [float(value) for value in line.split(",")]
-        except ValueError:
-            row = []
-        if len(row) != len(names) or not np.isfinite(row).all():
-            text = f'"{line}"; wanted {len(names)} numbers, {", ".join(names)}'
-            raise MeshError([Fault("", text, number)], str(path))
-        rows.append(row)
-    if len(rows) < 3:
-        raise MeshError([Fault("", f"it has {len(rows)} points; wanted at least three, around the mesh")], str(path))
-    return dict(zip(names, np.array(rows).T, strict=True))
+        rows = read_rows(path)
+        if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
+            raise Misread(path.name, f"its header is {', '.join(rows.header)}; wanted x, y, u, v or x, y, psi", 1)
+        found = {name: rows.numbers(k, DIMENSIONS[name]) for k, name in enumerate(rows.names)}
+    except Misread as error:
+        raise MeshError([Fault("", error.message, error.line)], str(path)) from None
+    except ValueError as error:
+        raise MeshError([Fault("", str(error))], str(path)) from None
+    if len(rows.lines) < 3:
+        text = f"it has {len(rows.lines)} points; wanted at least three, around the mesh"
+        raise MeshError([Fault("", text)], str(path))
+    return found
 
 
 def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
+from fvsolve.case.size import LEAST_TEXT, on_disk, size
 from fvsolve.errors import RunError
 from fvsolve.output.column import probe_columns, time_column
 from fvsolve.output.envelope import read_envelope, with_start, write_envelope
 from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
 from fvsolve.output.lines import LineSeries, clear_lines
+from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary import read_summary
 
@@ -33,13 +37,22 @@ class RunDirectory:
             raise RunError("--resume goes on with a run and --force starts it again; state one of them")
         _refuse_names(model.case)
         self.who = identity(model.case)
-        self.restart = self._checkpoint() if resume else None
-        if self.restart is None:
-            _refuse(self.folder, force, resume)
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
         drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
+        if self.folder.exists() and not self.folder.is_dir():
+            raise RunError(f"{self.folder} is a file; state another place with --out DIR")
+        self.lock = locked(self.folder, "a run")
+        try:
+            self.restart = self._checkpoint() if resume else None
+            if self.restart is None and not force:
+                _refuse(self.folder)
+            if self.restart is None:
+                _refuse_size(self.folder, model.case)
+        except BaseException:
+            let_go(self.lock)
+            raise
 
     @property
     def ended(self) -> bool:
@@ -51,7 +64,8 @@ class RunDirectory:
 
     def begin(self, model, state) -> None:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
-        (self.folder / ENDED).unlink(missing_ok=True)
+        for name in (ENDED, *PICTURES):
+            (self.folder / name).unlink(missing_ok=True)
         if self.restart is None:
             self._start()
             self._write_case()
@@ -66,32 +80,50 @@ class RunDirectory:
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
-        self.history.write(t, values)
+        with self.writing():
+            self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
         """Write a frame of all pipes and basins at time `t` [s]."""
-        if self.lines:
-            self.lines.write(self.fields.frames, frame)
-        if self.fields:
-            self.fields.write(t, frame)
+        with self.writing():
+            if self.lines:
+                self.lines.write(self.fields.frames, frame)
+            if self.fields:
+                self.fields.write(t, frame)
 
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by one that knows this state and all rows and frames so far."""
-        size = self.history.flush()
-        frames = self.fields.frames if self.fields else 0
-        restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
-        write_restart(self.folder / "restart.npz", restart, self.who)
+        with self.writing():
+            size = self.history.flush()
+            frames = self.fields.frames if self.fields else 0
+            restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
+            write_restart(self.folder / "restart.npz", restart, self.who)
 
     def end(self, summary) -> None:
         """Close the history and write the envelope; summary.json is the caller's last word."""
-        self.history.close()
-        if summary.envelope:
-            envelope = with_start(summary.envelope, self.model)
-            write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
+        with self.writing():
+            self.history.close()
+            if summary.envelope:
+                envelope = with_start(summary.envelope, self.model)
+                write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
 
     def close(self) -> None:
-        """Let go of open files, also when a run broke off."""
-        self.history.close()
+        """Let go of open files and of the directory, also when a run broke off."""
+        try:
+            with self.writing():
+                self.history.close()
+        finally:
+            let_go(self.lock)
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """What cannot be written is told with its place: RunError."""
+        try:
+            yield
+        except OSError as error:
+            place = error.filename or self.folder
+            raise RunError(f"{place}: cannot be written: {error.strerror or error}; make room and go on with --resume, "
+                           "or state another place with --out DIR") from None  # fmt: skip
 
     def table(self):
         """`float64[rows, 1 + probes]`: time and probes as history.csv has them."""
@@ -102,21 +134,23 @@ class RunDirectory:
         return _envelope(self.folder)
 
     def files(self) -> list[str]:
-        """Names of the files that a reader will look for, as far as they are there."""
-        names = [*OWN, *PICTURES, *self.model.case.copies]
+        """Names of the files that a reader will look for, as far as they are there; pictures come after them."""
+        names = [*OWN, *self.model.case.copies]
         there = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
         return sorted([*there, ENDED])
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
         found = read_restart(path, self.who) if path.is_file() else None
+        if found and found.y.size != self.model.y_size:
+            raise RunError(f"{path} holds {found.y.size} states, and the case has {self.model.y_size}; start the run "
+                           "again with --force")  # fmt: skip
         if found and found.t > self.model.case.numerics.end:
             raise RunError(f"{path} is at t = {found.t:.6g} s, after numerics.end; start again with --force")
         return found
 
     def _start(self) -> None:
         clear(self.folder)
-        self.folder.mkdir(parents=True, exist_ok=True)
         self.history.start()
         if self.fields:
             self.fields.start()
@@ -125,7 +159,8 @@ class RunDirectory:
 
     def _write_case(self) -> None:
         case = self.model.case
-        (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
+        with self.writing():
+            (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
         for name, path in case.copies.items():
             copy = self.folder / name
             if copy.resolve() != Path(path).resolve():
@@ -162,11 +197,19 @@ def _refuse_names(case) -> None:
             raise RunError(f"{path} has the name of a file that every run writes; give it another name")
 
 
-def _refuse(folder: Path, force: bool, resume: bool) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise RunError(f"{folder} is a file; state another place with --out DIR")
-    if force or not folder.is_dir():
-        return
+def _refuse_size(folder: Path, case) -> None:
+    least, free = on_disk(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
+    if least > free:
+        raise RunError(f"{folder}: history.csv would take {size(least)} at least, and {size(free)} are free; wanted a "
+                       "longer [output] every, or another place with --out DIR")  # fmt: skip
+
+
+def pictures(folder: Path) -> list[str]:
+    """Names of the pictures that are there."""
+    return [name for name in PICTURES if (folder / name).is_file()]
+
+
+def _refuse(folder: Path) -> None:
     if (folder / ENDED).exists():
         raise RunError(f"{folder} holds a run; replace it with --force, or keep it and state --out DIR")
     if (folder / "restart.npz").exists():

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.errors import RunError
 from fvsolve.output.column import Column, column, split_header
 
 QUANTITIES = {
@@ -52,10 +53,13 @@ def write_envelope(path: Path, envelope: dict, case) -> None:
 
 def read_envelope(path: Path) -> dict:
     """Pipe -> quantity -> float64[cells] as the file has them."""
-    with open(path, encoding="utf-8", newline="") as file:
-        rows = csv.reader(file)
-        names = [split_header(header)[0] for header in next(rows)]
-        pipes: dict[str, list] = {}
-        for row in rows:
-            pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
-    return {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+    pipes: dict[str, list] = {}
+    try:
+        with open(path, encoding="utf-8", newline="") as file:
+            rows = csv.reader(file)
+            names = [split_header(header)[0] for header in next(rows, [])]
+            for row in rows:
+                pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
+        return {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+    except (ValueError, IndexError, csv.Error) as error:
+        raise RunError(f"{path} cannot be read: {error}") from None

@@ -6,7 +6,9 @@ array carries its unit as VTK's own UNITS_LABEL.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -19,6 +21,7 @@ UNITS = {
 }  # fmt: skip
 UNIT = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
 ARRAY = b"</DataArray>"
+FILE = re.compile('file="([^"]+)"')
 
 HEAD = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
@@ -53,13 +56,16 @@ class FieldSeries:
     def continue_from(self, frames: int) -> None:
         """Keep the first `frames` of a series, drop what came after its checkpoint."""
         listed = self.folder / "fields.pvd"
-        lines = listed.read_text().splitlines() if listed.is_file() else []
+        lines = listed.read_text(encoding="utf-8").splitlines() if listed.is_file() else []
         many = frames * (len(self.basins) + (1 if self.pipes else 0))
         kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:many]
-        if len(kept) < many:
+        named = [FILE.search(line) for line in kept]
+        if len(kept) < many or not all(one and (self.folder / one[1]).is_file() for one in named):
             raise RunError(f"{listed} lacks frames; start the run again with --force")
+        (self.folder / "fields").mkdir(exist_ok=True)
         for path in (self.folder / "fields").glob("*.vtu"):
-            if int(path.stem.rpartition("-")[2]) >= frames:
+            number = path.stem.rpartition("-")[2]
+            if number.isdecimal() and int(number) >= frames:
                 path.unlink()
         listed.write_bytes((HEAD + "".join(kept) + TAIL).encode())
         self.frames = frames
@@ -96,7 +102,7 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
     text = path.read_bytes()
     for name, unit in units.items():
         end = text.index(ARRAY, text.index(f' Name="{name}"'.encode()))
-        text = text[:end] + UNIT.format(unit).encode() + text[end:]
+        text = text[:end] + UNIT.format(escape(unit)).encode() + text[end:]
     path.write_bytes(text)
 
 
@@ -150,6 +156,6 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
 
     try:
         root = ElementTree.parse(path).getroot()
-    except (OSError, ElementTree.ParseError) as error:
+        return [(float(one.attrib["timestep"]), path.parent / one.attrib["file"]) for one in root.iter("DataSet")]
+    except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
-    return [(float(one.get("timestep")), path.parent / one.get("file")) for one in root.iter("DataSet")]

@@ -23,7 +23,7 @@ class HistoryFile:
     def start(self) -> None:
         """Begin an empty file with its header."""
         self._file = open(self.path, "wb")
-        headers = ",".join(_quoted(one.header) for one in [self.time, *self.columns])
+        headers = ",".join(quoted(one.header) for one in [self.time, *self.columns])
         self._file.write(f"{headers}\n".encode())
 
     def continue_from(self, rows: int, size: int) -> None:
@@ -52,8 +52,8 @@ class HistoryFile:
     def close(self) -> None:
         """Close the file; closing twice does no harm."""
         if self._file is not None:
-            self._file.close()
-            self._file = None
+            file, self._file = self._file, None
+            file.close()
 
 
 def read_headers(path: Path) -> list[tuple[str, str]]:
@@ -76,8 +76,11 @@ def read_table(path: Path) -> np.ndarray:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
         except ValueError as error:
             raise RunError(f"{path} cannot be read: {error}") from None
+    if table.size and table.shape[1] != names:
+        raise RunError(f"{path} cannot be read: {table.shape[1]} numbers in a row under {names} headers")
     return table if table.size else np.empty((0, names))
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """A header as CSV writes it."""
     return '"' + text.replace('"', '""') + '"' if any(sign in text for sign in ',"\n') else text

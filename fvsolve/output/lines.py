@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.errors import RunError
 from fvsolve.output.column import Column, column, converted
+from fvsolve.output.history import quoted
 
 AXES = {"u": 0, "v": 1}  # of velocities
 FILE = re.compile(r"(.+)-(\d{6,})\.csv")
@@ -32,6 +33,7 @@ class LineSeries:
         for name in self.lines:
             if frames and not self.path(name, frames - 1).is_file():
                 raise RunError(f"{self.folder} lacks frames of {name}; start the run again with --force")
+        self.folder.mkdir(exist_ok=True)
         clear_lines(self.folder.parent, frames)
 
     def write(self, number: int, frame: dict) -> None:
@@ -67,7 +69,7 @@ class Line:
         """The file of a frame."""
         values = np.column_stack([self.places, *(self.along(one.name, fields) for one in self.columns[3:])])
         rows = [",".join(map(repr, row)) for row in converted(self.columns, values).tolist()]
-        return "\n".join([",".join(one.header for one in self.columns), *rows]) + "\n"
+        return "\n".join([",".join(quoted(one.header) for one in self.columns), *rows]) + "\n"
 
     def along(self, name: str, fields: dict[str, np.ndarray]) -> np.ndarray:
         """A field at the points, nan in holes : float64[points]."""

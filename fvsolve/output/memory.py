@@ -13,6 +13,7 @@ class MemorySink:
 
     folder = None
     restart = None
+    ended = False
 
     def __init__(self, model):
         self.model = model

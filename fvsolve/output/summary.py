@@ -8,9 +8,15 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-from fvsolve.errors import RunError
+from fvsolve.errors import RunError, listing
 from fvsolve.output.column import probe_columns, time_column
 from fvsolve.output.envelope import envelope_columns
+
+# What a reader looks for.
+NEEDED = (
+    "title", "case", "reason", "ok", "t", "marks", "probes", "time_unit", "envelope_units", "ambient_pressure",
+    "extremes", "ledgers", "expectations", "comparisons", "versions", "warnings", "files",
+)  # fmt: skip
 
 
 def described(summary, model) -> dict:
@@ -66,7 +72,11 @@ def write_summary(path: Path, summary: dict) -> None:
 def read_summary(path: Path) -> dict:
     """summary.json as it was written; RunError where there is none."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8"))
+        lacks = [key for key in NEEDED if key not in found] if isinstance(found, dict) else ["a table"]
+        if lacks:
+            raise ValueError(f"it lacks {listing(lacks)}, so no run wrote it; run again with --force")
+        return found
     except FileNotFoundError:
         raise RunError(f"{path.parent} holds no ended run (no {path.name})") from None
     except (OSError, ValueError) as error:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.series import copy_name, find_file, read_rows
+from fvsolve.parts.csv_rows import read_rows
+from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.value import Misfit, Quantity, Range, Setting, Value, anything
 from fvsolve.units import show
 
@@ -84,7 +85,7 @@ class Shaped(Value):
             raise ValueError(f'{show(given)}; wanted {{ file = "NAME.csv" }}, columns x, y and the value')
         try:
             path = find_file(given["file"], setting)
-            columns = read_points(path)
+            columns = read_points(path, self.dimension)
         except ValueError as error:
             raise Misfit([(("file",), str(error))]) from None
         return Formula({"file": copy_name(path, setting)}, Samples(columns))
@@ -93,18 +94,14 @@ class Shaped(Value):
         return {"type": ["number", "string", "object"]}
 
 
-def read_points(path: Path) -> np.ndarray:
-    """Rows x [m], y [m], value below a header : float64[n, 3]; ValueError names the line at fault."""
-    _, rows = read_rows(path)
-    found = np.zeros((len(rows), 3))
-    for k, (number, row) in enumerate(rows):
-        values = [plain(one) for one in row]
-        if len(row) != 3 or not all(isinstance(one, float) and np.isfinite(one) for one in values):
-            raise ValueError(f"{path.name}, line {number}: {show(','.join(row))}; wanted x [m], y [m] and the value")
-        found[k] = values
-    if len(found) < 3:
-        raise ValueError(f"{path.name}: {len(found)} points; wanted three at least")
-    return found
+def read_points(path: Path, dimension: str) -> np.ndarray:
+    """Columns x [m], y [m] and the value [SI] : float64[n, 3]; ValueError names the line at fault."""
+    rows = read_rows(path)
+    if len(rows.header) != 3:
+        raise ValueError(f"{path.name} has {len(rows.header)} columns; wanted x, y and the value")
+    if len(rows.lines) < 3:
+        raise ValueError(f"{path.name}: {len(rows.lines)} points; wanted three at least")
+    return np.column_stack([rows.numbers(k, one) for k, one in enumerate(("length", "length", dimension))])
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from fvsolve.errors import CaseError, RunError
-from fvsolve.output.directory import RunDirectory, read_directory
+from fvsolve.output.directory import RunDirectory, pictures, read_directory
 from fvsolve.output.memory import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import described, write_summary
@@ -42,13 +45,13 @@ def run(
         sink = MemorySink(model)
     else:
         sink = RunDirectory(Path(out), model, force, resume)
-        if sink.ended:
-            return open_run(out)
     try:
-        summary = _solve(model, sink, progress)
+        result = open_run(out) if sink.ended else _result(model, _solve(model, sink, progress), sink, begun)
+        if sink.folder is not None:
+            _draw(result)
+        return result
     finally:
         sink.close()
-    return _result(model, summary, sink, begun)
 
 
 def open_run(directory: str | Path) -> Result:
@@ -67,6 +70,8 @@ def model_of(case, set: Mapping | None = None):
             return build(case)
         except CaseError as error:
             raise located(error, case) from None
+        except MemoryError:
+            raise RunError(f"{case.name}: memory is too small for its model; wanted fewer cells") from None
     if set:
         raise RunError("a Model is made and cannot be overridden; give set= together with the case")
     return case
@@ -89,7 +94,6 @@ def _result(model, summary, sink, begun: float) -> Result:
     said |= claims(model, summary.extremes, result)
     said["versions"] = identity(model.case)
     if sink.folder is not None:
-        _draw(result)
         said["files"] = sink.files()
         said["seconds_total"] = time.perf_counter() - begun
         write_summary(sink.folder / "summary.json", said)
@@ -97,8 +101,18 @@ def _result(model, summary, sink, begun: float) -> Result:
 
 
 def _draw(result: Result) -> None:
-    """Write the pictures of a run directory."""
-    if result.probes:
-        result.plot(result.directory / "history.png")
-    if result.envelope:
-        result.plot_envelope(result.directory / "envelope.png")
+    """Write the pictures of a run directory that are not there, each whole or not at all; a warning of what fails."""
+    there = pictures(result.directory)
+    drawn = {"history.png": result.plot if result.probes else None,
+             "envelope.png": result.plot_envelope if result.envelope else None}  # fmt: skip
+    for name, draw in drawn.items():
+        if name in there or draw is None:
+            continue
+        path, fresh = result.directory / name, result.directory / f"fresh-{name}"
+        try:
+            draw(fresh)
+            os.replace(fresh, path)
+        except Exception as error:  # whatever it is, the numbers are there
+            with contextlib.suppress(OSError):
+                fresh.unlink()
+            warnings.warn(f"{path} could not be drawn: {type(error).__name__}: {error}", RuntimeWarning, stacklevel=3)

@@ -134,7 +134,11 @@ class Result(Shown):
     @cached_property
     def envelope(self) -> dict:
         """Pipe -> distance, elevation, least and greatest pressure and head, times: float64[cells]."""
-        return self._read_envelope()
+        found = self._read_envelope()
+        for arrays in found.values():
+            for array in arrays.values():
+                array.flags.writeable = False
+        return found
 
     @property
     def probes(self) -> list[str]:
@@ -143,7 +147,11 @@ class Result(Shown):
 
     @cached_property
     def _table(self) -> np.ndarray:
-        return self._read_table()
+        table = self._read_table()
+        if table.shape[1] != 1 + len(self.units):
+            raise RunError(f"history.csv has {table.shape[1]} columns; wanted the time and {len(self.units)} probes")
+        table.flags.writeable = False
+        return table
 
     @property
     def t(self) -> np.ndarray:
@@ -160,8 +168,8 @@ class Result(Shown):
         return Column("t", "time", self.summary["time_unit"])
 
     def __getitem__(self, probe: str) -> np.ndarray:
-        if probe not in self.units:
-            raise FvsolveError(f"no probe {probe!r}{did_you_mean(probe, self.units)}; see Result.probes")
+        if not isinstance(probe, str) or probe not in self.units:
+            raise FvsolveError(f"no probe {probe!r}{did_you_mean(str(probe), self.units)}; see Result.probes")
         return self._table[:, 1 + self.probes.index(probe)]
 
     def frame(self):
@@ -170,9 +178,9 @@ class Result(Shown):
             import pandas
         except ImportError:
             raise FvsolveError("Result.frame() needs pandas: pip install pandas") from None
-        index = pandas.Index(self.t, name=self._time.header)
+        index = pandas.Index(self.t.copy(), name=self._time.header)
         headers = [f"{name} [{unit}]" for name, unit in self.units.items()]
-        return pandas.DataFrame(self._table[:, 1:], index=index, columns=headers)
+        return pandas.DataFrame(self._table[:, 1:].copy(), index=index, columns=headers)
 
     def plot(self, path=None):
         """The probes over time as a matplotlib Figure, also written to `path` where one is given."""

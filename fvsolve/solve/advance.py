@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from numbers import Real
 from typing import NamedTuple
@@ -25,10 +26,17 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     FvsolveError for an input that names nothing or is out of range, a time before the state's, and a run that
     cannot go on.
     """
+    if not isinstance(model, Model) or not isinstance(state, State):
+        raise FvsolveError(f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
+    if inputs is not None and not isinstance(inputs, Mapping):
+        raise FvsolveError(f"inputs = {show(inputs)} is no table; wanted names with a number each")
+    if isinstance(until, bool) or not isinstance(until, Real):
+        raise FvsolveError(f"until = {show(until)} is no time; wanted a finite number of seconds")
     if not math.isfinite(until):
         raise FvsolveError(f"until = {until} is no time; wanted a finite number of seconds")
     if not until >= state.t:
         raise FvsolveError(f"until = {until:g} s lies before the state's time, {state.t:g} s")
+    model.given(state.t, state.y)
     held = hold(model, inputs or {})
     loop = Loop(held, lambda: model.structure)  # which does not depend on what is held
     loop.now[:] = state.y

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from fvsolve.errors import listing
+from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.model.basins.dispersion import Watch
@@ -41,6 +41,11 @@ def solve(model: Model, state: State, sink, progress=None) -> Summary:
 
     progress(t, seconds, steps) is called about ten times a second. A state with memory is resumed bit for bit.
     """
+    if not isinstance(model, Model) or not isinstance(state, State):
+        raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
+    if progress is not None and not callable(progress):
+        raise FvsolveError(f"progress = {progress!r} cannot be called; wanted progress(t, seconds, steps)")
+    model.given(state.t, state.y)
     return Run(model, state, sink, progress).go()
 
 
@@ -78,7 +83,11 @@ class Run:
         self.processor = 0.0  # seconds of CPU time of the steps of this process
         self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
         if not self.fresh:
-            self.remember(state.memory)
+            try:
+                self.remember(state.memory)
+            except (ValueError, IndexError, OverflowError):  # of a damaged checkpoint, or of another solver's
+                raise RunError(f"a memory of {state.memory.size} numbers is not of such a run; start it again with "
+                               "--force, or with a State without memory") from None  # fmt: skip
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
@@ -93,12 +102,17 @@ class Run:
 
     def remember(self, memory: np.ndarray) -> None:
         self.segment, self.seconds, changes = int(memory[0]), float(memory[1]), int(memory[2])
+        if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[3 + 3 * changes] >= 0):
+            raise ValueError("counts out of range")
         self.changes = [tuple(row) for row in memory[3 : 3 + 3 * changes].reshape(-1, 3).tolist()]
         if changes % 2 == 1:
             automatic.change(self.loop.stepper)
         memory = memory[3 + 3 * changes :]
         events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
+        known = [self.model.tables[at] for at in PERSISTENT] + self.loop.stepper.memories()
+        if memory.size != sum(array.size for array in known):
+            raise ValueError("as many numbers as there is nothing for")
         memory = self.loop.stepper.remember(memory)
         for at in PERSISTENT:
             array = self.model.tables[at].ravel()

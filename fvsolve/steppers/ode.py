@@ -44,8 +44,14 @@ def integrate(
     watched = method == AUTO
     if watched and step is not None:
         raise FvsolveError('method "auto" goes by the error of its steps; give rtol, not step')
+    if not isinstance(method, (str, Method)):
+        raise FvsolveError(f"method = {method!r} is none; wanted a name or a tableau")
+    if counts is not None and not isinstance(counts, dict):
+        raise FvsolveError(f"counts = {counts!r} cannot be filled; wanted a dict")
     method = method_named(automatic.first_method(method)) if isinstance(method, str) else method
     t, y0 = _numbers("t", t), np.atleast_1d(_numbers("y0", y0))
+    if y0.ndim != 1:
+        raise FvsolveError(f"y0 has shape {y0.shape}; wanted one row of numbers")
     _check(method, t, rtol, step)
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
@@ -121,6 +127,8 @@ def _failure(method, code, memory) -> str:
 
 def _numbers(name, given) -> np.ndarray:
     try:
+        if np.asarray(given).dtype.kind == "c":
+            raise TypeError
         return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
         raise FvsolveError(f"{name} = {given!r} is not made of numbers") from None

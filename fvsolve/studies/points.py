@@ -7,12 +7,15 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import plain
 
 
 class Points:
     """What was found before, by case and settings, in `points.jsonl` of a folder; in memory without one.
+
+    While it is open (`with Points(folder) as points`) no other study writes there: RunError where one does.
 
     A point is reused only for the same case (as resolved, with its files), the same extra settings and the same
     versions of fvsolve and what it computes with.
@@ -22,13 +25,22 @@ class Points:
         self.path = None if folder is None else Path(folder) / "points.jsonl"
         self.found: dict[str, dict] = {}
         self.reused = 0
+        self.lock = None if folder is None else locked(Path(folder), "a study")
         if self.path is not None and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
+            for line in self.path.read_text(encoding="utf-8", errors="replace").splitlines():
                 try:
                     point = json.loads(line)
                     self.found[point["key"]] = point["found"]
-                except (ValueError, KeyError):  # the last line of a study that was killed
+                except (ValueError, KeyError, TypeError):  # the last line of a study that was killed
                     continue
+
+    def __enter__(self) -> Points:
+        return self
+
+    def __exit__(self, *_) -> None:
+        """Let go of the folder."""
+        if self.lock is not None:
+            let_go(self.lock)
 
     def get(self, case, extra: dict, make: Callable[[], dict]) -> dict:
         """What was found for a case and settings, made now where it is new; None stands for what is not finite."""
@@ -38,7 +50,6 @@ class Points:
         key, made = key_of(case, extra), plain(make())
         self.found[key] = made
         if self.path is not None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
             with open(self.path, "a", encoding="utf-8") as file:
                 file.write(json.dumps({"key": key, "of": plain(extra), "found": made}) + "\n")
         return made

@@ -96,19 +96,21 @@ def sweep(
     folder = None if out is None else Path(out)
     source, base = _source(case), dict(set or {})
     combinations = [dict(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())]
-    points, found, told = Points(folder), {}, progress or (lambda done, total, what: None)
+    found, told = {}, progress or (lambda done, total, what: None)
     told(0, len(combinations), _said(combinations[0]))
-    try:
-        for at, row in _rows(source, base, combinations, points, jobs):
-            found[at] = combinations[at] | row
-            told(len(found), len(combinations), _said(combinations[min(at + 1, len(combinations) - 1)]))
-    finally:
-        made = Sweep(tuple(vary), [found[at] for at in sorted(found)], points.reused)
-        refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in made.rows}
-        if len(made.rows) == len(combinations) and len(refused) == 1 and "" not in refused:
-            raise FvsolveError(f"all {len(combinations)} runs are {refused.pop()}")
-        if folder is not None and found:
-            made.write(folder / "sweep.csv")
+    with Points(folder) as points:
+        try:
+            for at, row in _rows(source, base, combinations, points, jobs):
+                found[at] = combinations[at] | row
+                told(len(found), len(combinations), _said(combinations[min(at + 1, len(combinations) - 1)]))
+        finally:
+            made = Sweep(tuple(vary), [found[at] for at in sorted(found)], points.reused)
+            refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in made.rows}
+            useless = len(made.rows) == len(combinations) and len(refused) == 1 and "" not in refused
+            if folder is not None and found and not useless:
+                made.write(folder / "sweep.csv")
+    if useless:
+        raise FvsolveError(f"all {len(combinations)} runs are {refused.pop()}")
     return made
 
 

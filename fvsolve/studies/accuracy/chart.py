@@ -113,7 +113,8 @@ def chart(
     target : an error over the trajectory for which a setting is to be found and run
     folder : where finished points are kept and found again. Raises CaseError, FvsolveError.
     """
-    return _Study(case, set, folder, progress).go(schemes, methods, cells, rtol, step, target)
+    with Points(folder) as kept:
+        return _Study(case, set, kept, progress).go(schemes, methods, cells, rtol, step, target)
 
 
 def toml(value) -> str:
@@ -124,14 +125,14 @@ def toml(value) -> str:
 class _Study:
     """One chart while it is made."""
 
-    def __init__(self, case, set: Mapping | None, folder: Path | None, progress: Told) -> None:
+    def __init__(self, case, set: Mapping | None, points: Points, progress: Told) -> None:
         from fvsolve.case import load
 
         self.case: Case = load(case, set)
         if from_files(self.case):
             what = f"chart refines cells, and those of {listing(from_files(self.case))} are a file's"
             raise FvsolveError(f"{what}; order --refine time does without")
-        self.points, self.progress = Points(folder), progress
+        self.points, self.progress = points, progress
         self.default, self.compiling = default_curve(self.case), 0.0
         self.coarse: Coarse | None = None  # with pipes
         self.done, self.total, self.least_overshoot = 0, 0, 0.0

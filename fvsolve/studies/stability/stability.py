@@ -5,6 +5,7 @@ Knows cases, matrices and runs; draws nothing. Failure: max over n <= N of ||R(h
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -106,10 +107,9 @@ def stability(
     asked = list(methods or [case.numerics.method])
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
     said = (AUTOMATIC,) if AUTO in asked else ()
-    points, found = Points(folder), []
-    makers = {scheme: Maker(case, scheme, at, before, steps, threshold) for scheme in schemes}
-    for scheme, make in makers.items():
-        for method in methods:
+    found, makers = [], {scheme: Maker(case, scheme, at, before, steps, threshold) for scheme in schemes}
+    with Points(folder) as points:
+        for (scheme, make), method in itertools.product(makers.items(), methods):
             progress(len(found), len(schemes) * len(methods), f"{scheme} with {method}")
             extra = {"study": "stability", "scheme": scheme, "method": method, "at": at,
                      "before": before, "steps": steps, "threshold": threshold}  # fmt: skip

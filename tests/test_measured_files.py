@@ -1,0 +1,126 @@
+"""What stands in a CSV file is what is read, or the file is refused with the line: separators, commas, units, bytes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytest import approx
+from truth.scenes import lake, scene, tank, valve
+
+import fvsolve
+from fvsolve.errors import CaseError, MeshError
+from fvsolve.mesh import rectangle
+from fvsolve.model.velocity import face_flows
+from fvsolve.parts.formula import Shaped
+from fvsolve.parts.series import read_columns
+from fvsolve.parts.value import Setting
+
+T, H = [0.0, 0.5, 1.25], [45.7, -46.1, 1234.5]
+
+
+def columns(path, text, encoding="utf-8"):
+    path.write_bytes(text.encode(encoding))
+    return read_columns(path, None, None, "head", Setting())[:2]
+
+
+def refusal(path, text, encoding="utf-8"):
+    with pytest.raises(ValueError) as refused:
+        columns(path, text, encoding)
+    return str(refused.value)
+
+
+@pytest.mark.parametrize("mark, point", [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_numbers_are_read_whatever_parts_them(mark, point, ending, tmp_path):
+    rows = [f"{a}{mark}{b}".replace(".", point) for a, b in zip(T, H, strict=True)]
+    t, head = columns(tmp_path / "rig.csv", ending.join([f"t [s]{mark}H [m]", *rows]))
+    assert t.tolist() == T and head.tolist() == H
+
+
+@pytest.mark.parametrize("header", ["t [s];p, measured [m]", '"t [s]";"H, [m]"'])
+def test_a_comma_in_a_header_parts_no_columns(header, tmp_path):
+    t, head = columns(tmp_path / "rig.csv", f"{header}\n0;45,7\n1;46,1\n")
+    assert t.tolist() == [0.0, 1.0] and head.tolist() == [45.7, 46.1]
+
+
+def test_numbers_in_quotes_may_have_commas(tmp_path):
+    t, head = columns(tmp_path / "rig.csv", 't [s],H [m]\n"0,0","45,7"\n"0,5","46,1"\n')
+    assert t.tolist() == [0.0, 0.5] and head.tolist() == [45.7, 46.1]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_other_encodings_of_spreadsheets_are_read(encoding, tmp_path):
+    t, head = columns(tmp_path / "rig.csv", "t [s];H [m]\n0;45,7\n1;46\n", encoding)
+    assert t.tolist() == [0.0, 1.0] and head.tolist() == [45.7, 46.0]
+
+
+@pytest.mark.parametrize("text, words", {
+    "decimal commas between commas": ("t [s],H [m]\n0,0,45,7\n0,1,46,1\n", "line 2: 4 cells under 2 headers; decimal"),
+    "one of them": ("t [s],H [m]\n0,45,7\n1,46,1\n", "line 2: 3 cells under 2 headers; decimal commas?"),
+    "only further down": ("t [s],H [m]\n0,45\n1,46,1\n", "line 3: 3 cells under 2 headers; decimal commas?"),
+    "a row too short": ("t,H,p\n0,45,1\n1,46\n", "line 3: 2 cells under 3 headers"),
+    "a row too long": ("t;H\n0;45\n1;46;3\n", "line 3: 3 cells under 2 headers"),
+    "another separator": ("t,H\n0;45\n1;46\n", "line 2: 1 cell under 2 headers"),
+    "units of their own": ("t,H\ns,m\n0,45\n", 'line 2: "s" is no number in column "t"; units stand in the header'),
+    "both commas and points": ("t;H\n0;1.234\n1;1,2\n", 'line 3: "1,2" has a decimal comma where others have points'),
+    "thousands": ("t;H\n0;1.234,5\n", '"1.234,5" is no number'),
+    "many thousands": ("t;H\n0;1,234,500\n", '"1,234,500" is no number'),
+    "underscores": ("t,H\n0,1_000\n", '"1_000" is no number'),
+    "nothing": ("t,H\n0,\n", '"" is no number in column "H"'),
+    "not a number": ("t,H\n0,nan\n", '"nan" is no number'),
+    "too great a number": ("t,H\n0,1e999\n", '"1e999" is no number'),
+    "one name twice": ("t,H,H\n0,1,2\n", None),
+}.items())  # fmt: skip
+def test_what_may_be_misread_is_refused_with_its_line(text, words, tmp_path):
+    text, words = words
+    if words:
+        assert words in refusal(tmp_path / "rig.csv", text)
+    else:
+        (tmp_path / "rig.csv").write_text(text)
+        with pytest.raises(ValueError, match='has 2 columns "H"'):
+            read_columns(tmp_path / "rig.csv", "t", "H", "head", Setting())
+
+
+def test_bytes_that_are_no_text_are_named(tmp_path):
+    assert "rig.csv is not UTF-8 or UTF-16 text" in refusal(tmp_path / "rig.csv", "t,Hö\n0,1\n", "latin-1")
+    (tmp_path / "rig.csv").write_bytes(b"PK\x03\x04\x00\x00\x00\x00\x12\x00\x00\x00\n1\n")
+    with pytest.raises(ValueError, match="not UTF-8 or UTF-16 text"):
+        read_columns(tmp_path / "rig.csv", None, None, "head", Setting())
+
+
+def test_a_measured_series_with_decimal_commas_is_compared_as_measured(tmp_path):
+    (tmp_path / "rig.csv").write_text("t [s];H [m]\n0,0;5,25\n0,5;5,25\n1,0;5,25\n")
+    nodes = {"lake": lake(5.0), "pond": tank(1.0, 5.0)}
+    case = scene(nodes, {"gate": valve("lake", "pond", 0.01)}, 1.0, {"rtol": 1e-6}, ["lake.head"],
+                 compare={"lake.head": {"file": str(tmp_path / "rig.csv")}})  # fmt: skip
+    (found,) = fvsolve.run(case).comparisons
+    assert found.points == 3 and found.rms == approx(0.25, rel=1e-12)
+    (tmp_path / "rig.csv").write_text("t [s],H [m]\n0,0,5,25\n0,5,5,25\n")
+    with pytest.raises(CaseError, match=r"line 2: 4 cells under 2 headers; decimal commas\?"):
+        fvsolve.load(case)
+
+
+@pytest.mark.parametrize("text", [
+    "x,y,bed\n0,0,1.5\n10,0,1.5\n0,10,1.5\n", "x [m];y [m];bed [m]\n0,0;0,0;1,5\n10;0;1,5\n0;10;1,5\n",
+    "x [cm];y [dm];bed [mm]\n0;0;1500\n1000;0;1500\n0;100;1500\n",
+])  # fmt: skip
+def test_points_of_a_bed_are_read_in_their_units(text, tmp_path):
+    (tmp_path / "bed.csv").write_text(text)
+    bed = Shaped("length").read({"file": "bed.csv"}, Setting(folder=tmp_path))
+    assert bed.at(np.array([1.0, 9.0, 30.0]), np.array([1.0, 0.5, 30.0])) == approx([1.5] * 3)
+    (tmp_path / "bed.csv").write_text("x,y,bed\n0,0,1,5\n")
+    with pytest.raises(ValueError, match="line 2: 4 cells under 3 headers; decimal commas"):
+        Shaped("length").read({"file": "bed.csv"}, Setting(folder=tmp_path))
+
+
+@pytest.mark.parametrize("text", [
+    "x,y,u,v\n-9,-9,0.5,0\n9,-9,0.5,0\n-9,9,0.5,0\n9,9,0.5,0\n",
+    "x [cm];y [m];u [cm/s];v [m/s]\n-900;-9;50,0;0\n900;-9;50;0\n-900;9;50;0\n900;9;50;0\n",
+])  # fmt: skip
+def test_velocities_are_read_alike(text, tmp_path):
+    mesh = rectangle((1.0, 1.0), (2, 2))
+    (tmp_path / "v.csv").write_text(text)
+    assert face_flows(mesh, {"file": tmp_path / "v.csv"}) == approx(0.5 * mesh.normal[:, 0] * mesh.length, abs=1e-15)
+    (tmp_path / "v.csv").write_text("x,y,u,v\n0,0,0,5,0,0\n")
+    with pytest.raises(MeshError, match="line 2: 6 cells under 4 headers; decimal commas"):
+        face_flows(mesh, {"file": tmp_path / "v.csv"})

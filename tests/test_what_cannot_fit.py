@@ -1,0 +1,94 @@
+"""What cannot advance, or cannot fit into memory or on disk, is refused before it starts; what takes long is told."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from test_output import branched
+from test_text_as_it_stands import still
+
+import fvsolve
+from fvsolve.case.size import free_memory, on_disk
+from fvsolve.errors import CaseError, RunError
+from fvsolve.run.expected import duration, expected
+
+POOL = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4, 4], "velocity": {"u": 0, "v": 0}}
+
+
+@pytest.mark.parametrize("settings, words", [
+    ({"numerics.courant": 1e-300}, "numerics.courant: 1e-300 makes steps of .* s, which would not move the time"),
+    ({"numerics.courant": 1e-14, "numerics.end": 1e4}, "would not move the time; wanted more than"),
+    ({"output.every": 1e-9, "numerics.end": 1e4}, r"output.every: 1e-09 s makes 1e\+13 rows of 5 numbers, about .* TB"),
+    ({"output.every": 1e-300}, "output.every: 1e-300 s would not move the time"),
+    ({"links.main.cells": 10**8}, r"links.main.cells: 1e\+08 cells take about 50 GB of memory, and .* are free"),
+    ({"links.main.cells": 2 * 10**7, "numerics.method": "radau-iia-5"}, "cells take about 60 GB of memory"),
+])  # fmt: skip
+def test_what_cannot_advance_or_fit_is_refused_before_it_is_built(settings, words):
+    if "memory" in words and free_memory() > 50e9:
+        pytest.skip("here it fits")
+    with pytest.raises(CaseError, match=words):
+        fvsolve.load(branched(), settings)
+
+
+def test_basins_likewise():
+    case = branched()
+    case["nodes"]["pool"] = POOL | {"cells": [10**5, 10**5]}
+    with pytest.raises(CaseError, match=r"nodes.pool.cells: 1e\+10 cells take about 6 TB of memory"):
+        fvsolve.load(case)
+    case = branched() | {"nodes": {"pool": POOL}, "links": {}, "scalars": {"dye": {}}}
+    case["output"]["probes"], case["numerics"]["courant"] = ["pool.dye@0.5,0.5"], 1e-300
+    with pytest.raises(CaseError, match="numerics.courant: 1e-300 makes steps"):
+        fvsolve.load(case)
+
+
+@pytest.mark.parametrize("settings", [
+    {"numerics.courant": 1e-3}, {"output.every": 1e-6}, {"links.main.cells": 10**5},
+    {"numerics.end": 1e12, "output.every": 1e9},
+])  # fmt: skip
+def test_what_fits_is_let_alone(settings):
+    assert fvsolve.load(branched(), settings)
+
+
+def test_a_table_larger_than_the_disk_is_refused_by_its_place(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000})())  # the system's, not ours
+    with pytest.raises(RunError, match=r"run: history\.csv would take 2 kB at least, and 1 kB are free"):
+        fvsolve.run(branched(fields=0), out=tmp_path / "run")
+    assert not (tmp_path / "run" / ".lock").exists()
+
+
+def test_the_estimate_of_the_disk_is_near_what_is_written(tmp_path):
+    case = branched(fields=50)
+    fvsolve.run(case, {"output.every": "1 ms"}, tmp_path / "run")
+    files = [tmp_path / "run" / "history.csv", *(tmp_path / "run" / "fields").iterdir()]
+    found = on_disk(fvsolve.load(case, {"output.every": "1 ms", "output.fields": 0}))
+    assert 0.5 < found / files[0].stat().st_size < 2.0
+
+
+@pytest.mark.parametrize("group", ["nodes", "links", "scalars", "lines"])
+def test_names_of_many_letters_are_refused_at_once(group):
+    case, name = branched() | {"scalars": {}}, "x" * 10**5
+    case["nodes"]["pool"] = POOL
+    case["output"]["lines"] = {}
+    tables = {**{one: case[one] for one in ("nodes", "links", "scalars")}, "lines": case["output"]["lines"]}
+    parts = {"nodes": {"type": "junction"}, "links": case["links"]["valve"], "scalars": {},
+             "lines": {"basin": "pool", "from": [0, 0], "to": [1, 1]}}  # fmt: skip
+    tables[group][name] = parts[group]
+    with pytest.raises(CaseError) as refused:
+        fvsolve.load(case)
+    assert "has 100000 letters; wanted 60 at most" in str(refused.value) and len(str(refused.value)) < 5000
+
+
+def test_a_reference_of_many_letters_is_answered_shortly():
+    with pytest.raises(CaseError) as refused:
+        fvsolve.load(branched(), {"links.valve.to": "y" * 10**5, "output.probes": ["z" * 10**5 + ".pressure"]})
+    assert len(str(refused.value)) < 5000
+
+
+def test_a_long_run_is_told_before_it_starts(fvs, tmp_path, monkeypatch):
+    long = fvsolve.build(fvsolve.load(branched(), {"numerics.end": 1e12, "output.every": 1e9}))
+    assert re.fullmatch(r"case will take about \S+ years", expected(long))
+    large = fvsolve.build(fvsolve.load(branched(fields=10**6), {"numerics.end": 1e-2, "output.every": 1e-3}))
+    assert re.fullmatch(r"case will take about .* GB on disk", expected(large))
+    assert expected(fvsolve.build(fvsolve.load(still()))) == ""
+    assert [duration(one) for one in (100.0, 240.0, 86400.0, 1e6)] == ["1e+02 s", "4 minutes", "24 hours", "12 days"]
