@@ -10,7 +10,6 @@ from fvsolve.case.case import Case
 from fvsolve.studies.accuracy.pareto import Crossing, between, crossing
 from fvsolve.studies.accuracy.setting import Setting, with_cells, without_cells
 
-
 COARSEST_RTOL = 0.1  # a tolerance beyond says nothing
 
 
