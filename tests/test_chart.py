@@ -431,3 +431,28 @@ def test_where_a_chamber_holds_explicit_steps_back_references_are_implicit():
 def test_a_resolution_that_the_case_has_not_is_named(case, given, said):
     with pytest.raises(FvsolveError, match=said):
         chart(case(), **given)
+
+
+@pytest.mark.parametrize(
+    ("case", "given"),
+    [
+        (line(), {"schemes": ["upwind5"], "methods": ["rk4"], "cells": [40, 80]}),
+        (pot(), {"methods": ["rk4"], "step": [0.02, 0.01], "rtol": [1e-8]}),
+        (pot(), {"methods": ["dormand-prince"], "rtol": [1e-7, 1e-8]}),
+    ],
+)
+def test_a_target_is_followed_down_to_settings_that_nobody_named(case, given):
+    found = chart(case, target=0.05, **given)
+    for name, curve in found.curves().items():
+        errors = [one.trajectory if one.ok else math.inf for one in curve]
+        widest = curve[0].setting
+        last = {"rtol": widest.size == 0.1, "step": 2 * widest.size > case["numerics"]["end"]}
+        assert errors[0] > 0.05 or last.get(widest.control, widest.cells == 1), name
+    updates = [one.updates for one in found.points if one.ok and one.trajectory <= 0.05]
+    assert found.aim.point.ok and found.aim.point.trajectory <= 0.05
+    asked = [
+        one.updates
+        for one in found.points
+        if one.setting.cells in given.get("cells", ()) or one.setting.size in given.get("step", given.get("rtol", ()))
+    ]
+    assert min(updates) < 0.5 * min(asked)

@@ -9,12 +9,12 @@ import sys
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, NO_FRICTION, chamber, junction, lake, pipe, reservoir, scene, step, valve
+from truth.scenes import AMBIENT, NO_FRICTION, area, chamber, junction, lake, pipe, reservoir, scene, step, tank, valve
 
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.failure.failure_map import failures
-from fvsolve.studies.failure.verdict import FAR, Measures, excess, ranges_of, ringing, verdict
+from fvsolve.studies.failure.verdict import FAR, Measures, excess, pace, ranges_of, ringing, verdict
 from fvsolve.studies.failure.watched import WINDOW, watched
 from fvsolve.studies.points import Points
 
@@ -229,3 +229,24 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeyp
     with open(tmp_path / "out" / "map.csv") as file:
         assert [row["verdict"] for row in csv.DictReader(file)] == [one["verdict"] for one in said["squares"]]
     assert (tmp_path / "out" / "map.png").stat().st_size > 10_000 and (tmp_path / "out" / "map.svg").is_file()
+
+
+def test_a_swing_of_the_scene_that_euler_amplifies_is_no_ringing():
+    """A column between two tanks swings at omega; Euler makes each step sqrt(1 + (omega h)^2) times larger."""
+    omega = math.sqrt(2 * 9.80665 * area(0.5) / (50.0 * 1.0))
+    nodes = {"a": tank(1.0, 5.0), "b": tank(1.0, 4.0)}
+    column = {"type": "rigid-column", "from": "a", "to": "b", "length": 50.0, "diameter": 0.5}
+    end = 6 * 2 * math.pi / omega
+    grown = 2.0  # over the run: end omega^2 h / 2 = log 2
+    long = 2 * math.log(grown) / (omega**2 * end)
+    case = scene(nodes, {"c": column}, end, {"method": "rk4", "step": long}, ["a.level"], end / 200)
+    (euler,) = failures(case, methods=["euler"], steps=[long]).squares
+    assert euler.measures.error > TOLERANCE and euler.verdict == "coarse" and euler.measures.variation == 0.0
+
+
+def test_the_pace_of_swings_is_the_rows_of_half_a_period():
+    n = np.arange(400.0)
+    assert pace(np.sin(2 * np.pi * n / 40), 0.02) == 20.0
+    assert pace(np.exp(-n / 60) * np.sin(2 * np.pi * n / 40), 1e-3) == pytest.approx(20.0, abs=1.0)
+    assert pace(n / 400, 1e-3) == pace(np.minimum(n, 100.0), 1e-3) == math.inf
+    assert pace(n / 400 + 1e-4 * (-1.0) ** n, 1e-3) == math.inf

@@ -8,14 +8,17 @@ import shutil
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import isfunction
 from pathlib import Path
 
 import pytest
 
 import fvsolve
+import fvsolve.studies
 
-DOCS = (Path(__file__).parent.parent / "docs" / "python.md").read_text(encoding="utf-8")
+DOCS_FOLDER = Path(__file__).parent.parent / "docs"
+DOCS = (DOCS_FOLDER / "python.md").read_text(encoding="utf-8")
 
 
 def test_at_most_twenty():
@@ -70,3 +73,30 @@ def test_importing_imports_nothing_heavy():
     code = f"import fvsolve, sys; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+PAGES = {
+    page.name: page.read_text(encoding="utf-8")
+    for page in [*DOCS_FOLDER.glob("*.md"), DOCS_FOLDER.parent / "README.md"]
+}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_a_page_names_can_be_imported_from_where_it_says(page):
+    imports = re.findall(r"from (fvsolve[\w.]*) import \(?([\w, ]+)", PAGES[page])
+    named = [(room, name.strip()) for room, names in imports for name in names.split(",") if name.strip()]
+    named += [text.rpartition(".")[::2] for text in re.findall(r"`(fvsolve(?:\.[a-zA-Z_]\w*)+)", PAGES[page])]
+    lost = [f"{room}.{name}" for room, name in named if not importable(room, name)]
+    assert not lost
+
+
+def importable(room, name):
+    """Whether a room has a name, as itself or as a room of its own."""
+    if hasattr(import_module(room), name):
+        return True
+    return find_spec(f"{room}.{name}") is not None
+
+
+def test_names_of_studies_are_functions_or_kinds_and_no_modules():
+    for name in fvsolve.studies.__all__:
+        assert callable(getattr(fvsolve.studies, name)), name

@@ -8,14 +8,16 @@ import sys
 
 import numpy as np
 import pytest
-from truth.scenes import RHO, area, chamber, junction, pipe, reservoir, scene, valve
+from scipy.optimize import brentq
+from truth.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
 
+from fvsolve import build, load
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
 from fvsolve.studies.linear.frozen import frozen
-from fvsolve.studies.linear.linearise import linearised
+from fvsolve.studies.linear.linearise import linearise, linearised
 from fvsolve.studies.stability.bounds import field_of_values, region_limit
 from fvsolve.studies.stability.carried import Sparse, stepping
 from fvsolve.studies.stability.growth import Dense, growth, powers, predicted, step_matrix
@@ -264,3 +266,56 @@ def test_without_a_case_the_command_answers_for_a_periodic_grid(monkeypatch, cap
         main()
     assert not left.value.code
     assert json.loads(capsys.readouterr().out)["limits"][0]["limit"] == 1.0
+
+
+def carried(method="rk4", ends=("lake", "end"), **scalar):
+    """Ten cells of 10 m with a dye; `vessel`, a tank that starts with none of it, stands at either end."""
+    nodes = {
+        "lake": reservoir(3e5, scalars={"dye": 1.0}),
+        "end": reservoir(2.99e5),
+        "vessel": tank(1.0, 20.0, scalars={"dye": 0.0}),
+    }
+    friction = {"model": "steady", "factor": 0.02}
+    links = {"main": pipe(*ends, 100.0, 0.1, 1000.0, 10, friction=friction)}
+    used = {name: node for name, node in nodes.items() if name in ends}
+    numerics = {"scheme": "upwind", "method": method, "courant": 0.8}
+    return scene(used, links, 1.0, numerics, scalars={"dye": {"initial": 0.5, **scalar}})
+
+
+def spread(model, diffusivity):
+    """Eigenvalues of a pipe's diffusion, ends at given values: D (u'' by three cells, half a cell at the ends)."""
+    n, dx = model.pipes[0].cells, model.pipes[0].length / model.pipes[0].cells
+    a = np.diag(np.full(n, -2.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
+    a[0, 0] = a[-1, -1] = -3.0
+    return np.linalg.eigvalsh(diffusivity / dx**2 * a)
+
+
+def real_end(method, low, high):
+    """Where |R| comes to 1 on the negative real axis, R by its own series."""
+    r = {"euler": lambda z: 1 + z, "rk4": lambda z: 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24}[method]
+    return brentq(lambda x: abs(r(-x)) - 1.0, low, high)
+
+
+@pytest.mark.parametrize(("method", "low", "high"), [("euler", 1.5, 2.5), ("rk4", 2.0, 3.5)])
+@pytest.mark.parametrize("quick", [{"decay": 800.0}, {"diffusivity": 30000.0}])
+def test_scalars_of_pipes_bound_the_step_in_powers_eigenvalues_and_real_runs(method, low, high, quick):
+    case = carried(method, **quick)
+    fastest = quick.get("decay") or -spread(build(load(case)), quick["diffusivity"]).min()
+    row = stability(case).rows[0]
+    truth = real_end(method, low, high) / fastest
+    assert row.eigenvalues == pytest.approx(truth, rel=1e-3)  # what flows besides
+    assert row.predicted == pytest.approx(truth, rel=6e-3)  # 1000 steps grow by 1000 only a little beyond
+    assert row.measured == pytest.approx(row.predicted, rel=2e-3)
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "upwind5"])
+@pytest.mark.parametrize("ends", [("lake", "vessel"), ("vessel", "end"), ("end", "vessel")])
+def test_a_vessel_that_starts_without_a_scalar_is_no_kink(scheme, ends):
+    case = carried(ends=ends, decay=0.25)
+    case["nodes"].get("end", {})["pressure"] = 2.0e5
+    case["numerics"]["scheme"] = scheme
+    found = linearise(case)
+    i = found.states.index("vessel.dye")
+    drop = AMBIENT + 20.0 * RHO * GRAVITY - 2.0e5  # of pressure from the vessel to the end
+    leaves = area(0.1) * math.sqrt(2 * RHO * drop * 0.1 / (0.02 * 100.0)) if "end" in ends else 0.0
+    assert found.a[i, i] == pytest.approx(-0.25 - leaves / (20.0 * RHO), rel=1e-3)

@@ -44,8 +44,12 @@ Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="over
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
 
 
-def load_case(name: str, overrides: list[str]):
-    """The case, overridden; an override that is none is one more fault of it."""
+def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):
+    """The case, overridden; an override that is none is one more fault of it.
+
+    scheme, method : lists that a study takes in place of the case's; what is no case with its own is read with their
+    first, to which the overrides may belong
+    """
     from fvsolve.case import load, shipped
 
     path = shipped.find(name)
@@ -54,6 +58,13 @@ def load_case(name: str, overrides: list[str]):
     try:
         case = load(path, settings)
     except CaseError as error:
+        first = {f"numerics.{key}": text.split(",")[0].strip() for key, text in
+                 (("scheme", scheme), ("method", method)) if text}  # fmt: skip
+        if first and not faults:
+            try:
+                return load(path, first | settings)
+            except CaseError:
+                pass
         raise CaseError([*error.faults, *faults], error.file) if faults else error from None
     if faults:
         raise CaseError(faults, path.name)

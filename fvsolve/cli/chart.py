@@ -33,7 +33,7 @@ def chart(
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.files import write
 
-    found = load_case(case, set)
+    found = load_case(case, set, scheme, method)
     if target is not None and not 0.0 < target < 1.0:
         raise FvsolveError(f"--target: {target:g} is no error; wanted a part of the range, above 0 and below 1")
     if models:

@@ -31,7 +31,7 @@ def map_(
     from fvsolve.studies.failure.failure_map import failures
     from fvsolve.studies.points import Points
 
-    read_case = load_case(case, set)
+    read_case = load_case(case, set, scheme, method)
     folder = folder_of(read_case, "map", out)
     with told() as progress, Points(folder) as points:
         found = failures(

@@ -38,7 +38,7 @@ def order(
     from fvsolve.studies.accuracy.order import order as study
     from fvsolve.studies.points import Points
 
-    scene = load_case(case, overrides)
+    scene = load_case(case, overrides, scheme, method)
     folder = folder_of(scene, "order", out)
     found = []
     pairs = [(s, m) for s in listed(scheme, "--scheme") or [None] for m in methods_of(method) or [None]]

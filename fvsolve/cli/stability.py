@@ -47,7 +47,7 @@ def stability(
     from fvsolve.studies.stability.growth import STEPS
     from fvsolve.studies.stability.stability import stability as ask
 
-    read = load_case(case, set)
+    read = load_case(case, set, scheme, method)
     folder = folder_of(read, "stability", out)
     with told() as progress:
         found = ask(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Annotated
 import typer
 
 from fvsolve.errors import FvsolveError, visible
+
+NOW_AND_THEN = 10.0  # between two lines of progress where no terminal listens [s]
 
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="folder of tables and pictures")]
 
@@ -67,17 +70,25 @@ def writable(folder: Path) -> Path:
 
 @contextmanager
 def told(kept: bool = True) -> Iterator[Callable[[int, int, str], None]]:
-    """A `progress(done, total, next)` function: one line on a terminal, rewritten; nothing elsewhere.
+    """A `progress(done, total, next)` function: one line on a terminal, rewritten; elsewhere one every NOW_AND_THEN.
 
     Ctrl-C ends the command with exit code 130; points that are finished are on disk and the same command goes on,
     unless `kept` is False.
     """
-    shows, seen = sys.stderr.isatty(), [0, 0]
+    shows, seen, latest, over = sys.stderr.isatty(), [0, 0], [""], threading.Event()
 
     def progress(done: int, total: int, what: str) -> None:
-        seen[:] = done, total
+        seen[:], latest[0] = (done, total), f"{done} of {total}: {visible(what)}"
         if shows:
-            print(f"\r\033[K{done} of {total}: {visible(what)}", end="", file=sys.stderr, flush=True)
+            print(f"\r\033[K{latest[0]}", end="", file=sys.stderr, flush=True)
+
+    def repeat() -> None:
+        while not over.wait(NOW_AND_THEN):
+            if latest[0]:
+                print(latest[0], file=sys.stderr, flush=True)
+
+    if not shows:
+        threading.Thread(target=repeat, daemon=True).start()
 
     try:
         yield progress
@@ -86,5 +97,6 @@ def told(kept: bool = True) -> Iterator[Callable[[int, int, str], None]]:
         print(f"\ninterrupted after {seen[0]} of {seen[1]} points; {rest}", file=sys.stderr)
         sys.exit(130)
     finally:
+        over.set()
         if shows:
             print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -9,6 +9,7 @@ from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, sl
 from fvsolve.kernels.records import (
     CHAMBER,
     FIXED,
+    FLAT,
     I_INTEGERS,
     I_LAYOUT,
     I_NODES,
@@ -35,6 +36,8 @@ DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it holds no value, an
 @njit
 def limited(limiter, a, b):
     """The limited mean of two differences."""
+    if limiter == FLAT:
+        return 0.0
     if limiter == MINMOD:
         return slope_minmod(a, b)
     return slope_van_leer(a, b) if limiter == VAN_LEER else slope_monotonized_central(a, b)

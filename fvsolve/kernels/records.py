@@ -20,7 +20,7 @@ UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
     3,
     4,
 )  # scheme families; LINEAR ones are six weights, SHORT upwind3
-MINMOD, VAN_LEER, MONOTONIZED_CENTRAL = 0, 1, 2
+MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3  # FLAT: no slope, of scalars that are linearised
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 ROOT, TWO_WAY, CURVE, POWER, LIFT = 0, 1, 2, 3, 4  # laws of restrictions; all but ROOT are solved in a cluster
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3

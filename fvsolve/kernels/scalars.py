@@ -10,6 +10,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
 from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, limited, lose, mix
 from fvsolve.kernels.records import (
+    FLAT,
     I_FLOATS,
     I_LAYOUT,
     I_NODES,
@@ -130,7 +131,7 @@ def carry_in_pipe(y, dydt, out, tables, p):
         values(s, m, c)
         for i in range(n):
             d[i] = 0.0
-        if st["scheme"] != UPWIND:
+        if st["scheme"] != UPWIND and limiter != FLAT:
             inner_slopes(limiter, c, d)
             for right in range(2):
                 near, beside = (n - 1, n - 2) if right == 1 else (0, 1)

@@ -10,10 +10,12 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.energy import weights as basin_weights
+from fvsolve.model.scalars import bounds
 from fvsolve.model.unsteady import memory_shares
 
 RANK = 1e-12  # of the greatest singular value of what hangs together: below, a motion stores no energy
 TOGETHER = 2500  # positions joined by springs whose singular values are taken, in some 7 s
+CARRIED = 1e-6  # of the weight of the mass that it goes with, of an amount: below what waves do to it in 1000 steps
 CLOSED = 1e-6  # share of what its terms could add up to, below which a rate is round-off of differences
 
 
@@ -79,7 +81,9 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a body m v^2 / 2,
     a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
     its excess at y. Exact under `linear` about a profile at rest. Devices store what their `squares` say, cells of
-    basins what `model.basins.energy` says. Positions that nothing holds, one by one or together, store nothing: idle.
+    basins what `model.basins.energy` says. A scalar stores nothing; a deviation of its amount, over the greatest value
+    that there can be, counts as 1e-6 of what so much mass would store, for nothing else hangs on it. Positions that
+    nothing holds, one by one or together, store nothing: idle.
     """
     from scipy.sparse import csr_array
 
@@ -156,8 +160,8 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
     for basin in model.basins:
         basin.of(found)[:] = basin_weights(basin, basin.of(y))
-        if basin.scalars:
-            basin.amounts(found)[:] = 0.5 * basin.mesh.area
+        for q, amount in enumerate(basin.amounts(found) if basin.scalars else ()):
+            amount[:] = CARRIED * 0.5 * basin.mesh.area / typical(model, q) ** 2
     for row in tables[rec.I_NODES]:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             found[row["y"]] = stiffness(model, row) / (2.0 * rho)
@@ -166,7 +170,27 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
     for row in tables[rec.I_BODIES]:
         if row["y"] >= 0:
             found[int(row["y"]) + 1] = 0.5 / row["lightness"]
+    weigh_scalars(model, found)
     return found
+
+
+def weigh_scalars(model, found: np.ndarray) -> None:
+    """Weights of amounts in pipes, and in nodes that store, from those of the mass there."""
+    tables, rho = model.tables, model.case.properties.density
+    for q, scalar in enumerate(tables[rec.I_SCALARS]):
+        share = CARRIED / typical(model, q) ** 2
+        for row in tables[rec.I_PIPES]:
+            cells = slice(scalar["y"] + row["cell"], scalar["y"] + row["cell"] + row["cells"])
+            found[cells] = share * row["dx"] * row["speed"] ** 2 / (rho * row["area"])
+        places = tables[rec.I_INTEGERS][scalar["places"] :]
+        for place, node in zip(places, tables[rec.I_NODES], strict=False):
+            if node["kind"] in (rec.TANK, rec.CHAMBER):
+                found[place] = share * found[node["y"]]
+
+
+def typical(model, q: int) -> float:
+    """The greatest size of a scalar's values that there can be; 1 where all are 0."""
+    return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
 
 
 def held(model, y: np.ndarray):

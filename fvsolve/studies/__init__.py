@@ -13,6 +13,7 @@ _HOMES = {  # public name -> module of this room
     "failures": "failure.failure_map",
     "fit": "accuracy.fit",
     "ladder": "accuracy.models",
+    "limit_of": "stability.grid",
     "limited_limits": "stability.limited",
     "line_positive_real": "ports.line",
     "linearise": "linear.linearise",

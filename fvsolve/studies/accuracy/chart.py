@@ -15,7 +15,7 @@ from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import from_files
 from fvsolve.studies.accuracy.distance import Distance, distance, track
-from fvsolve.studies.accuracy.front import Point, Row, cheapest, curves, errors_of, row, setting_between
+from fvsolve.studies.accuracy.front import Point, Row, cheapest, coarser, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
 from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, left_out, settings
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
@@ -149,6 +149,8 @@ class _Study:
         floor = self.floor()
         self.least_overshoot = floor["overshoot"] or 0.0
         points, least = [self.point(setting) for setting in self.all], floor["trajectory"]
+        if target is not None:
+            points = self.downwards(points, target)
         if all(point.trajectory < least for point in points if point.ok):
             raise FvsolveError(_useless(self.case, points, floor))
         rows = [row(points, one, least, self.default) for one in targets(errors_of(points), least)]
@@ -200,6 +202,20 @@ class _Study:
         if told["overshoot"] < self.least_overshoot:
             told["overshoot"] = 0.0
         return Point(setting, **told)
+
+    def downwards(self, points: list[Point], target: float) -> list[Point]:
+        """All points, and before those of each curve that are all good enough coarser ones, until one is not."""
+        found = []
+        for curve in curves(points).values():
+            wider = list(curve)
+            while wider[0].ok and wider[0].trajectory <= target:
+                setting = coarser(self.case, wider[0].setting)
+                if setting is None:
+                    break
+                self.total += 1
+                wider.insert(0, self.point(setting))
+            found += wider
+        return found
 
     def compile(self, setting: Setting) -> float:
         """Seconds that the first run of a curve takes beyond its second; none for what is refused."""

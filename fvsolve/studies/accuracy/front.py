@@ -10,6 +10,8 @@ from fvsolve.case.case import Case
 from fvsolve.studies.accuracy.pareto import Crossing, between, crossing
 from fvsolve.studies.accuracy.setting import Setting, with_cells, without_cells
 
+COARSEST_RTOL = 0.1  # a tolerance beyond says nothing
+
 
 @dataclass(frozen=True)
 class Point:
@@ -96,6 +98,15 @@ def setting_between(case: Case, coarse: Setting, fine: Setting, share: float) ->
     if coarse.cells is not None:
         return with_cells(case, coarse.scheme, coarse.method, math.ceil(between(coarse.cells, fine.cells, share)))
     return without_cells(coarse.method, float(f"{between(coarse.size, fine.size, share):.2g}"))
+
+
+def coarser(case: Case, setting: Setting) -> Setting | None:
+    """The next coarser setting of a curve: half the cells, ten times the tolerance, twice the step; None at its end."""
+    if setting.cells is not None:
+        return with_cells(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None
+    size = float(f"{setting.size * (10.0 if setting.control == 'rtol' else 2.0):.6g}")
+    most = COARSEST_RTOL if setting.control == "rtol" else case.numerics.end - case.numerics.start
+    return without_cells(setting.method, size) if size <= most else None
 
 
 def fineness(points, name: str | None, where: Crossing | None) -> str:

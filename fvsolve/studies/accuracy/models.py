@@ -17,7 +17,7 @@ from fvsolve.fluid import LAWS
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.model.checks import velocities
-from fvsolve.studies.accuracy.rungs import Misfit, restated, structures
+from fvsolve.studies.accuracy.rungs import Misfit, finer, restated, structures
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
 from fvsolve.studies.outcome import Outcome, outcome, without_basins
 
@@ -25,6 +25,8 @@ TARGET = 1e-2
 BEST_OF, BRIEF = 3, 0.3  # timings of a rung; [s] that the first may take for there to be others
 PATIENCE = 8.0  # [s] of CPU time after which a rung is given up
 BEYOND = 3.0  # times dp/K: from there on the laws differ by something else
+DOUBLINGS = 6  # of the richest rung's cells, to see what it errs itself
+DEARER = 4.0  # times, of twice the cells and twice the steps
 SAMPLES = 4001  # of each schedule, to find how quickly it changes
 
 
@@ -75,7 +77,8 @@ class Apart:
 class Ladder:
     """All rungs, poorest first, and what chooses among them.
 
-    richest : the one that the others are measured against
+    richest : the one that the others are measured against, refined until what it errs itself is within the target
+    own : about what the richest errs by its cells [-], None where it has none or no finer one was run
     cheapest : the quickest rung whose error is within the target; travel_time : of a wave along the longest pipe [s]
     change_time : of the quickest schedule, its range over its steepest slope [s]
     strain : greatest change of pressure from the start over the stiffness of what it acts on [-]
@@ -90,6 +93,19 @@ class Ladder:
     change_time: float
     strain: float
     apart: Apart | None
+    own: float | None
+
+    @property
+    def worth(self) -> str:
+        """What the errors mean, by the richest rung's own one; nothing where it has no cells."""
+        if self.travel_time == 0.0:
+            return ""
+        if self.own is None:
+            return f"what {self.richest.name} errs itself is not known: twice its cells could not be run"
+        said = f"{self.richest.name} errs by about {self.own:.2g} itself, by its cells"
+        if self.own <= self.target:
+            return said
+        return f"{said}: more than the target, so no error in this table is worth more; refine the case (fvsolve order)"
 
     @property
     def thumb(self) -> list[str]:
@@ -102,7 +118,7 @@ class Ladder:
                 f"a wave crosses the longest pipe in {self.travel_time:.3g} s, what acts changes in "
                 f"{self.change_time:.3g} s, {ratio:.3g} times that: {kind}"
             )
-        return found
+        return [*found, self.worth] if self.worth else found
 
     def _of_laws(self, apart: Apart) -> str:
         side = "within" if apart.error <= self.target else "above"
@@ -119,7 +135,12 @@ class Ladder:
 
     def plain(self) -> dict[str, Any]:
         """As JSON says it."""
-        own = {"target": self.target, "travel_time": self.travel_time, "change_time": self.change_time}
+        own = {
+            "target": self.target,
+            "own_error": self.own,
+            "travel_time": self.travel_time,
+            "change_time": self.change_time,
+        }
         laws = {"strain": self.strain, "apart": self.apart and vars(self.apart), "thumb": self.thumb}
         rungs = {"rungs": [vars(one) for one in self.rungs]}
         return own | laws | rungs | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
@@ -152,15 +173,43 @@ def ladder(
     at = max((k for k, one in enumerate(runs) if one.ok and asked[k][0] == asked[-1][0]), default=None)
     if at is None:
         raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
-    richest = runs[at]
+    whole, law = runs[at], asked[at][1]
+    more, own = refined(case, law, whole, target, lambda rung: told(len(asked), len(asked) + 1, f"{rung}, {law}"))
+    richest = more[-1][1] if more else whole
+    asked, runs = [*asked, *((rung, law) for rung, _ in more)], [*runs, *(one for _, one in more)]
     rungs = [_rung(*names, one, richest) for names, one in zip(asked, runs, strict=True)]
     able = [one for one in rungs if one.error is not None and one.error <= target]
     if not able:
         raise FvsolveError("no probe moves, so no model errs; probe what does, or let something act")
     cheapest = min(able, key=lambda one: one.seconds)
     travel, change = travel_time(richest.model), change_time(richest.model)
-    plain = next((one for one, said in zip(runs, asked, strict=True) if said == (asked[at][0], "linear")), richest)
-    return Ladder(rungs, rungs[at], target, cheapest, travel, change, strain(richest), apart(plain, richest))
+    plain = next((one for one, said in zip(runs, asked, strict=True) if said == (asked[at][0], "linear")), whole)
+    top = rungs[-1] if more else rungs[at]
+    return Ladder(rungs, top, target, cheapest, travel, change, strain(richest), apart(plain, whole), own)
+
+
+def refined(case, law: str, whole: Outcome, target: float, told: Callable[[str], None]) -> tuple[list, float | None]:
+    """(rungs with 2, 4, ... times the cells as (name, run), own error of the last of them, or of `whole` without any).
+
+    The error of a rung is its difference d to the next over 1 - r, where differences fall by r each time, 1/2 until
+    there are two. The rung that only served to find it is left out. Ends where the error is within the target, or a
+    finer one cannot be run: then the last rung errs about r times as much as the one before.
+    """
+    runs, gaps, ratio = [("full line", whole)], [], 0.5
+    for name in finer(case, DOUBLINGS):
+        told(name)
+        if DEARER * runs[-1][1].processor > PATIENCE:
+            break
+        one = _run(case, name, law)
+        if not one.ok:
+            break
+        gaps.append(max((_rms(gap) for gap in differences(runs[-1][1], one).values()), default=0.0))
+        if len(gaps) > 1 and gaps[-2] > 0.0:
+            ratio = min(max(gaps[-1] / gaps[-2], 0.1), 0.9)
+        if gaps[-1] <= target * (1.0 - ratio):
+            return runs[1:], gaps[-1] / (1.0 - ratio)
+        runs.append((name, one))
+    return runs[1:], gaps[-1] * ratio / (1.0 - ratio) if gaps else None
 
 
 def laws(case) -> list[str]:

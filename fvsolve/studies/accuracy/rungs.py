@@ -29,11 +29,21 @@ def structures(case) -> list[str]:
     return ["rigid column", "lumped volume", "column and volume", *cells, "full line"]
 
 
+def finer(case, doublings: int) -> list[str]:
+    """Names of rungs above the case's own, each with twice the cells of the one before; none without pipes."""
+    pipes = any(link.kind == "pipe" for link in case.links.values())
+    return [f"{2**k} times the cells" for k in range(1, doublings + 1)] if pipes else []
+
+
 def restated(case, rung: str) -> dict[str, Any]:
     """The keys that say a case by a rung; raises Misfit where it cannot be."""
     if rung in ("full line", "as it is"):
         return {}
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
+    if rung.endswith("times the cells"):
+        times, step = int(rung.split()[0]), case.numerics.step
+        found = {f"links.{name}.cells": times * pipe.cells for name, pipe in pipes.items()}
+        return found if step is None else found | {"numerics.step": step / times}
     if rung.endswith(("cell", "cells")):
         count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
         return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -72,15 +72,19 @@ def failures(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
     key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, points: Points | None = None,
-    progress: Told | None = None,
+    progress: Told | None = None, set: Mapping | None = None,
 ) -> FailureMap:  # fmt: skip
     """Run every method, under every scheme, at every step (or value of a key), and say what became of each run.
 
-    case : a Case; schemes, methods : see `default_schemes` and METHODS; courants or steps [s] : the columns; with
-    key = (NAME, values) these are the columns, and one step, one Courant number, or else the case's own control holds.
+    case : what `load` takes; schemes, methods : see `default_schemes` and METHODS; courants or steps [s] : the
+    columns; with key = (NAME, values) these are the columns, and one step, one Courant number, or else the case's own
+    control holds.
     tolerance : mean error over the range of a probe. Raises FvsolveError for names and numbers that are none, and
     where the reference is no better than the tolerance asks.
     """
+    from fvsolve.case import load
+
+    case = load(case, dict(set or {}))
     without_basins(case, "map")
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")

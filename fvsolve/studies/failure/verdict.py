@@ -16,7 +16,7 @@ STABLE, RINGING, COARSE, WRONG, BLOWN, REFUSED, SKIPPED = (
 )  # fmt: skip
 VERDICTS = {
     STABLE: "error within the tolerance, and smooth",
-    RINGING: "finite, but it swings from step to step, or its probes swing more than those of the reference",
+    RINGING: "finite, but it swings from step to step, or more than the reference and quicker",
     COARSE: "error above the tolerance, but a shorter step helps",
     WRONG: "finite, error above the tolerance, and neither half nor a quarter of the step helps",
     BLOWN: "not finite, or three ranges of a probe beyond what the reference reaches",
@@ -25,6 +25,8 @@ VERDICTS = {
 }
 FAR = 3.0  # ranges of a probe outside the reference's span: beyond, a run has blown up
 SWINGS = 8  # changes in a row that alternate in sign: ringing
+SWING, FAINT = 0.02, 1e-3  # ranges: swings of a run that count, and those of the reference, which may have decayed
+HASTE = 0.5
 MORE = 0.25  # of the reference's variation: what a probe may swing more
 HELPS = 0.75  # of the error is left at most where a shorter step helps
 STILL = 1e-9  # of its greatest value: a probe that moves less stands still
@@ -96,12 +98,31 @@ def ringing(bursts: Sequence[np.ndarray], ranges: np.ndarray) -> float:
 def excess(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray) -> float:
     """By what part a probe varies more than the reference: (TV - TV_ref) / max(TV_ref, range), worst probe.
 
-    TV is the sum of |changes| from row to row, after each row has been replaced by the median of itself and its
-    neighbours: one row that sticks out, read within the step after a jump, is no swing.
+    It counts only where the swings follow each other in less than HASTE of the time of the reference's: one that a
+    method amplifies or does not damp is no ringing. TV is the sum of |changes| from row to row, after each row has been
+    replaced by the median of itself and its neighbours: one row that sticks out, read within the step after a jump, is
+    no swing.
     rows, reference : float64[k, probes], ranges : float64[probes]
     """
-    one, other = (np.abs(np.diff(_medians(values), axis=0)).sum(axis=0) / ranges for values in (rows, reference))
-    return float(np.max((one - other) / np.maximum(other, 1.0), initial=0.0))
+    one, other = (_medians(values) / ranges for values in (rows, reference))
+    varies, known = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (one, other))
+    found = (varies - known) / np.maximum(known, 1.0)
+    quick = [pace(a, SWING) < HASTE * pace(b, FAINT) for a, b in zip(one.T, other.T, strict=True)]
+    return float(np.max(found[quick], initial=0.0))
+
+
+def pace(values: np.ndarray, height: float) -> float:
+    """Rows from one turn to the next, the median over turns between swings of `height` at least; inf with one turn."""
+    turns, low, high, rises = [], 0, 0, 0
+    for i, value in enumerate(values):
+        low, high = (i if value < values[low] else low), (i if value > values[high] else high)
+        if rises >= 0 and value < values[high] - height:
+            turns += [high] * rises
+            rises, low = -1, i
+        elif rises <= 0 and value > values[low] + height:
+            turns += [low] * -rises
+            rises, high = 1, i
+    return float(np.median(np.diff(turns))) if len(turns) > 1 else np.inf
 
 
 def _medians(rows: np.ndarray) -> np.ndarray:

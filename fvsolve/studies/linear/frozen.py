@@ -89,7 +89,16 @@ def stopped(model, t: float, before: bool = False):
     rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]
     tables[rec.I_PIECES] = np.array(rows).reshape(-1, 7)
     hold_velocities(model, tables, t)
+    if not has_limiter(model):
+        carry_without_limits(tables)
     return replace(model, tables=tuple(tables), breaks=[])
+
+
+def carry_without_limits(tables: list) -> None:
+    """Let pipes carry scalars without slopes, and no bound cut what leaves a part: both are kinks that no scene has."""
+    tables[rec.I_SETTINGS], tables[rec.I_SCALARS] = tables[rec.I_SETTINGS].copy(), tables[rec.I_SCALARS].copy()
+    tables[rec.I_SETTINGS]["limiter"] = rec.FLAT
+    tables[rec.I_SCALARS]["least"], tables[rec.I_SCALARS]["greatest"] = -np.inf, np.inf
 
 
 def hold_velocities(model, tables: list, t: float) -> None:

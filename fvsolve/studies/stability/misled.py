@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.studies.linear.frozen import LIMITED
+from fvsolve.studies.linear.frozen import LIMITED, has_limiter
 from fvsolve.studies.stability.carried import TooLarge
 
 CLOSE = 0.02  # bounds that differ by less from the prediction need no word
@@ -58,6 +58,9 @@ def of_the_case(row, side) -> list[str]:
                      "least weight of all")  # fmt: skip
     elif side.idle:
         found.append(f"{listing(side.idle)}: no energy hangs on it where it moves freely, and that motion is left out")
+    model = side.at.model
+    if model.cells and model.case.scalars and model.case.numerics.scheme != "upwind" and not has_limiter(model):
+        found.append("scalars in pipes are taken without slopes, whose limiter has no derivative")
     if moves(side):
         found.append("the state moves: runs are compared with a run from the same state, schedules held")
     return found
