@@ -345,7 +345,7 @@ class Scene:
             layout[name], at = at, at + size
         layout["size"] = at
         parts = len(pipes) + 3 * len(self.node_table) + len(self.column_table)
-        marks = np.full(parts + len(self.device_table) + len(self.piston_table), np.nan)
+        marks = np.full(parts + 2 * len(self.device_table) + len(self.piston_table), np.nan)
         if s["floor"] > 0.0:  # first place, greatest volume and its time of the cavities of each pipe
             marks = np.append(marks, np.full(3 * len(pipes), np.nan))
             s["vapor"] = cavity_pressure(self.fluid)
