@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -75,7 +76,9 @@ def mesh_of(basin: Basin, setting: Setting) -> Mesh:
         return read(setting.files[basin.mesh.file], basin.mesh.unit)
     except MeshError as error:
         if basin.mesh is not None:  # what is wrong lies in its file, and is no key of the case
-            raise Misfit([(("mesh",), f"{error.file}: {fault}") for fault in error.faults]) from None
+            name, places = Path(basin.mesh.file).name, [one.place == "unit" for one in error.faults]
+            raise Misfit([(("mesh", "unit"), one.message) if key else (("mesh",), f"{name}: {one}")
+                          for key, one in zip(places, error.faults, strict=True)]) from None  # fmt: skip
         raise Misfit([(keys(fault.place), fault.message) for fault in error.faults]) from None
 
 
@@ -147,7 +150,8 @@ def _patches(basin: Basin, known: tuple[str, ...], wanted: str) -> str:
     """What patches there are, or how a file comes to have some."""
     if known or basin.mesh is None:
         return f"patches are {listing(known) or 'none'}"
-    return f"{basin.mesh.file} names no groups of lines; Gmsh does by Physical Curve({show(wanted)}) = {{1, 2}};"
+    name = Path(basin.mesh.file).name
+    return f"{name} names no groups of lines; Gmsh does by Physical Curve({show(wanted)}) = {{1, 2}};"
 
 
 def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any) -> Found:

@@ -11,7 +11,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.density import add_law, cavity_pressure
+from fvsolve.model.density import add_law, cavity_pressure, coarse_for_cavities
 from fvsolve.model.devices import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
@@ -381,7 +381,7 @@ class Scene:
             (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
         )
         start = self.start_state()
-        self.warnings += dispersion.warnings(self.basins, start)
+        self.warnings += [*dispersion.warnings(self.basins, start), *coarse_for_cavities(self)]
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
