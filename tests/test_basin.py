@@ -261,3 +261,22 @@ def test_a_run_interrupted_and_resumed_is_the_unbroken_one_frames_too(tmp_path):
     assert fvsolve.run(case, out=tmp_path / "whole").ok
     for name in ("history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"):
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+
+
+def test_what_is_wrong_in_a_mesh_file_is_named_by_the_file_and_by_no_key(tmp_path):
+    import meshio
+
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+
+    def said(cells, **keys) -> list:
+        meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("quad", np.array([cells]))]))
+        basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0, **keys}
+        with pytest.raises(CaseError) as caught:
+            fvsolve.load(scene({"pool": basin}, {}, 1.0, {}))
+        return [(fault.place, fault.message) for fault in caught.value.faults]
+
+    ((place, message),) = said([0, 1, 3, 2])
+    assert place == "nodes.pool.mesh" and message.startswith("square.vtu: cells: ") and "cross themselves" in message
+    ((place, message),) = said([0, 1, 2, 3], patches={"west": {}})
+    assert place == "nodes.pool.patches.west"
+    assert 'square.vtu names no groups of lines; Gmsh does by Physical Curve("west") = {1, 2};' in message

@@ -261,3 +261,23 @@ def wait_for_a_checkpoint(path: Path, running: subprocess.Popen) -> None:
             first = path.stat().st_mtime_ns
         assert running.poll() is None, running.communicate()
         time.sleep(0.01)
+
+
+def test_an_epanet_file_is_told_from_a_case(fvs, tmp_path):
+    path = tmp_path / "pump.inp"
+    path.write_text("[TITLE]\nA town\n\n[JUNCTIONS]\na 10 5\n[END]\n")
+    for command in ("run", "check"):
+        code, _, err = fvs(command, path)
+        said = " ".join(err.split())
+        assert code == 2 and "an EPANET network" in said and "fvsolve new pump --from" in said
+
+
+def test_a_case_beside_the_mesh_it_comes_with_is_copied_and_another_mesh_is_kept(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert fvs("new", "flooding", "one.toml")[0] == 0
+    code, out, _ = fvs("new", "flooding", "two.toml")
+    assert code == 0 and out.split() == ["two.toml"]
+    mesh = tmp_path / "flooding.msh"
+    mesh.write_text("another")
+    code, _, err = fvs("new", "flooding", "three.toml")
+    assert code == 2 and "exists" in err and mesh.read_text() == "another" and not (tmp_path / "three.toml").exists()

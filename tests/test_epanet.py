@@ -186,6 +186,85 @@ def test_emitters_draw_what_epanet_says(units, exponent, tmp_path):
     assert tomllib.loads(made.text)["links"]["b-emitter"]["type"] == "leak"
 
 
+FOLLOWS = "DEMAND MODEL PDA\nREQUIRED PRESSURE {required}\nMINIMUM PRESSURE {least}\nPRESSURE EXPONENT 0.6\n"
+LEAKY = "[EMITTERS]\nb 0.7\nc 0.2\n[VALVES]"
+
+
+def written(tmp_path, changes, options=""):
+    """The small network with texts replaced and options added, as a file in a folder of its own."""
+    path = tmp_path / "in" / "net.inp"
+    path.parent.mkdir()
+    text = SMALL.format(r=110, formula="H-W")
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text.replace("[END]", f"{options}[END]"))
+    return path
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.8, 1.3])
+@pytest.mark.parametrize("leaks", [{}, {"[VALVES]": LEAKY}], ids=["alone", "emitters"])
+@pytest.mark.parametrize("units, required, least", [("LPS", 40, 5), ("GPM", 66, 8)])
+def test_demands_that_follow_the_pressure_are_parts_that_do(weight, leaks, units, required, least, tmp_path):
+    """Beside emitters EPANET's answer holds the sum of both, and its pressures are in metres of water."""
+    options = FOLLOWS.format(required=required, least=least) + f"SPECIFIC GRAVITY {weight}\n"
+    path = written(tmp_path, {"UNITS LPS": f"UNITS {units}", **leaks}, options)
+    lost, off, made = differences(path, 0, tmp_path)
+    assert lost < 2e-3 and off < 1e-3
+    case = load(tomllib.loads(made.text))
+    assert case.nodes["a"].required_pressure > case.nodes["a"].minimum_pressure > case.ambient_pressure
+    assert not any("pressure" in what for what, _ in made.notes)
+
+
+BEHIND = {  # what leads to junction d, whose demand gets what is left at no pressure
+    "shut pipe": {"p6 b low": "p8 c d 100 100 110 0 Closed\np6 b low"},
+    "shut valve": {"[VALVES]": "[VALVES]\nv1 c d 100 TCV 5 0\n[STATUS]\nv1 CLOSED"},
+    "open valve": {"[VALVES]": "[VALVES]\nv1 c d 100 TCV 5 0"},
+    "reducing valve": {"[VALVES]": "[VALVES]\nv1 c d 100 PRV 10 0"},
+}
+
+
+@pytest.mark.parametrize("way", BEHIND)
+@pytest.mark.parametrize("demand", [2, 0])
+def test_a_demand_behind_a_valve_gets_what_its_pressure_allows(way, demand, tmp_path):
+    changes = {"[DEMANDS]": f"d 8 {demand}\n[DEMANDS]", **BEHIND[way]}
+    path = written(tmp_path, changes, FOLLOWS.format(required=40, least=0))
+    if demand or not way.startswith("shut"):
+        assert differences(path, 0, tmp_path)[0] < 2e-3
+    else:  # nothing says what pressure a place has that is shut off
+        build(load(tomllib.loads(import_network(path).text)))
+
+
+@pytest.mark.parametrize("weight", [0.8, 1.0, 1.3])
+@pytest.mark.parametrize("units, power", [("LPS", 3), ("GPM", 4)])
+def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(weight, units, power, tmp_path):
+    changes = {"[VALVES]": f"[PUMPS]\nq low c POWER {power}\n[VALVES]", "UNITS LPS": f"UNITS {units}"}
+    lost, off, _ = differences(written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n"), 0, tmp_path)
+    assert lost < 2e-3 and off < 1e-3
+
+
+@pytest.mark.parametrize("weight, setting", [(0.8, 28), (0.8, 33.6), (0.8, 41), (1.3, 54.6), (1.3, 58), (1.3, 68)])
+@pytest.mark.parametrize("kind", ["PRV", "PSV"])
+def test_a_set_pressure_is_one_of_water_whatever_the_fluid_weighs(kind, weight, setting, tmp_path):
+    """Also where it is above every source, and where the junction that it holds was moved."""
+    changes = {"p4 a c 500 150 110 0 Open\n": "", "[VALVES]": f"[VALVES]\nv1 a c 150 {kind} {setting} 2"}
+    path = written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n")
+    assert differences(path, 0, tmp_path)[0] < 5e-3
+    steep = path.read_text().replace("p3 b c 350", "p3 b c 5").replace("c 9 0", "c 0 0")
+    path.write_text(steep)
+    assert differences(path, 0, tmp_path)[0] < 5e-3
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_where_a_flow_follows_the_pressure_a_steep_pipe_grows_and_no_junction_moves(follows, tmp_path):
+    changes = {"p3 b c 350": "p3 b c 5", "c 9 0": "c 0 0", "[VALVES]": "[VALVES]" if follows else LEAKY}
+    path = written(tmp_path, changes, FOLLOWS.format(required=60, least=0) if follows else "")
+    lost, off, made = differences(path, 0, tmp_path)
+    assert lost < 2e-3 and off < 1e-3
+    assert tomllib.loads(made.text)["nodes"]["c"]["elevation"] == "0 m"
+    assert ["p3"] in [names for what, names in made.notes if what.startswith("12.12 m long here")]
+
+
 VALVES = {
     "TCV": ("v1 a c 150 TCV 40 0", "valve"),
     "FCV": ("v1 a c 150 FCV 5 0", "flow-control"),

@@ -257,3 +257,16 @@ def test_the_nine_pipes_of_streeter_and_wylie_follow_the_characteristics():
     t, exact = net.gate_pressure(100.0, lambda s: max(0.0, 1 - max(s - shut, 0.0)) ** 2, 1.0, 8.0)
     at = np.interp(np.asarray(result.t), t, exact)
     assert np.max(np.abs(result["N7.pressure"] - at)) < 2e-3 * np.ptp(exact)
+
+
+def test_a_friction_factor_is_that_of_the_wall_alone():
+    """Not the minor loss: none where there is no friction, and the given one beside any loss."""
+    nodes = {"a": lake(10.0), "b": lake(9.0)}
+    found = []
+    for friction in ({"model": "none"}, {"model": "steady", "factor": 0.02}):
+        for loss in (1.5, 0.0) if friction["model"] != "none" else (1.5,):
+            links = {"p": pipe("a", "b", 50.0, 0.1, 1000.0, 5, friction=friction, minor_loss=loss)}
+            found.append(
+                fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}))).checks["pipes"]["p"]["friction_factor"]
+            )
+    assert found[0] is None and found[1:] == pytest.approx([0.02, 0.02], rel=1e-9)

@@ -278,3 +278,16 @@ def test_a_valve_through_which_nothing_flows_is_solved_to_the_rounding_of_pressu
     done = fvsolve.run(case)
     assert done.ok, done.reason
     assert np.ptp(done["pot.pressure"]) == 0.0
+
+
+@pytest.mark.parametrize("where", ["inflow", "demand"])
+def test_flows_that_are_given_are_volumes_at_the_reference_density(where):
+    """At 2000 bar, where water is 1.095 times as dense, exp(2000 bar / 2.2 GPa), a pipe reads fewer litres."""
+    flow, end, high = 1e-3, 0.5, 2e8 + AMBIENT
+    fluid = scenes.WATER | {"law": "log", "pressure": AMBIENT}
+    given = {"type": "inflow", "flow": flow} if where == "inflow" else junction(-flow)
+    nodes = {"in": given, "lake": reservoir(high)}
+    line = pipe("in", "lake", 10.0, 0.1, 1400.0, 5)
+    result = fvsolve.run(scene(nodes, {"line": line}, end, {}, ["line.flow@1"], fluid=fluid))
+    assert result.ledger["mass"]["inflow"] == pytest.approx(scenes.RHO * flow * end, rel=1e-9)
+    assert result["line.flow@1"][-1] == pytest.approx(flow / np.exp(2e8 / 2.2e9), rel=1e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from truth.scenes import junction, lake, pipe, pump, scene, step
 
@@ -68,3 +69,51 @@ def test_faults_of_torques():
     assert "is held by its motor until it trips" in faults(motor, **held)
     wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
     assert "a hydraulic place, and this port of a torque a rotational one" in faults(wet, curve=ONE)
+
+
+def rounded(by: float) -> dict:
+    """A table of Suter form whose ends differ."""
+    x = np.linspace(0.0, 2.0 * np.pi, 9)
+    head, torque = 0.5 - np.cos(x), 0.4 - np.cos(x)
+    head[-1] += by
+    torque[-1] -= by
+    return {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": head.tolist(), "torque": torque.tolist()}}
+
+
+@pytest.mark.parametrize("by", [1e-16, -4e-16, 1e-9, -1e-7])
+def test_ends_of_a_suter_table_that_differ_by_rounding_are_one(by):
+    case = scene({"sump": lake(0.0), "top": lake(20.0)}, {"pump": pump("sump", "top", **rounded(by))}, 1.0, {})
+    table = fvsolve.load(case).links["pump"].suter
+    assert table.head[0] == table.head[-1] and table.torque[0] == table.torque[-1]
+
+
+@pytest.mark.parametrize("by", [1e-3, -1e-4])
+def test_ends_of_a_suter_table_that_differ_by_more_are_a_fault(by):
+    assert "x = 2 pi is x = 0 again" in faults(**rounded(by))
+
+
+def notes(nodes: dict, start: str, end: str, **keys) -> list:
+    links = {"pump": pump(start, end, **keys), "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5, minor_loss=20.0)}
+    made = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {})))
+    return [(one.key, one.text) for one in made.warnings if one.kind == "range" and one.place == "links.pump"]
+
+
+WATERS = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
+
+
+def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
+    assert notes(WATERS, "sump", "out", curve=ONE) == []
+    ((key, text),) = notes(WATERS, "out", "sump", curve=ONE)
+    assert key == "from" and "the lowest water there is" in text and "drawn backwards?" in text
+    down = {"sump": lake(60.0), "out": junction(), "top": lake(20.0)}
+    ((key, text),) = notes(down, "sump", "out", curve={"flow": [0.02], "head": [10.0]})
+    assert key == "from" and "m lower" in text
+    assert notes({**down, "top": lake(70.0)}, "sump", "out", curve={"flow": [0.02], "head": [10.0]}) == []  # a booster
+    assert notes(WATERS, "out", "sump", curve=ONE, speed=0.0) == []  # it stands
+
+
+@pytest.mark.parametrize("flow, unit", [(20.0, "l/s"), (2000.0, "m3/h"), (20000.0, "l/min")])
+def test_a_rated_flow_too_quick_for_the_pipes_beside_it_is_asked_about(flow, unit):
+    said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
+    assert [key for key, _ in said] == ["curve"] and f'was "{flow:.4g} {unit}" meant?' in said[0][1]
+    assert notes(WATERS, "sump", "out", curve={"flow": [1.0], "head": [50.0]}) == []

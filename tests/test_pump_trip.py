@@ -254,3 +254,21 @@ def test_implicit_steps_follow_scipy_too():
     truth = column_truth(30.0, 1.0, operating_flow(30.0), 1.0, 6.0)
     assert result.ok and result["pump.speed"][-1] == approx(truth.y[0, -1], rel=1e-7)
     assert result["pump.flow"][-1] == approx(truth.y[1, -1], rel=1e-6)
+
+
+def test_a_pump_that_runs_down_forward_until_its_check_valve_shuts_is_a_note_and_no_mark():
+    """In forward flow beyond the last flow, shut at 4.05 s; without a check valve a mark."""
+    result = fvsolve.run(column(30.0, 6.0, ["pump.flow"], **SHAFT, trip=1.0, check_valve=True))
+    assert [event["what"] for event in result.summary["events"]] == ["check valve shuts"]
+    assert result.marks == [] and result.ok
+    (said,) = [one for one in result.warnings if one.kind == "range"]
+    assert said.place == "links.pump" and said.ok and "it runs down, from 1.37" in said.text and "suter" in said.text
+    open_ended = fvsolve.run(column(30.0, 6.0, ["pump.flow"], **SHAFT, trip=1.0))
+    assert [mark.what for mark in open_ended.marks] == ["outside its curve"]
+    assert "suter = { rated_flow, rated_head, table }" in open_ended.marks[0].text
+
+
+def test_a_pump_driven_beyond_its_curve_at_its_own_speed_is_marked_though_it_has_a_check_valve():
+    case = column(30.0, 3.0, ["pump.flow"], curve=ONE, check_valve=True)
+    case["nodes"]["sump"] = lake({"time": [0.0, 1.0], "value": [0.0, 90.0]})
+    assert [mark.what for mark in fvsolve.run(case).marks] == ["outside its curve"]

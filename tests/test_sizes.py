@@ -94,7 +94,7 @@ def test_the_wall_of_a_nominal_size_makes_its_wave_speed():
 
 BAD = {
     "a size that is not made": ({"nominal": "DN110"}, "nominal", "the nearest are NPS 4"),
-    "no size": ({"nominal": "100 mm"}, "nominal", '"DN100" or "NPS 4"'),
+    "no size": ({"nominal": "100 mm"}, "nominal", '"DN100", "NPS 4" or "NPS 1-1/2"'),
     "a schedule": ({"nominal": "DN100", "schedule": "45"}, "schedule", "did you mean"),
     "a schedule alone": ({"diameter": 0.1, "schedule": "40"}, "schedule", "keep one"),
     "both": ({"diameter": 0.1, "nominal": "DN100"}, "nominal", "keep one"),
@@ -111,3 +111,25 @@ def test_a_name_that_means_nothing_is_one_fault_with_a_remedy(keys, key, text):
         fvsolve.load(line(**keys))
     assert len(caught.value.faults) == 1
     assert key in str(caught.value) and text in str(caught.value)
+
+
+FRACTIONS = {
+    "1/8": "0.125", "1/4": "0.25", "3/8": "0.375", "1/2": "0.5", "3/4": "0.75", "1-1/4": "1.25", "1-1/2": "1.5",
+    "1 1/2": "1.5", "2-1/2": "2.5", "3 1/2": "3.5", "1 - 1/2": "1.5", "1 / 2": "0.5",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("said", FRACTIONS)
+def test_a_fraction_names_the_size_that_its_decimal_does(said):
+    assert bore(f"NPS {said}", "40") == bore(f"nps{FRACTIONS[said]}", "40") == nearest(FRACTIONS[said])
+
+
+def nearest(inches: str) -> tuple[float, float]:
+    found = nearest_pipe(NPS=float(inches), schedule="40")
+    return found[1], found[3]
+
+
+@pytest.mark.parametrize("said", ["NPS 1/0", "NPS 1/", "NPS /2", "NPS 1--1/2", "NPS 1/2/4", "NPS 1-1.5", "NPS -1/2"])
+def test_what_is_no_fraction_is_no_size(said):
+    with pytest.raises(ValueError, match="is no nominal size"):
+        bore(said, "40")

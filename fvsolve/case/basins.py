@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -79,8 +80,11 @@ def mesh_of(basin: Basin, setting: Setting) -> Mesh:
             return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
         return read(setting.files[basin.mesh.file], basin.mesh.unit)
     except MeshError as error:
-        below = ("mesh",) if basin.mesh else ()
-        raise Misfit([((*below, *keys(fault.place)), fault.message) for fault in error.faults]) from None
+        if basin.mesh is not None:  # what is wrong lies in its file, and is no key of the case
+            name, places = Path(basin.mesh.file).name, [one.place == "unit" for one in error.faults]
+            raise Misfit([(("mesh", "unit"), one.message) if key else (("mesh",), f"{name}: {one}")
+                          for key, one in zip(places, error.faults, strict=True)]) from None  # fmt: skip
+        raise Misfit([(keys(fault.place), fault.message) for fault in error.faults]) from None
 
 
 def keys(place: str) -> tuple:
@@ -149,6 +153,14 @@ def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     return found
 
 
+def _patches(basin: Basin, known: tuple[str, ...], wanted: str) -> str:
+    """What patches there are, or how a file comes to have some."""
+    if known or basin.mesh is None:
+        return f"patches are {listing(known) or 'none'}"
+    name = Path(basin.mesh.file).name
+    return f"{name} names no groups of lines; Gmsh does by Physical Curve({show(wanted)}) = {{1, 2}};"
+
+
 def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any) -> Found:
     """Faults of patches, and of what basins do not go with."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
@@ -165,7 +177,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         known = patch_names(meshes[name])
         for patch, one in basin.patches.items():
             if patch not in known:
-                yield (*key, "patches", patch), f"the mesh has no such patch; patches are {listing(known) or 'none'}"
+                yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"
             elif f"{name}.{patch}" in joined and basin.physics == "transport":
                 yield (*key, "patches", patch), "a link joins here, but what flows is given by velocity"
             elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:

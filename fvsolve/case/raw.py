@@ -76,6 +76,9 @@ def read_raw(source: Any) -> Raw:
     except RecursionError:
         raise CaseError([Fault("", "tables or lists nested too deep")], path.name) from None
     except ValueError as error:
+        if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
+            what = f"an EPANET network, no case; fvsolve new {path.stem} --from {path} makes one of it"
+            raise CaseError([Fault("", what)], path.name) from None
         raise CaseError([_syntax_fault(error, text)], path.name) from None
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
 

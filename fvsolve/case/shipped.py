@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tomllib
+from filecmp import cmp
 from pathlib import Path
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
@@ -56,6 +57,7 @@ def copy(name: str, to: Path) -> list[Path]:
     pairs = [(source, to)]
     pairs += [(Path(path), to.parent / Path(path).absolute().relative_to(folder())) for path in load(source).files]
     described = to.parent / SCHEMA
+    pairs = pairs[:1] + [pair for pair in pairs[1:] if not (pair[1].is_file() and cmp(*pair, shallow=False))]
     for _, target in pairs:
         if target.exists():
             raise FvsolveError(f"{target} exists; state another file: fvsolve new {name} FILE")

@@ -10,6 +10,7 @@ from fvsolve.epanet.names import Names
 from fvsolve.epanet.reading import SHUT, Hour
 
 STALLED = 1e-7  # flow below which EPANET's pumps of constant power have stuck [m3/s]
+LEAST_REQUIRED = 0.1  # pressure at which a demand is met whole, at least, in metres or psi as the file counts
 STEEPEST = 0.99  # climb per length where the file has more than 1
 SWITCHED_OFF, ACTIVE = 2, 4  # EPANET's codes of a link
 PSI_OF_METRE = 0.4333 / 0.3048
@@ -32,6 +33,8 @@ class Translation:
         self.node_names, self.link_names = Names(), Names()
         hydraulic = network.options.hydraulic
         self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
+        self.gravity = hydraulic.specific_gravity  # a pressure in metres is one of water, a head one of the fluid
+        self.follows = hydraulic.demand_model in ("PDA", "PDD")
         self.clock = hour.seconds + network.options.time.pattern_start
         self.drawn = any(any(node.coordinates) for _, node in network.nodes())
         self.elevation = self.elevations()
@@ -61,7 +64,8 @@ class Translation:
     def elevations(self) -> dict[str, float]:
         """Elevations [m] of junctions and tanks, none of which a pipe is too short to reach.
 
-        Heads and flows of a network do not depend on them; EPANET accepts a pipe of 6 m that climbs 200 m.
+        EPANET accepts a pipe of 6 m that climbs 200 m. Heads and flows of a network do not depend on them, but where
+        what is drawn follows the pressure: there the pipe grows, see `length`.
         """
         found = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
         pipes = [pipe for _, pipe in self.network.pipes() if {pipe.start_node_name, pipe.end_node_name} <= found.keys()]
@@ -72,6 +76,8 @@ class Translation:
                 low, high = sorted((pipe.start_node_name, pipe.end_node_name), key=found.get)
                 if found[high] - found[low] <= pipe.length:
                     continue
+                if self.feels(low) or self.feels(high):
+                    continue
                 if self.network.get_node(low).node_type == "Junction":
                     name, found[low] = low, found[high] - STEEPEST * pipe.length
                 else:
@@ -80,16 +86,28 @@ class Translation:
                 self.note("elevation moved, no pipe can be shorter than its climb; heads and flows stay", name)
         return found
 
+    def feels(self, name: str) -> bool:
+        """Whether what leaves a node depends on its pressure, and so on its elevation."""
+        node = self.network.get_node(name)
+        return node.node_type == "Junction" and bool(node.emitter_coefficient or (self.follows and self.wanted(node)))
+
+    def wanted(self, node: Any) -> float:
+        """Demand of a junction at the hour, by its patterns [m3/s]."""
+        return node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
+
     def position(self, node: Any) -> Any:
         """Where a node is drawn; None in a file without coordinates, of which WNTR puts every node at the origin."""
         return node.coordinates if self.drawn else None
 
     def junction(self, name: str, node: Any) -> words.Part:
-        demand = node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
-        if self.network.options.hydraulic.demand_model in ("PDA", "PDD"):
-            demand = self.hour.demand[name]
-            self.note("demand that depends on pressure: taken as delivered at this hour", name)
-        return words.junction(self.elevation[name], demand, self.position(node))
+        demand = self.wanted(node)
+        made = words.junction(self.elevation[name], demand, self.position(node))
+        if self.follows and demand > 0.0:
+            hydraulic = self.network.options.hydraulic
+            least = LEAST_REQUIRED * (1.0 / PSI_OF_METRE if hydraulic.inpfile_units in US_UNITS else 1.0)
+            required = max(hydraulic.required_pressure, least)
+            made |= words.follows_pressure(hydraulic.minimum_pressure, required, hydraulic.pressure_exponent)
+        return made
 
     def reservoir(self, name: str, node: Any) -> words.Part:
         return words.reservoir(node.head_timeseries.at(self.clock), self.position(node))
@@ -134,11 +152,17 @@ class Translation:
             self.note(f"{what}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name)
             end = place
         law = words.friction(self.formula, link.roughness)
-        length = max(link.length, self.shortest)
+        length = self.length(link)
         if length > link.length:
             law = self.spread(name, link, length)
-            self.note(f"{self.shortest:.4g} m long here, with the loss of its own length", name)
+            self.note(f"{length:.4g} m long here, with the loss of its own length", name)
         return words.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
+
+    def length(self, link: Any) -> float:
+        """No less than the shortest that steps can follow, nor than a climb that stays [m]."""
+        low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
+        inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
+        return max(link.length, self.shortest, (high - low) / STEEPEST if inside and high - low > link.length else 0.0)
 
     def spread(self, name: str, link: Any, length: float) -> words.Part:
         """Friction of a pipe made longer that takes what the pipe took."""
@@ -156,7 +180,8 @@ class Translation:
         if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALLED:
             self.note("pump of constant power stands at no flow in EPANET, which no power allows: a shut valve", name)
             return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
-        law = words.power(link.power) if link.pump_type == "POWER" else words.curve(link.get_pump_curve().points)
+        given = link.pump_type == "POWER"
+        law = words.power(self.gravity * link.power) if given else words.curve(link.get_pump_curve().points)
         return words.pump(self.ends(link), law, float(self.hour.setting[name]))
 
     def valve(self, name: str, link: Any) -> words.Part:
@@ -201,14 +226,16 @@ class Translation:
         network, held = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         sources = [*network.reservoir_name_list, *network.tank_name_list]
         most = max(self.hour.head[source] for source in sources)
-        return not network.num_pumps and self.hour.setting[name] + network.get_node(held).elevation > most
+        head = self.hour.setting[name] / self.gravity + network.get_node(held).elevation
+        return not network.num_pumps and head > most
 
     def setting(self, name: str, link: Any) -> float:
-        """What a valve holds: a head above its end [m] or a flow [m3/s]; a moved elevation moves it along."""
+        """What a valve holds: a head of water above its end [m] or a flow [m3/s]; a moved elevation moves it along."""
         held = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         if link.valve_type == "FCV" or held not in self.elevation:
             return self.hour.setting[name]
-        return self.hour.setting[name] + self.network.get_node(held).elevation - self.elevation[held]
+        moved = self.network.get_node(held).elevation - self.elevation[held]
+        return self.hour.setting[name] + self.gravity * moved
 
     def emitters(self) -> None:
         """Emitters as leaks. WNTR turns coefficients per psi into ones per metre as if every exponent were a half."""

@@ -34,6 +34,19 @@ def junction(elevation: float, demand: float, position: Any) -> Part:
     return part | _position(position)
 
 
+def follows_pressure(minimum: float, required: float, exponent: float) -> Part:
+    """Keys of a demand that grows from none at one pressure to all at another, heads of water [m]."""
+    part = {"required_pressure": gauge(required)}
+    if minimum:
+        part["minimum_pressure"] = gauge(minimum)
+    return part if exponent == 0.5 else part | {"demand_exponent": number(exponent)}
+
+
+def gauge(head: float) -> str:
+    """Pressure above ambient of a head of water [m]."""
+    return f"{DENSITY * GRAVITY * head * 1e-5:.10g} barg"
+
+
 def reservoir(head: float, position: Any) -> Part:
     """A place of given head [m]."""
     return {"type": "reservoir", "head": quantity(head, "m")} | _position(position)
@@ -103,7 +116,7 @@ def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float
     if kind == "FCV":
         part["set_flow"] = quantity(setting, "l/s")
     else:
-        part["set_pressure"] = f"{DENSITY * GRAVITY * setting * 1e-5:.10g} barg"
+        part["set_pressure"] = gauge(setting)
     part |= {"time_constant": TIME_CONSTANT, "diameter": quantity(diameter, "mm")}
     return part | {"loss_coefficient": number(loss or NO_LOSS)}
 

@@ -11,7 +11,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.density import add_law, cavity_pressure
+from fvsolve.model.density import add_law, cavity_pressure, coarse_for_cavities
 from fvsolve.model.devices import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
@@ -345,7 +345,7 @@ class Scene:
             layout[name], at = at, at + size
         layout["size"] = at
         parts = len(pipes) + 3 * len(self.node_table) + len(self.column_table)
-        marks = np.full(parts + len(self.device_table) + len(self.piston_table), np.nan)
+        marks = np.full(parts + 2 * len(self.device_table) + len(self.piston_table), np.nan)
         if s["floor"] > 0.0:  # first place, greatest volume and its time of the cavities of each pipe
             marks = np.append(marks, np.full(3 * len(pipes), np.nan))
             s["vapor"] = cavity_pressure(self.fluid)
@@ -381,7 +381,7 @@ class Scene:
             (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
         )
         start = self.start_state()
-        self.warnings += dispersion.warnings(self.basins, start)
+        self.warnings += [*dispersion.warnings(self.basins, start), *coarse_for_cavities(self)]
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,

@@ -41,12 +41,13 @@ def checks(model) -> dict[str, Any]:
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
         law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
-        loss = drag(*law) / row["area"] * mesh.length
+        loss, link = drag(*law) / row["area"] * mesh.length, model.case.links[mesh.name]
+        rubs = dynamic > 0 and link.friction.model != "none"
         pipes[mesh.name] = {
             "length": mesh.length, "cells": mesh.cells, "wave_speed": (speed := start_speed(model, k)),
             "travel_time": mesh.length / speed, "velocity": float(velocity),
             "reynolds": float(rho * abs(velocity) * mesh.diameter / viscosity) if viscosity else None,
-            "friction_factor": float(abs(loss) / dynamic) if dynamic > 0 else None,
+            "friction_factor": float(rubbed(loss, link, rho, velocity) / dynamic) if rubs else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
             **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}),
         }  # fmt: skip
@@ -64,6 +65,11 @@ def checks(model) -> dict[str, Any]:
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
         "moving": model.steady["moving"], "warnings": [one.plain() for one in model.warnings],
     }  # fmt: skip
+
+
+def rubbed(loss: float, link, rho: float, velocity: float) -> float:
+    """Pressure that a pipe's wall takes of all that it loses [Pa]: the rest is its minor loss."""
+    return abs(loss) - link.minor_loss * rho * velocity**2 / 2.0
 
 
 def basin_facts(basin) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.schemes import ORDER
 from fvsolve.parts import EDGES
 
+TIE = 1e-6  # of a cell, within which two sets of cells are as near
 SPOOL_FLOWS = {  # flow into the link at a port: weights of its four edges
     f"flow_{port}": [float((port == start) - (port == end)) for start, end, _ in EDGES] for port in "PTAB"
 }
@@ -96,10 +97,23 @@ def place(scene, row, fraction: float, degree: int | None = None) -> None:
         return
     n = int(scene.pipe_table[row["index"]]["cells"])
     degree = min(degree or max(ORDER[scene.case.numerics.scheme] - 1, 1), n - 1)
-    x = fraction * n
-    first = int(np.clip(round(x - 0.5 * (degree + 1)), 0, n - degree - 1))
-    row["cell"], row["count"], row["weights"] = first, degree + 1, len(scene.floats)
-    scene.floats += list(reading_weights(x - first, degree))
+    first, weights = around(fraction * n, degree, n)
+    row["cell"], row["count"], row["weights"] = first, weights.size, len(scene.floats)
+    scene.floats += weights.tolist()
+
+
+def around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
+    """First of the cells that are read x cells from `from`, and their weights.
+
+    They are the nearest degree + 1; where two such sets are as near, as on a face for an even degree, it is the mean
+    of both, so that a pipe drawn the other way reads the same.
+    """
+    middle = x - 0.5 * (degree + 1)
+    firsts = sorted({int(np.clip(round(middle + side), 0, n - degree - 1)) for side in (-TIE, TIE)})
+    weights = np.zeros(firsts[-1] - firsts[0] + degree + 1)
+    for first in firsts:
+        weights[first - firsts[0] :][: degree + 1] += reading_weights(x - first, degree) / len(firsts)
+    return firsts[0], weights
 
 
 def reading_weights(x: float, degree: int) -> np.ndarray:

@@ -25,6 +25,8 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
+ROUNDING = 1e-6  # share of the greatest value by which the ends of a table of Suter form may differ
+
 
 @dataclass(frozen=True)
 class Points:
@@ -205,10 +207,11 @@ class Suter(Value):
         for key, row in (("head", head), ("torque", torque)):
             if len(row) < 9:
                 faults.append(((key,), f"{len(row)} values; wanted 9 or more, from x = 0 to x = 2 pi"))
-            elif row[0] != row[-1]:
+            elif abs(row[0] - row[-1]) > ROUNDING * max(map(abs, row)):
                 faults.append(((key,), f"ends at {row[-1]:g} and begins at {row[0]:g}; x = 2 pi is x = 0 again"))
         if faults:
             raise Misfit(faults)
+        found["head"], found["torque"] = ((*row[:-1], row[0]) for row in (head, torque))
         return SuterTable(**found)
 
     def json(self) -> dict[str, Any]:

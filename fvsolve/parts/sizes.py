@@ -50,17 +50,27 @@ FITTINGS: dict[str, Callable[[Any, float, float], float]] = {
 }
 
 
+WHOLE, MIXED = r"\d+(?:\.\d+)?", r"(?:\d+(?:\s+|\s*-\s*))?[1-9]\d*\s*/\s*[1-9]\d*"  # 1.5; 1/2, 1-1/2, 1 1/2
+
+
+def inches(text: str) -> float:
+    """ "1.5", "1/2", "1-1/2" or "1 1/2" as a number."""
+    *whole, last = re.split(r"\s*-\s*|(?<!/)(?<!/ )\s+(?!/)", text)
+    top, _, bottom = last.partition("/")
+    return sum(map(float, whole)) + float(top) / float(bottom or 1)
+
+
 def bore(nominal: str, schedule: str) -> tuple[float, float]:
     """(inner diameter, wall thickness) [m] of "DN100" or "NPS 4" in a schedule; ValueError for what is not made."""
     from fluids.piping import nearest_pipe, schedule_lookup
 
-    found = re.fullmatch(r"(DN|NPS)\s*(\d+(?:\.\d+)?)", nominal.strip(), re.IGNORECASE)
+    found = re.fullmatch(rf"(DN|NPS)\s*({WHOLE}|{MIXED})", nominal.strip(), re.IGNORECASE)
     if found is None:
-        raise ValueError(f'{show(nominal)} is no nominal size; wanted for example "DN100" or "NPS 4"')
+        raise ValueError(f'{show(nominal)} is no nominal size; wanted for example "DN100", "NPS 4" or "NPS 1-1/2"')
     if schedule not in schedule_lookup:
         near = did_you_mean(schedule, schedule_lookup) or f"; schedules are {listing(schedule_lookup)}"
         raise ValueError(f"no schedule named {show(schedule)}{near}")
-    number = float(found[2])
+    number = inches(found[2])
     if found[1].upper() == "DN":
         number = DN_NPS.get(number, number / 25.0)
     sizes = schedule_lookup[schedule][0]

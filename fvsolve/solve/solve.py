@@ -21,6 +21,7 @@ from fvsolve.solve.summary import (
     find_extremes,
     find_marks,
     mass_ledger,
+    run_downs,
 )
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
@@ -97,17 +98,18 @@ class Run:
         kept = [self.model.tables[at].ravel() for at in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
-        own = [float(self.segment), self.seconds, float(len(self.changes)), *changes, float(len(switched)), *switched]
+        own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
+        own += [float(len(switched)), *switched]
         return np.concatenate([own, *(view.ravel() for view in self.loop.stepper.memories()), *kept])
 
     def remember(self, memory: np.ndarray) -> None:
-        self.segment, self.seconds, changes = int(memory[0]), float(memory[1]), int(memory[2])
-        if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[3 + 3 * changes] >= 0):
+        self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
+        if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[4 + 3 * changes] >= 0):
             raise ValueError("counts out of range")
-        self.changes = [tuple(row) for row in memory[3 : 3 + 3 * changes].reshape(-1, 3).tolist()]
+        self.changes = [tuple(row) for row in memory[4 : 4 + 3 * changes].reshape(-1, 3).tolist()]
         if changes % 2 == 1:
             automatic.change(self.loop.stepper)
-        memory = memory[3 + 3 * changes :]
+        memory = memory[4 + 3 * changes :]
         events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
         known = [self.model.tables[at] for at in PERSISTENT] + self.loop.stepper.memories()
@@ -327,11 +329,12 @@ class Run:
         ledger = loop.stepper.ledger[: loop.stepper.ledger.size // 2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[: len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
-        warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers)]
+        warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers), *run_downs(model)]
         ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(
             reason, ok, loop.t, find_marks(model), ledgers, find_extremes(model),
-            find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.setup,
+            find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
+            self.setup,
             [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), warnings,
         )  # fmt: skip
         self.sink.end(summary)

@@ -58,6 +58,7 @@ class Summary:
     methods: list[dict[str, Any]] = field(default_factory=list)  # which one from when on, and why
     cells: int = 0
     seconds: float = 0.0
+    processor: float = 0.0  # CPU time of the steps
     seconds_setup: float = 0.0
     events: list[Event] = field(default_factory=list)
     cavities: list[Cavity] = field(default_factory=list)  # that the law `mixture` followed
@@ -75,8 +76,8 @@ class Summary:
 
     @property
     def cost(self) -> float:
-        """Stepping time per cell (or state, without cells) and step [ns]."""
-        return 1e9 * self.seconds / max(1, self.steps * max(1, self.cells))
+        """CPU time of the steps per cell (or state, without cells) and step [ns]."""
+        return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
 def find_marks(model: Model) -> list[Mark]:
@@ -88,11 +89,18 @@ def find_marks(model: Model) -> list[Mark]:
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
+    keys = "" if model.case.fluid.law == "mixture" else 'law = "mixture", air_fraction = 1e-7 and '
     texts = {
         "stopped dead": "its last way out shut while it flowed; a rigid column has no surge, a pipe would",
-        "outside its curve": "the pump works backwards or beyond its curve's last flow; a suter table would say how",
+        "outside its curve": (
+            "the pump works backwards or beyond its curve's last flow; in place of curve, suter = { rated_flow, "
+            'rated_head, table } says how, with table = "radial-35" or head and torque (WH and WB) of its own'
+        ),
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would hold it",
-        "below vapor pressure": "pressure falls below vapour pressure; the liquid column would part",
+        "below vapor pressure": (
+            "pressure falls below vapour pressure; the liquid column would part, and "
+            f"{keys}cavitation = true in [fluid] would follow it"
+        ),
         "dry": "no water is left where outflow is asked for; what flows is made up",
         "spilling": "the tank is full to its height and spills",
     }
@@ -101,6 +109,18 @@ def find_marks(model: Model) -> list[Mark]:
         for (what, place), time in zip(kinds, marks[: len(kinds)], strict=True)
         if np.isfinite(time) and not (what == "below vapor pressure" and model.cavitates)
     ]
+
+
+def run_downs(model: Model) -> list[Notice]:
+    """Pumps that ran forward beyond their curve while they ran down, ahead of a check valve that shuts."""
+    found, marks = [], model.tables[rec.I_MARKS]
+    first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
+    for (name, *_), time in zip(model.devices, marks[first + len(model.devices) :], strict=False):
+        if np.isfinite(time):
+            text = (f"{name}: it runs down, from {time:.6g} s on beyond its curve's last flow, where its head is "
+                    "that of a parabola; suter in place of curve would tell it")  # fmt: skip
+            found.append(Notice("range", f"links.{name}", text, "curve"))
+    return found
 
 
 def find_cavities(model: Model) -> list[Cavity]:

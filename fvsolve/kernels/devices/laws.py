@@ -12,7 +12,7 @@ class Law:
     set : before nodes are closed, conductances, speeds, pressures and stiffness of vessels, from (t, y) and flags alone
     move : after, d/dt of what it holds where dydt.size > 0, and its greatest rate into out[RATE]
     events : its event functions into g, from a state whose nodes are closed
-    value : its quantity number `which`; outside : whether it works where its law is not to be trusted
+    value : its quantity number `which`; outside : 1 where its law is not to be trusted, or PASSING
     power : (supplied, rate of what it stores, dissipated) beside its restriction [W]; stored : since the profile [J]
     """
 

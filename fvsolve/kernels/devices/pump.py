@@ -10,6 +10,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.curves import COUNT, LAST, LAW, OWN, SCALE, SUTER, curve_head, piecewise, suter_value
 from fvsolve.kernels.devices.check_valve import RELUCTANCE
+from fvsolve.kernels.devices.codes import PASSING
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.records import (
     I_ARMED,
@@ -196,10 +197,20 @@ def pump_value(out, tables, device, which):
 
 @njit
 def pump_outside(out, tables, device):
-    """Whether it works outside its curve: backwards, or beyond the last flow; a Suter table has no outside."""
+    """1 where it works outside its curve, backwards or beyond the last flow; a Suter table has no outside.
+
+    PASSING where it runs down behind a check valve: slower than at the start, forward, by a flow its curve then held.
+    """
     floats, curve = tables[I_FLOATS], tables[I_VALVES][device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:
-        return False
+        return 0
     n, q, _ = pump_point(out, tables, device)
-    slack = OUTSIDE * floats[curve + SCALE]
-    return q < -slack or q > max(n, 0.0) * floats[curve + LAST] + slack
+    slack, last, begun = (
+        OUTSIDE * floats[curve + SCALE],
+        floats[curve + LAST],
+        tables[I_VALVES][device["valve"]]["drive"],
+    )
+    if -slack <= q <= max(n, 0.0) * last + slack:
+        return 0
+    down = floats[device["data"] + CHECK] > 0.0 and n < begun and 0.0 < q <= begun * last
+    return PASSING if down else 1

@@ -1,6 +1,7 @@
 """What all devices of one kind do: a template, in which `loops` puts the kind and its calls in place of `each`."""
 
 from fvsolve.jit import njit
+from fvsolve.kernels.devices.codes import PASSING
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
     DEVICE_VALUE,
@@ -61,16 +62,17 @@ def observe(t, y, out, handle, values):
 
 @njit
 def record(t, y, out, handle, values):
-    """The first time that each device works where its law is not to be trusted."""
+    """The first time that each device works where its law is not to be trusted, and where that passes by itself."""
     tables = open_tables(handle)
     marks, devices = tables[I_MARKS], tables[I_DEVICES]
     first = tables[I_PIPES].size + 3 * tables[I_NODES].size + tables[I_COLUMNS].size + tables[I_PISTONS].size
     for k in range(devices.size):
-        device, beyond = devices[k], False
+        device, beyond = devices[k], 0
         if device["kind"] == KIND:
             ...  # each: beyond = outside
-            if beyond and marks[first + k] != marks[first + k]:
-                marks[first + k] = t
+            at = first + k + (devices.size if beyond == PASSING else 0)
+            if beyond and marks[at] != marks[at]:
+                marks[at] = t
 
 
 @njit

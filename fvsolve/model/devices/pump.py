@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import curves
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import pump as law
@@ -18,6 +19,9 @@ from fvsolve.steady import Edge
 
 SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding
 SMALL_SPEED = 0.01  # what counts as a small change of relative speed
+NEAR = 1e-6  # difference of heads that is rounding [m]
+QUICKEST = 15.0  # velocity beside a pump at its rated flow beyond which a note asks [m/s]
+UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
 SNAP = 1e-12  # share of the torques on a shaft below which their sum is rounding
 
 
@@ -134,6 +138,7 @@ class Pump(Device, kind="pump"):
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
+        start.scene.warnings += [*drawn_backwards(start, name, part, valve), *quick(scene, name, part)]
         return moving + self.let_go(start, part, row, valve)
 
     def let_go(self, start, part, row, valve) -> list[str]:
@@ -157,6 +162,36 @@ class Pump(Device, kind="pump"):
         floats[at + law.HELD], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, taken, left
         rise = left / part.inertia
         return [f"pump {name}: its shaft speeds up by {rise:.4g} rad/s2"] if left != 0.0 else []
+
+
+def drawn_backwards(start, name: str, part, valve) -> list[Notice]:
+    """A note on a pump that runs at the start and delivers downhill, or into the lowest water that there is."""
+    i, j = int(valve["from_node"]), int(valve["to_node"])
+    heads = start.nodes["pressure"] / start.weight + start.nodes["elevation"]
+    still = np.isin(start.nodes["kind"], (rec.FIXED, rec.TANK))
+    lowest = still[j] and not still[i] and heads[j] < heads[still].max() - NEAR and heads[j] == heads[still].min()
+    if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + NEAR or lowest):
+        return []
+    what = "the lowest water there is" if lowest else f"{heads[i] - heads[j]:.4g} m lower"
+    text = f"{name}: it pumps from {part.from_} to {part.to}, {what}; is it drawn backwards? `from` is its suction side"
+    return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
+
+
+def quick(scene, name: str, part) -> list[Notice]:
+    """A note on a pump whose rated flow is too quick for every pipe beside it; pumping stations have 1 to 4 m/s (Sanks,
+    Pumping Station Design)."""
+    pipes = [one for one in scene.case.links.values() if one.kind in ("pipe", "rigid-column")]
+    wide = max((one.diameter for one in pipes if {one.from_, one.to} & {part.from_, part.to}), default=None)
+    if wide is None or part.power is not None:
+        return []
+    flow = rated_point(part, scene.fluid.density * scene.case.gravity)[0]
+    speed = flow / (math.pi / 4.0 * wide**2)
+    if speed <= QUICKEST:
+        return []
+    meant = next((f'; was "{flow:.4g} {unit}" meant?' for unit, size in UNITS if speed * size <= QUICKEST), "")
+    text = f"{name}: its rated flow of {flow:.4g} m3/s is {speed:.4g} m/s in the widest pipe beside it{meant}"
+    key = "suter" if part.suter is not None else "curve"
+    return [Notice("range", f"links.{name}", text, key, speed, QUICKEST)]
 
 
 def torques_on(case, name: str) -> list:
