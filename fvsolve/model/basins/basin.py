@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from fvsolve.case.basins import behind
+from fvsolve.case.basins import behind, is_grid, means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import advection_faces
@@ -38,8 +38,7 @@ class Basin:
         self.x, self.y = np.ascontiguousarray(self.mesh.centre.T)
         self.n = self.x.size
         self.memory = 0  # its tables and its state [bytes]
-        grid = self.mesh.grid
-        self.is_grid = grid is not None and self.n == grid.nx * grid.ny
+        self.is_grid = is_grid(self.mesh)
         self.scalars = list(case.scalars)
 
     # what a physics says ------------------------------------------------------------------------------------
@@ -114,16 +113,7 @@ class Basin:
 
     def formula(self, shape) -> np.ndarray:
         """Means of a formula over cells, on grids by nine Gauss points, elsewhere at centres : float64[n]."""
-        if shape is None:
-            return np.zeros(self.n)
-        found, grid = shape.at(self.x, self.y), self.mesh.grid
-        if not self.is_grid:
-            return found
-        places, shares = np.polynomial.legendre.leggauss(3)
-        wide, high = np.tile(np.diff(grid.x), grid.ny), np.repeat(np.diff(grid.y), grid.nx)
-        values = [shape.at(self.x + 0.5 * a * wide, self.y + 0.5 * b * high) for b in places for a in places]
-        means = np.tensordot(np.outer(shares, shares).ravel() / 4.0, values, 1)
-        return np.where(np.ptp(values, axis=0) > 0.0, means, found)  # what is even stays so to the bit
+        return means(samples(shape, self.mesh))
 
     def reflects(self) -> np.ndarray:
         """What comes back of waves at faces of the boundary in the kernels' order : float64[outer]; none for walls."""

@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.basin import Basin
-from fvsolve.model.velocity import face_flows, grid_flows
+from fvsolve.model.velocity import face_flows, grid_flows, velocity_flows
 
 
 class Transport(Basin, physics="transport"):
@@ -51,8 +51,7 @@ class Transport(Basin, physics="transport"):
         """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
         given, mesh = self.part.velocity.given, self.mesh
         if self.part.velocity.way == "u, v":
-            u, v = (given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv")
-            return (u * mesh.normal[:, 0] + v * mesh.normal[:, 1]) * mesh.length
+            return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))
         if self.part.velocity.way == "stream":
             given = {"stream": given["stream"].at(*np.ascontiguousarray(mesh.points.T))}
         try:
