@@ -33,6 +33,9 @@ class Transport(Basin, physics="transport"):
             through = np.bincount(mesh.left, np.abs(flows), self.n)
             through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
             row["fastest"], self.share = (0.5 * through / mesh.area).max(), 1.0
+        net = np.bincount(mesh.left, flows, self.n)
+        net -= np.bincount(mesh.right[: mesh.inner], flows[: mesh.inner], self.n)
+        self.gathers = float(np.abs(net / mesh.area).max())
         self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
@@ -40,9 +43,16 @@ class Transport(Basin, physics="transport"):
             what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
             scene.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
             scene.check()
+        row["unsplit"] = self.unsplit(row, passing)
         if passing:
             inward = -flows[mesh.inner :]
             row["through"] = scene.to_plane(inward[self.ring()] if self.is_grid else inward)
+
+    def unsplit(self, row, passing: list[str]) -> float:
+        """What counts as rate over what leaves a cell, so that Euler steps of Courant number 1 keep bounds."""
+        if row["scheme"] in (rec.UPWIND, rec.LINEAR):
+            return 1.0
+        return 3.0 if row["scheme"] == rec.MUSCL and self.is_grid and passing else 2.0
 
     def opens(self, patch: str) -> bool:
         return patch in self.passing
