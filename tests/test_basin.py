@@ -280,3 +280,51 @@ def test_what_is_wrong_in_a_mesh_file_is_named_by_the_file_and_by_no_key(tmp_pat
     ((place, message),) = said([0, 1, 2, 3], patches={"west": {}})
     assert place == "nodes.pool.patches.west"
     assert 'square.vtu names no groups of lines; Gmsh does by Physical Curve("west") = {1, 2};' in message
+
+
+PARABOLOID = "0.1*((x - 1.5)^2 + (y - 1.5)^2)"
+
+
+def at_start(level: str, bed: str = PARABOLOID, rest: float = 0.05, cells: int = 24, **more):
+    """(depths, areas) of a square bowl that starts from a level."""
+    pool = basin((3.0, 3.0), (cells, cells), rest, bed=bed, start={"level": level}, **more)
+    model = fvsolve.build(fvsolve.load(alone(pool, 1.0)))
+    return model.basins[0].fields(model.basins[0].start())["depth"], model.basins[0].mesh.area
+
+
+@pytest.mark.parametrize("holes", [{}, {"holes": [[0.0, 0.0, 0.5, 0.5]]}])
+def test_a_level_on_the_bed_is_no_water_whatever_its_shape(holes):
+    for bed in (PARABOLOID, "0.3*sin(2*x)*cos(3*y)", "0.2*x + 0.1*y"):
+        assert at_start(bed, bed, **holes)[0].max() == 0.0
+    same = "0.1*(x^2 + y^2) - 0.3*(x + y) + 0.45"  # the paraboloid, but for rounding
+    assert at_start(same, **holes)[0].max() < 1e-12
+
+
+def test_a_level_that_is_never_below_the_bed_does_as_one_that_runs_on_under_it():
+    for surface in ("0.1", "0.1 + 0.05*x", "0.05 + 0.02*sin(3*x)*y"):
+        over, under = at_start(f"max({PARABOLOID}, {surface})")[0], at_start(surface)[0]
+        assert np.array_equal(over, under) and (over == 0.0).any() and (over > 0.0).any()
+
+
+def test_a_start_at_rest_is_rest_to_the_bit_on_banks_too():
+    for level in ("0.05", f"max({PARABOLOID}, 0.05)"):
+        pool = basin((3.0, 3.0), (24, 24), 0.05, bed=PARABOLOID, start={"level": level})
+        model = fvsolve.build(fvsolve.load(alone(pool, 1.0)))
+        assert np.all(model.start == 0.0)
+
+
+def test_the_water_of_a_start_is_the_integral_of_what_stands_above_the_bed():
+    """A film all over, a column on a slope (both exact), a bowl up to a level: a cap of volume pi h^2 / (2 k)."""
+    depth, area = at_start(f"{PARABOLOID} + 0.01")
+    assert depth == approx(np.full(depth.size, 0.01), rel=1e-12)
+    depth, area = at_start("where(x < 1.0625, 1, 0.2*x)", "0.2*x", rest=-1.0)  # the edge is the middle of a cell
+    x = 0.0625 + 0.125 * np.arange(24)
+    means = np.where(x < 1.0, 1.0 - 0.2 * x, 0.0)
+    assert depth.reshape(24, 24)[:, np.abs(x - 1.0625) > 0.1] == approx(
+        np.tile(means[np.abs(x - 1.0625) > 0.1], (24, 1)), rel=1e-12, abs=1e-15
+    )
+    errors = []
+    for cells in (24, 48):  # a cell's bank is flat: second order
+        depth, area = at_start("0.15", cells=cells)
+        errors.append(np.sum(depth * area) / (math.pi * 0.15**2 / (2.0 * 0.1)) - 1.0)
+    assert abs(errors[0]) < 5e-3 and abs(errors[1]) < abs(errors[0]) / 3.0

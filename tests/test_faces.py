@@ -15,12 +15,12 @@ from truth.meshes import corner_lists, shaken, write
 from truth.orders import observed_order
 
 from fvsolve.kernels.plane import advection_faces, liquid_faces, shallow_faces
-from fvsolve.kernels.records import LAW_LINEAR, LAW_LOG, MINMOD, MUSCL, UPWIND, VAN_LEER
+from fvsolve.kernels.records import LAW_LINEAR, LAW_LOG, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER
 from fvsolve.mesh import Mesh, read, rectangle
 from fvsolve.model.face_mesh import lower_mesh
 
 G, C, RHO = 9.8, 10.0, 1000.0
-NONE = np.zeros(0)
+NONE, FREE = np.zeros(0), (-math.inf, math.inf)
 
 
 @dataclass
@@ -52,11 +52,23 @@ class Field:
             law, C, RHO, table, scheme, limiter, self.floats, self.integers, reflect, *y, NONE, work, *found
         )
 
-    def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, limiter=VAN_LEER):
+    def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, limiter=VAN_LEER, bounds=FREE):
         work, found = np.full(advection_faces.work_size(self.integers), np.nan), np.full_like(s, np.nan)
         outside = np.zeros(len(self.edge)) if outside is None else outside
         return found, advection_faces.advection_rates(
-            scheme, limiter, diffusivity, 1.0, self.floats, self.integers, flow, depth, outside, s, work, found
+            scheme,
+            limiter,
+            diffusivity,
+            1.0,
+            self.floats,
+            self.integers,
+            flow,
+            depth,
+            outside,
+            *bounds,
+            s,
+            work,
+            found,
         )
 
     def stream(self, psi) -> np.ndarray:
@@ -299,17 +311,61 @@ def test_a_bump_is_carried_over_triangles_with_the_order_of_its_scheme(tmp_path,
     assert observed_order(errors, [1 / n for n in sizes]) > order - 0.3
 
 
-@pytest.mark.parametrize(("scheme", "courant"), [(UPWIND, 1.0), (MUSCL, 1 / 3)], ids=["upwind", "minmod"])
-def test_upwind_and_minmod_keep_a_slotted_disk_between_its_bounds(tmp_path, scheme, courant):
-    field = triangles(tmp_path, 40, 40)
-    flow = field.stream(lambda x, y: 8 * (x * (1 - x) * y * (1 - y)))
+def slotted(field) -> np.ndarray:
     x, y = field.centre.T
-    disk = ((np.hypot(x - 0.5, y - 0.3) < 0.2) & ~((np.abs(x - 0.5) < 0.05) & (y < 0.35))).astype(float)
-    low, high = [], []
+    return ((np.hypot(x - 0.5, y - 0.3) < 0.2) & ~((np.abs(x - 0.5) < 0.05) & (y < 0.35))).astype(float)
+
+
+KEEPS = {  # scheme, limiter, bounds, greatest Courant number of Euler's steps
+    "upwind": (UPWIND, MINMOD, FREE, 1.0), "minmod": (MUSCL, MINMOD, FREE, 2 / 3),
+    "minmod, bounded": (MUSCL, MINMOD, (0.0, 1.0), 1.0), "van-leer": (MUSCL, VAN_LEER, (0.0, 1.0), 1.0),
+    "monotonized-central": (MUSCL, MONOTONIZED_CENTRAL, (0.0, 1.0), 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("quads", [False, True], ids=["triangles", "quadrilaterals"])
+@pytest.mark.parametrize("name", KEEPS)
+def test_a_slotted_disk_stays_between_its_bounds(tmp_path, name, quads):
+    scheme, limiter, bounds, courant = KEEPS[name]
+    field = triangles(tmp_path, 40, 40, quads=quads)
+    flow = field.stream(lambda x, y: 8 * (x * (1 - x) * y * (1 - y)))
+    disk, low, high = slotted(field), [], []
     seen = lambda c: (low.append(c.min()), high.append(c.max()))  # noqa: E731
-    end = march(lambda s: field.advection(scheme, flow, s, limiter=MINMOD), disk, 1.0, courant, seen)
+    rates = lambda s: field.advection(scheme, flow, s, limiter=limiter, bounds=bounds)  # noqa: E731
+    end = march(rates, disk, 1.0, courant, seen)
     assert min(low) > -1e-14 and max(high) < 1.0 + 1e-14
     assert end @ field.area == approx(disk @ field.area, rel=1e-13)
+
+
+@pytest.mark.parametrize("limiter", [MINMOD, VAN_LEER, MONOTONIZED_CENTRAL])
+def test_a_step_of_euler_keeps_bounds_in_random_flows_and_depths(tmp_path, limiter):
+    """Values at their bounds, flows in and out, with what they do to depths."""
+    for seed in range(40):
+        random, field = np.random.default_rng(seed), mixed(tmp_path) if seed % 2 else triangles(tmp_path, 9, 7)
+        n = len(field.area)
+        flow, depth = random.normal(size=len(field.mesh.left)), 0.1 + random.random(n)
+        c = random.choice([-0.5, 1.0, random.uniform(-0.5, 1.0)], n)
+        outside, bounds = random.uniform(-0.5, 1.0, len(field.edge)), (-0.5, 1.0)
+        given = {"depth": depth, "limiter": limiter, "bounds": bounds}
+        rate, quickest = field.advection(MUSCL, flow, c * depth, outside, **given)
+        filled, _ = field.advection(MUSCL, flow, depth, np.ones(len(field.edge)), **given | {"bounds": FREE})
+        after = (c * depth + rate / quickest) / (depth + filled / quickest)
+        assert after.min() > -0.5 - 1e-13 and after.max() < 1.0 + 1e-13
+
+
+@pytest.mark.parametrize("quads", [False, True], ids=["triangles", "quadrilaterals"])
+def test_bounds_cost_a_smooth_value_nothing_that_shows(tmp_path, quads):
+    bump = lambda x, y: np.exp(-((x / 0.12) ** 2) - (y / 0.12) ** 2)  # noqa: E731
+
+    def off(n, bounds):
+        field = triangles(tmp_path, n, n, quads=quads)
+        (x, y), flow = field.centre.T, field.stream(lambda x, y: 0.8 * y - 0.5 * x)
+        c = march(lambda s: field.advection(MUSCL, flow, s, bounds=bounds), bump(x - 0.3, y - 0.35), 0.4, 0.9)
+        return np.abs(c - bump(x - 0.62, y - 0.55)) @ field.area
+
+    kept = [off(n, (0.0, 1.0)) for n in (24, 48)]
+    assert all(one < 1.02 * off(n, FREE) for one, n in zip(kept, (24, 48), strict=True))
+    assert observed_order(kept, [1 / 24, 1 / 48]) > 1.7
 
 
 def test_diffusion_fades_a_mode_at_second_order_and_meets_the_value_that_flows_in(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from pytest import approx
@@ -10,7 +12,7 @@ from truth.plain import triangles, write_msh
 from truth.scenes import scene
 
 import fvsolve
-from fvsolve.errors import MeshError
+from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import read, rectangle
 from fvsolve.model.velocity import EXPRESSIONS, face_flows, grid_flows
 
@@ -178,3 +180,51 @@ def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
         start = fvsolve.initial_state(model)
         errors.append(np.abs(fvsolve.advance(model, start, 1.0).y - start.y).sum() / start.y.sum())
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.03
+
+
+def carrying(velocity, mesh=None, **more) -> dict:
+    """Something carried in a closed basin."""
+    pool = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": "where(x < 1, 1, 0)"}}
+    pool |= {"mesh": {"file": str(mesh)}} if mesh else more
+    return scene({"pool": pool}, {}, 0.1, MUSCL, [], 0.1) | {"scalars": {"dye": {}}}
+
+
+@pytest.mark.parametrize("length", [1.0, 6.0, 8.0, 10.0, 1000.0])
+@pytest.mark.parametrize("velocity", [
+    {"stream": "0.1*sin(pi*x)*sin(pi*y)"},
+    {"stream": "7 + 0.1*sin(pi*x)*sin(pi*y)"},
+    {"u": "0.1*pi*sin(pi*x)*cos(pi*y)", "v": "-0.1*pi*cos(pi*x)*sin(pi*y)"},
+])  # fmt: skip
+def test_a_field_that_is_closed_but_for_rounding_passes_no_outline(velocity, length):
+    case = carrying(velocity, size=[length, length], cells=[32, 32])
+    pool = fvsolve.build(fvsolve.load(case)).basins[0]
+    assert pool.passing == []
+
+
+@pytest.mark.parametrize("velocity", [
+    {"u": "2*cos(0.3)", "v": "2*sin(0.3)"},
+    {"u": "1.91067297825", "v": "0.591040413323"},
+    {"stream": "2*(y*cos(0.3) - x*sin(0.3))"},
+    {"expression": "constant", "u": 2.0 * math.cos(0.3), "v": 2.0 * math.sin(0.3)},
+])  # fmt: skip
+def test_a_slanted_channel_passes_its_ends_alone(velocity, tmp_path):
+    points, cells = triangles((4.0, 1.0), 0.25)
+    turn, away = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]]), np.array([100.0, 50.0])
+    ends = {"in": lambda x, y: along(x, y) < 1e-6, "out": lambda x, y: along(x, y) > 4.0 - 1e-6}
+
+    def along(x, y):
+        return (x - away[0]) * np.cos(0.3) + (y - away[1]) * np.sin(0.3)
+
+    write_msh(tmp_path / "channel.msh", points @ turn + away, cells, ends)
+    case = carrying(velocity, tmp_path / "channel.msh")
+    pool = fvsolve.build(fvsolve.load(case)).basins[0]
+    assert sorted(pool.passing) == ["in", "out"]
+    if "stream" in velocity or "expression" in velocity:
+        flows = pool.flows(None)
+        assert np.all(divergence(pool.mesh, flows) == 0.0)
+
+
+def test_a_stream_that_passes_the_outline_by_little_is_still_refused():
+    case = carrying({"stream": "0.1*sin(pi*x)*sin(pi*y) + 1e-9*x*y"}, size=[1.0, 1.0], cells=[8, 8])
+    with pytest.raises(CaseError, match="passes the outline at"):
+        fvsolve.build(fvsolve.load(case))

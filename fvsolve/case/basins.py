@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from fvsolve.mesh.points import Points
 
 Found = Iterator[tuple[tuple, str]]
+# Three Gauss points along either side of a rectangle, of sqrt(3 / 5) of half of it: centre, corners, sides.
+GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0, 1)
 
 
 @dataclass(frozen=True)
@@ -128,10 +130,38 @@ def behind(mesh: Mesh, patch: str) -> np.ndarray:
     return np.unique(mesh.left[mesh.patch(patch)])
 
 
-def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
-    """Height of the bed above the elevation at centres : float64[n] [m]."""
+def is_grid(mesh: Mesh) -> bool:
+    """Whether cells are all of a rectangle."""
+    return mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny
+
+
+def samples(shape: Formula | None, mesh: Mesh) -> np.ndarray:
+    """A formula in cells, centres first: on grids at nine Gauss points, elsewhere there alone : float64[points, n]."""
     x, y = np.ascontiguousarray(mesh.centre.T)
-    return np.zeros(x.size) if basin.bed is None else basin.bed.at(x, y)
+    if not is_grid(mesh):
+        places = np.array([x]), np.array([y])
+    else:
+        wide, high = np.tile(np.diff(mesh.grid.x), mesh.grid.ny), np.repeat(np.diff(mesh.grid.y), mesh.grid.nx)
+        to = 0.5 * math.sqrt(0.6) * np.array(GAUSS)[:, :, None]
+        places = x + to[:, 0] * wide, y + to[:, 1] * high
+    if shape is None:
+        return np.zeros(places[0].shape)
+    return shape.at(*(one.ravel() for one in places)).reshape(places[0].shape)
+
+
+def means(found: np.ndarray) -> np.ndarray:
+    """Means over cells of `samples`, in sums that mirrored and turned cells share; what is even stays so to the bit."""
+    if len(found) == 1:
+        return found[0]
+    corners = (found[1] + found[2]) + (found[3] + found[4])
+    sides = (found[5] + found[6]) + (found[7] + found[8])
+    mean = (25.0 * corners + (40.0 * sides + 64.0 * found[0])) / 324.0
+    return np.where(np.ptp(found, axis=0) > 0.0, mean, found[0])
+
+
+def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
+    """Height of the bed above the elevation, its mean over each cell : float64[n] [m]."""
+    return means(samples(basin.bed, mesh))
 
 
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
@@ -185,7 +215,6 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
                 yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
             if one.impedance is not None and basin.physics != "liquid":
                 yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
-        x, y = np.ascontiguousarray(meshes[name].centre.T)
         shapes = {("bed",): basin.bed}
         if basin.start is not None:
             shapes |= {("start", what): getattr(basin.start, what) for what in ("level", "pressure", "u", "v")}
@@ -198,7 +227,12 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
             shapes |= {("velocity", what): shape for what, shape in given if isinstance(shape, Formula)}
         for below, shape in shapes.items():
             try:
-                if shape is not None:
-                    shape.at(x, y)
+                if shape is None:
+                    continue
+                elif below[0] == "velocity":
+                    taken = meshes[name].points if below[1] == "stream" else meshes[name].middle
+                    shape.at(*np.ascontiguousarray(taken.T))
+                else:
+                    samples(shape, meshes[name])
             except ValueError as error:
                 yield (*key, *below), str(error)

@@ -129,7 +129,8 @@ class _Reader:
             self.add(check.cavities(numerics, has_cells, properties))
             self.add(basins.misfits(*parts.values(), meshes, properties))
             self.add(check.claims(expect, numerics))
-            numerics = numerics.filled(has_cells)
+            carries = bool(carried) and any(parts["nodes"][name].physics != "liquid" for name in meshes)
+            numerics = numerics.filled(has_cells, carries)
         self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         if None not in (numerics, output, properties) and not self.faults:

@@ -39,6 +39,7 @@ LIMITERS = ("minmod", "van-leer", "monotonized-central")
 # error control elsewhere.
 DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
 DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9
+DEFAULT_METHOD_CARRIED = "ssp-rk3"  # where basins carry scalars, whose bounds rk4 does not keep
 DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
 DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cells of the same travel time
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
@@ -98,15 +99,16 @@ class Numerics(Table):
     cell_time: Annotated[float | None, Quantity("time", positive, "of pipes that state no cells [s]")] = None
     below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
-    def filled(self, has_cells: bool) -> Numerics:
-        """The same with the step control and method that are the default, cells present or not."""
+    def filled(self, has_cells: bool, carries: bool) -> Numerics:
+        """The same with the step control and method that are the default; carries : whether basins carry scalars."""
         changes: dict[str, Any] = {}
         if self.courant is self.step is self.rtol is None:
             by_courant = has_cells and not steps_by_error(self.method)
             changes = {"courant": DEFAULT_COURANT} if by_courant else {"rtol": DEFAULT_RTOL}
         adaptive = self.rtol is not None or "rtol" in changes
         if self.method is None:
-            changes["method"] = DEFAULT_METHOD_RTOL if adaptive else DEFAULT_METHOD
+            by_step = DEFAULT_METHOD_CARRIED if carries else DEFAULT_METHOD
+            changes["method"] = DEFAULT_METHOD_RTOL if adaptive else by_step
         return self.model_copy(update=changes)
 
 

@@ -41,8 +41,9 @@ def coarse_for_cavities(scene) -> list[Notice]:
     if longest.cells >= ENOUGH:
         return []
     found = DURATION * longest.cells**-RATE
+    better = DURATION * ENOUGH**-RATE
     text = (f"{longest.name}: with {longest.cells} cells a first cavity lasts some {100.0 * found:.2g} % too short "
-            f"where little dampens it; {ENOUGH} cells bring that to {100.0 * DURATION * ENOUGH**-RATE:.2g} %")  # fmt: skip
+            f"where little dampens it; {ENOUGH} cells bring that to {100.0 * better:.2g} %")  # fmt: skip
     return [Notice("cells", f"links.{longest.name}", text, "cells", float(longest.cells), float(ENOUGH))]
 
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 COLUMNS = (("x", "y", "u", "v"), ("x", "y", "psi"))  # of a file
 DIMENSIONS = {"x": "length", "y": "length", "u": "velocity", "v": "velocity", "psi": "diffusivity"}
 EXACT_BITS = 50  # of a stream function that are kept, so that sums of its differences are exact
+ROUNDING = 64 * np.finfo(float).eps  # of a stream function and of the places where it is taken
+SLANT = 1e-9  # of the greatest velocity: what is less across the outline runs along it
 
 
 def constant(x, y, u, v):
@@ -116,8 +118,29 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
         x, y = mesh.points[np.flatnonzero(~np.isfinite(stream))[0]]
         raise ValueError(f"the stream function is not finite at ({x:.6g}, {y:.6g}) m")
     unit = 2.0 ** (np.frexp(np.abs(stream).max())[1] - EXACT_BITS)
-    psi = np.round(stream / unit) * unit
+    psi = np.round(along_walls(mesh, stream) / unit) * unit
     return psi[mesh.ends[:, 1]] - psi[mesh.ends[:, 0]]
+
+
+def along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
+    """A stream function, made one along stretches of the outline where it differs by rounding alone : float64[p]."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    steps = np.abs(np.diff(stream[mesh.ends], axis=1)[:, 0])
+    reach = (steps / mesh.length).max() * np.abs(mesh.points).max()  # what an error of places makes
+    one, other = mesh.ends[mesh.inner :][steps[mesh.inner :] <= ROUNDING * (np.abs(stream).max() + reach)].T
+    joined = coo_array((np.ones(one.size), (one, other)), shape=(stream.size, stream.size))
+    _, first, stretch = np.unique(connected_components(joined)[1], return_index=True, return_inverse=True)
+    return stream[first[stretch]]
+
+
+def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Flows of velocities at the middles of faces : float64[f]; none across the outline but for rounding."""
+    normal = u * mesh.normal[:, 0] + v * mesh.normal[:, 1]
+    still = np.abs(normal) <= SLANT * np.hypot(u, v).max()
+    still[: mesh.inner] = False
+    return np.where(still, 0.0, normal * mesh.length)
 
 
 def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
@@ -127,7 +150,7 @@ def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
         return _by_corners(mesh, _interpolated(file, places, columns["psi"], mesh.points))
     velocity = np.stack([columns["u"], columns["v"]], axis=1)
     found = _interpolated(file, places, velocity, mesh.middle)
-    return np.sum(found * mesh.normal, axis=1) * mesh.length
+    return velocity_flows(mesh, *found.T)
 
 
 def _columns(path: Path) -> dict[str, np.ndarray]:

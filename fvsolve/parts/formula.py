@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-import ast
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.parts.csv_rows import read_rows
 from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.value import Misfit, Quantity, Range, Setting, Value, anything
 from fvsolve.units import show
-
-FUNCTIONS = {
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "arctan2": np.arctan2, "exp": np.exp, "log": np.log, "sqrt": np.sqrt,
-    "tanh": np.tanh, "abs": np.abs, "min": np.minimum, "max": np.maximum, "hypot": np.hypot, "where": np.where,
-}  # fmt: skip
-NAMES = ("x", "y", "pi")
-ALLOWED = (
-    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Compare, ast.Call, ast.Name, ast.Load, ast.Constant, ast.operator,
-    ast.unaryop, ast.cmpop,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,8 +24,7 @@ class Formula:
 
     def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Values at points : float64[n]; ValueError where one is none."""
-        with np.errstate(all="ignore"):
-            found = np.array(np.broadcast_to(self.rule(x, y), np.shape(x)), dtype=float)
+        found = np.array(np.broadcast_to(self.rule(x, y), np.shape(x)), dtype=float)
         if not np.isfinite(found).all():
             k = int(np.argmax(~np.isfinite(found)))
             raise ValueError(f"{show(self.said)} is no number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
@@ -76,9 +64,9 @@ class Shaped(Value):
         try:
             return even(Quantity(self.dimension, self.range).read(plain(given), setting))
         except ValueError as error:
-            if given[:1].isdigit() and not any(sign in given for sign in "*/+-()"):
+            if given[:1].isdigit() and not any(sign in given for sign in "*/+-()^<>="):
                 raise
-            return parsed(given, str(error))
+            return Formula(given, Arithmetic(given, str(error)))
 
     def _samples(self, given: dict, setting: Setting) -> Formula:
         if set(given) != {"file"} or not isinstance(given["file"], str):
@@ -124,47 +112,3 @@ def plain(text: str) -> Any:
         return float(text)
     except ValueError:
         return text
-
-
-def open_bracket(text: str) -> str:
-    """What is wrong with the brackets of a text, "" where nothing is."""
-    depth = 0
-    for sign in text:
-        depth += (sign == "(") - (sign == ")")
-        if depth < 0:
-            return "a bracket is closed that was not opened"
-    return "a bracket is left open" if depth else ""
-
-
-def parsed(text: str, otherwise: str = "") -> Formula:
-    """The formula of a text; ValueError where it says anything but arithmetic of x, y, pi and FUNCTIONS."""
-    about = f"{show(text)} is no formula of x and y"
-    try:
-        tree = ast.parse(text.replace("^", "**"), mode="eval")
-    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        if any(sign in text for sign in "*+()"):  # no quantity
-            raise ValueError(f"{about}: {open_bracket(text) or getattr(error, 'msg', error)}") from None
-        raise ValueError(otherwise or about) from None
-    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name):
-            known = list(FUNCTIONS) if id(node) in called else [*NAMES]
-            if node.id not in known:
-                raise ValueError(f"{about}: {node.id} is unknown{did_you_mean(node.id, known)}; "
-                                 f"known are {listing([*NAMES, *FUNCTIONS])}")  # fmt: skip
-        number = isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and node.value is not True
-        if not isinstance(node, ALLOWED) or (isinstance(node, ast.Constant) and not number):
-            raise ValueError(f"{about}; wanted numbers, {listing([*NAMES, *FUNCTIONS])} and arithmetic")
-        if isinstance(node, ast.Call) and (node.keywords or not isinstance(node.func, ast.Name)):
-            raise ValueError(f"{about}; wanted a call such as sin(x)")
-    code = compile(tree, "formula", "eval")
-
-    def rule(x: np.ndarray, y: np.ndarray) -> Any:
-        return eval(code, {"__builtins__": {}}, {**FUNCTIONS, "pi": np.pi, "x": x, "y": y})
-
-    try:
-        with np.errstate(all="ignore"):
-            rule(np.array([0.3]), np.array([0.7]))
-    except Exception as error:  # a call with too few arguments, a list as a number
-        raise ValueError(f"{about}: {error}") from None
-    return Formula(text, rule)

@@ -10,6 +10,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
 from fvsolve.model.scalars import amounts
+from fvsolve.model.within import within
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.stepper import Stepper, arguments
@@ -43,6 +44,7 @@ class Loop:
         ]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
+        stepper.within = within(model)
         stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
         events = model.tables[rec.I_ARMED].size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)

@@ -15,7 +15,10 @@ from fvsolve.steppers.orders import (
     STOP_AT,
     T,
 )
-from fvsolve.steppers.step import interpolate
+from fvsolve.steppers.step import HUGE, interpolate
+
+BASE, GAIN, LEAST, MOST = range(4)
+LITTLE = 1e-9  # of what there are shares of, too little to tell them by
 
 
 @njit(forceinline=True)
@@ -42,9 +45,38 @@ def next_due(orders, memory, times):
     return min(row, output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT]))
 
 
+@njit(forceinline=True)
+def whole(at, by, y):
+    """What a state is a share of: base + gain (y[j] + y[k]), of both, one or none."""
+    found = by[BASE]
+    if at[1] >= 0:
+        found += by[GAIN] * (y[at[1]] + (y[at[2]] if at[2] >= 0 else 0.0))
+    return found
+
+
+@njit
+def keep_within(at, by, y_old, y, out):
+    """Hold what is read between two states to the bounds that these have: a polynomial through both may leave them.
+
+    at : int64[3 q]  a state, and up to two that say what it is a share of, else -1
+    by : float64[q, 4]  BASE, GAIN (see `whole`), LEAST and MOST share, which either end may have left
+    """
+    for r in range(by.shape[0]):
+        place, low, high = at[3 * r : 3 * r + 3], by[r, LEAST], by[r, MOST]
+        for y_end in (y_old, y):
+            total = whole(place, by[r], y_end)
+            if total > LITTLE:
+                share = y_end[place[0]] / total
+                low, high = min(low, share), max(high, share)
+        total = max(whole(place, by[r], out), 0.0)
+        found = max(out[place[0]], low * total)
+        out[place[0]] = min(found, high * total) if high < HUGE else found
+
+
 @njit
 def emit(
     rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
+    within_at, within_by,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
@@ -57,6 +89,7 @@ def emit(
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
         interpolate((due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
+        keep_within(within_at, within_by, y_old, y, y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due

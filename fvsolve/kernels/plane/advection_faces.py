@@ -1,11 +1,12 @@
 """Scalars carried by given flows through the faces of any mesh, and diffusing. Knows not what makes the flows.
 
 s_t + div(F c) = div(D depth grad c) for amounts s = depth c per area. Rates of a uniform c are c times the divergence
-of F, to the bit. In flows without divergence Euler steps up to Courant number 1 (`upwind`) and 1/3 (`minmod`) keep all
-values between their least and greatest; other limiters do so nearly, and have second order on any mesh. Diffusion goes
-from cell to cell, and what the line between their centres leans away from the normal by the mean of their gradients:
-second order, bounds not kept where cells lean. Nothing diffuses through walls and where the flow leaves; where it
-enters, the value outside holds at the face.
+of F, to the bit. Euler steps up to one over the rate that is returned keep all values between two bounds: a side
+differs from its cell by no more than this does from the nearer bound, so what leaves is at most twice as far from a
+bound as the cell. Up to two thirds of that `minmod` keeps them between those around. Other limiters have second order
+on any mesh. Diffusion goes from cell to cell, and what the line between their centres leans away from the normal by the
+mean of their gradients: second order, bounds not kept where cells lean. Nothing diffuses through walls and where the
+flow leaves; where it enters, the value outside holds at the face.
 """
 
 import numpy as np
@@ -17,7 +18,6 @@ from fvsolve.kernels.plane.faces import (
     DISTANCES,
     GAP,
     HEAD,
-    HUGE,
     INDICES,
     LEAN_X,
     LEAN_Y,
@@ -85,13 +85,23 @@ def gather_flows(faces, factor, flow, out):
 
 
 @njit
-def carry(c, d, cl, far, w):
-    """Take from the rates of a block of cells what flows out through one side of each, beyond that of a uniform c."""
+def put_room(c, least, most, room):
+    """How far sides of a block of cells may differ from these: to the nearer bound."""
+    for i in range(BLOCK):
+        room[i] = max(min(c[i] - least, most - c[i]), 0.0)
+
+
+@njit
+def carry(count, c, d, cl, far, w):
+    """Take from the rates of a block of cells what flows out through one side of each, beyond that of a uniform c.
+
+    count : what counts as rate over what leaves
+    """
     for i in range(BLOCK):
         q = far[SHARE * BLOCK + i] * w[_FLOW + i]
         w[_RATE + i] -= q * ((cl[i] if q > 0.0 else w[_VALUE + i]) - c[i])
         w[_DIVERGENCE + i] += q
-        w[_GONE + i] += max(q, 0.0) / max(d[i], THIN)
+        w[_GONE + i] += count * max(q, 0.0) / max(d[i], THIN)
 
 
 @njit
@@ -127,12 +137,17 @@ def work_size(integers):
 
 
 @njit
-def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow, depth, outside, s, work, rate):
-    """Rates of the amounts `s`; returns the greatest share of a cell that leaves it, diffusing too [1/s].
+def advection_rates(
+    scheme, limiter, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
+):
+    """Rates of the amounts `s`; returns one over the step that keeps bounds, which diffusion shortens [1/s].
+
+    That is the greatest share of a cell that leaves it, by `muscl` twice that.
 
     scheme, limiter : UPWIND, or MUSCL as in `faces.width`; diffusivity : [m2/s], 0 for none; factor : on all flows
     flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty where s is the
-    value; outside : float64[b]  values that come in with the flow; work : float64[work_size(integers)]
+    value; outside : float64[b]  values that come in with the flow; least, most : bounds, infinite for none
+    work : float64[work_size(integers)]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, limited, spreads = blocks(integers), scheme != UPWIND, diffusivity > 0.0
@@ -147,8 +162,8 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
     shown, w = work[4 * near + wide :][: 2 * b], work[4 * near + wide + 2 * b :]
     free = w[_FREE:]
     for i in range(BLOCK):
-        w[_TOP + i], free[i] = 0.0, HUGE
-    wide_by = width(limiter)
+        w[_TOP + i] = 0.0
+    wide_by, twice = width(limiter), 2.0 if limited else 1.0
     known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:
@@ -164,6 +179,7 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
                 shown[q] = outside[number[q]] if enters else value
                 shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
             if limited:
+                put_room(c[sided % ring * BLOCK :], least, most, free)
                 put_sides(sided, floats, integers, c, wide_by, free, bounds, here, w, cs)
             if spreads:
                 put_gradients(sided, floats, integers, c, ends, here, w, gx, gy)
@@ -179,7 +195,7 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
             i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
             for q in range(i, edge):
                 w[_VALUE + edges[q] % BLOCK] = outside[number[q]]
-            carry(c[o:], d[o:], cs[own:], far, w)
+            carry(twice, c[o:], d[o:], cs[own:], far, w)
             if spreads:
                 gather(c, where, w)
                 gather(d, where, w[_DEPTH:])
@@ -189,7 +205,7 @@ def advection_rates(scheme, limiter, diffusivity, factor, floats, integers, flow
                     w[edges[q] % BLOCK] = shown[b + q]
                 diffuse(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
         put_rates(c[o:], w, rate[first:last])
-    most = 0.0
+    quickest = 0.0
     for i in range(BLOCK):
-        most = max(most, w[_TOP + i])
-    return most
+        quickest = max(quickest, w[_TOP + i])
+    return quickest

@@ -24,7 +24,6 @@ from fvsolve.kernels.records import (
     I_PROBES,
     I_SCALARS,
     I_SETTINGS,
-    RATE,
     SHALLOW_FACES,
 )
 from fvsolve.kernels.schedules import schedule_value
@@ -156,7 +155,6 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
             high = depth[i] if depth.size > 0 else 1.0
             lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
         add_decay(scalar["decay"], scalar["ambient"], depth, s, rate)
-        out[RATE] = max(out[RATE], 0.5 * scalar["decay"])
     for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
         if patches[p]["basin"] == b and patches[p]["open"] == 0:
             bring(tables, patches[p], basin, q, y, rate, out)

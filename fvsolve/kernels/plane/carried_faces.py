@@ -32,7 +32,8 @@ def carry_on_meshes(t, y, dydt, out, handle):
             quickest = advection_rates(
                 basin["scheme"], basin["limiter"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
                 integers[basin["links"] :],
-                flow, depth, plane[ring : ring + basin["outer"]], y[o : o + n], plane[basin["toil"] + n :],
-                dydt[o : o + n],
+                flow, depth, plane[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
+                y[o : o + n], plane[basin["toil"] + n :], dydt[o : o + n],
             )  # fmt: skip
-            out[RATE] = max(out[RATE], quickest + (1.0 - abs(factor)) * basin["fastest"])  # at full speed
+            still = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]  # which will be at full speed
+            out[RATE] = max(out[RATE], quickest + still + scalars[q]["decay"])

@@ -36,8 +36,9 @@ def carry_on_grids(t, y, dydt, out, handle):
             continue
         made_ready(t, tables, b, y)
         kx, ky, flow_x, flow_y, depth, work = parts(plane, basin)
-        out[RATE] = max(out[RATE], basin["fastest"])  # at full speed: while it turns back it gets quicker in a step
+        quick = basin["unsplit"] * basin["fastest"]  # at full speed: while it turns back it gets quicker in a step
         for q in range(tables[I_SCALARS].size):
+            out[RATE] = max(out[RATE], quick + tables[I_SCALARS][q]["decay"])
             n, ring = basin["n"], basin["outside"] + q * basin["outer"]
             at = basin["carried"] + q * n
             grid_advection(
@@ -87,4 +88,5 @@ def spread_on_grids(t, y, dydt, out, handle):
                     kx.size, ky.size, kx, ky, spreads, turned(t, basin), flow_x, flow_y, depth,
                     plane[ring : ring + basin["outer"]], y[at : at + n], work, dydt[at : at + n],
                 )  # fmt: skip
-                out[RATE] = max(out[RATE], basin["fastest"] + quick)
+                still = basin["unsplit"] * basin["fastest"] + tables[I_SCALARS][q]["decay"]
+                out[RATE] = max(out[RATE], still + quick)

@@ -7,19 +7,23 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from fvsolve.case.basins import behind
-from fvsolve.errors import Notice
+from fvsolve.case.basins import behind, is_grid, means, samples
+from fvsolve.case.sections import DEFAULT_COURANT as COURANT
+from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
 from fvsolve.model.basins import FIFTH
 from fvsolve.model.face_mesh import lower_mesh
+from fvsolve.steppers.analysis.monotone import ssp_radius
+from fvsolve.steppers.methods import METHODS
 
 if TYPE_CHECKING:
     from fvsolve.mesh.points import Points
 
 LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
+ROUNDING = 1e-12  # of rates
 MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
 
 
@@ -29,6 +33,7 @@ class Basin:
     physics: ClassVar[dict[str, type[Basin]]] = {}
     quantities: ClassVar[tuple[str, ...]] = ()  # of cells, as states have them; the first is what is stored
     units: ClassVar[dict[str, str]] = {}  # of fields
+    gathers: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls, physics: str) -> None:
         Basin.physics[physics] = cls
@@ -38,8 +43,7 @@ class Basin:
         self.x, self.y = np.ascontiguousarray(self.mesh.centre.T)
         self.n = self.x.size
         self.memory = 0  # its tables and its state [bytes]
-        grid = self.mesh.grid
-        self.is_grid = grid is not None and self.n == grid.nx * grid.ny
+        self.is_grid = is_grid(self.mesh)
         self.scalars = list(case.scalars)
 
     # what a physics says ------------------------------------------------------------------------------------
@@ -114,16 +118,7 @@ class Basin:
 
     def formula(self, shape) -> np.ndarray:
         """Means of a formula over cells, on grids by nine Gauss points, elsewhere at centres : float64[n]."""
-        if shape is None:
-            return np.zeros(self.n)
-        found, grid = shape.at(self.x, self.y), self.mesh.grid
-        if not self.is_grid:
-            return found
-        places, shares = np.polynomial.legendre.leggauss(3)
-        wide, high = np.tile(np.diff(grid.x), grid.ny), np.repeat(np.diff(grid.y), grid.nx)
-        values = [shape.at(self.x + 0.5 * a * wide, self.y + 0.5 * b * high) for b in places for a in places]
-        means = np.tensordot(np.outer(shares, shares).ravel() / 4.0, values, 1)
-        return np.where(np.ptp(values, axis=0) > 0.0, means, found)  # what is even stays so to the bit
+        return means(samples(shape, self.mesh))
 
     def reflects(self) -> np.ndarray:
         """What comes back of waves at faces of the boundary in the kernels' order : float64[outer]; none for walls."""
@@ -210,6 +205,37 @@ class Basin:
         if row["flows"] < 0:
             row["flows"] = scene.to_plane(np.zeros(flows))
         row["toil"] = scene.to_plane(np.zeros(toil))
+        may = self.may_leave(row)
+        if may:
+            numerics = self.case.numerics
+            scheme = "muscl" if row["scheme"] == rec.MUSCL else numerics.scheme
+            limited = f", {numerics.limiter}" if row["scheme"] == rec.MUSCL else ""
+            what = f"basin {self.name}: scalars may leave their bounds ({scheme}{limited}; {numerics.method}): "
+            key, why, value, limit = may
+            scene.warnings.append(Notice("bounds", f"nodes.{self.name}", what + why, key, value, limit))
+
+    def may_leave(self, row) -> tuple[str, str, float | None, float | None] | None:
+        """Why scalars may leave the bounds that the case states: (key, text, value, limit); None where they cannot."""
+        numerics, method = self.case.numerics, METHODS.get(self.case.numerics.method)
+        if row["scheme"] == rec.LINEAR:
+            return "scheme", "upwind5 keeps none; upwind, muscl and weno5 do", None, None
+        if method is None or not method.explicit or numerics.courant is None:
+            key = "step" if numerics.step is not None else "rtol" if numerics.rtol is not None else "method"
+            return key, f"they are kept with ssp-rk3 and courant = {COURANT:g} or less", None, None
+        spreads = [name for name in self.scalars if self.case.scalars[name].diffusivity > 0.0]
+        if spreads and not self.is_grid:
+            return None, f"{listing(spreads)} diffuses between cells that lean; a rectangle keeps them", None, None
+        if self.gathers > ROUNDING * row["fastest"]:
+            why = (
+                f"the velocity has a divergence of up to {self.gathers:.3g} 1/s, which gathers or thins what it carries"
+            )
+            return "velocity", f"{why}; a stream function has none", self.gathers, 0.0
+        radius = ssp_radius(method)
+        if numerics.courant > radius:
+            instead = f"Courant numbers up to {radius:g} keep them" if radius else "no Courant number keeps them"
+            key = "courant" if radius else "method"
+            return key, f"{instead}, with ssp-rk3 up to 1", numerics.courant, radius
+        return None
 
     def scalar_scale(self, name: str) -> float:
         """What counts as a small amount of a scalar per area."""

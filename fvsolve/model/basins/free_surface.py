@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.case.basins import bed_of
+from fvsolve.case.basins import bed_of, means, samples
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
@@ -12,8 +12,28 @@ from fvsolve.model.basins import FIFTH
 from fvsolve.model.basins.basin import Basin
 
 SCALE = 0.1  # [m] of depth
+ROUNDING = 1e-12  # of levels and beds, less than which is no water
+TINY = 1e-300
 UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one,
 SHORES = 6.0  # and sixths of cells under fifth order where there is a shore
+
+
+def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
+    """Mean depth of water over cells whose bed is its mean, from `samples` of both : float64[n] [m].
+
+    The mean of max(level - bed, 0). Water of one level that a bank cuts off in the cell stands at that level over the
+    mean of the bed in its place, for so it rests; the less, the more the level follows the bed.
+    """
+    deep = level - bed
+    wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))
+    deep, flooded = np.where(wet, deep, 0.0), wet.any(axis=0)
+    low, high = np.where(wet, level, np.inf).min(axis=0), np.where(wet, level, -np.inf).max(axis=0)
+    middle = means(np.where(wet, level, 0.0)) / np.where(flooded, means(1.0 * wet), 1.0)
+    middle = np.where(flooded, np.where(high > low, middle, low), -np.inf)
+    still, there = np.maximum(middle - means(bed), 0.0), means(np.maximum(middle - bed, 0.0))
+    rise = np.where(flooded, high - low, 0.0)
+    follows = np.minimum(rise / np.maximum(np.ptp(bed, axis=0), TINY), 1.0)
+    return np.maximum(still + (means(deep) - there) - follows * (still - there), 0.0)
 
 
 class FreeSurface(Basin, physics="free-surface"):
@@ -59,7 +79,7 @@ class FreeSurface(Basin, physics="free-surface"):
         found, given = np.zeros((3, self.n)), self.part.start
         depth = self.depth
         if given is not None and given.level is not None:
-            depth = np.maximum(self.formula(given.level) - self.bed, 0.0)
+            depth = depth_at_start(samples(given.level, self.mesh), samples(self.part.bed, self.mesh))
             found[0] = depth - self.depth
         if given is not None:
             found[1], found[2] = depth * self.formula(given.u), depth * self.formula(given.v)

@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.basin import Basin
-from fvsolve.model.velocity import face_flows, grid_flows
+from fvsolve.model.velocity import face_flows, grid_flows, velocity_flows
 
 
 class Transport(Basin, physics="transport"):
@@ -33,6 +33,9 @@ class Transport(Basin, physics="transport"):
             through = np.bincount(mesh.left, np.abs(flows), self.n)
             through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
             row["fastest"], self.share = (0.5 * through / mesh.area).max(), 1.0
+        net = np.bincount(mesh.left, flows, self.n)
+        net -= np.bincount(mesh.right[: mesh.inner], flows[: mesh.inner], self.n)
+        self.gathers = float(np.abs(net / mesh.area).max())
         self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
@@ -40,9 +43,16 @@ class Transport(Basin, physics="transport"):
             what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
             scene.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
             scene.check()
+        row["unsplit"] = self.unsplit(row, passing)
         if passing:
             inward = -flows[mesh.inner :]
             row["through"] = scene.to_plane(inward[self.ring()] if self.is_grid else inward)
+
+    def unsplit(self, row, passing: list[str]) -> float:
+        """What counts as rate over what leaves a cell, so that Euler steps of Courant number 1 keep bounds."""
+        if row["scheme"] in (rec.UPWIND, rec.LINEAR):
+            return 1.0
+        return 3.0 if row["scheme"] == rec.MUSCL and self.is_grid and passing else 2.0
 
     def opens(self, patch: str) -> bool:
         return patch in self.passing
@@ -51,8 +61,7 @@ class Transport(Basin, physics="transport"):
         """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
         given, mesh = self.part.velocity.given, self.mesh
         if self.part.velocity.way == "u, v":
-            u, v = (given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv")
-            return (u * mesh.normal[:, 0] + v * mesh.normal[:, 1]) * mesh.length
+            return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))
         if self.part.velocity.way == "stream":
             given = {"stream": given["stream"].at(*np.ascontiguousarray(mesh.points.T))}
         try:
