@@ -1,6 +1,7 @@
 """What is legal but beyond what practice knows is noted once, with the unit that was probably meant."""
 
 import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -8,13 +9,18 @@ import pytest
 
 from fvsolve import run
 from fvsolve.case import load
-from fvsolve.errors import listing
+from fvsolve.errors import CaseError, listing
 from fvsolve.run import model_of
 from tests.test_faults import SCENE
 from tests.truth import scenes
 
 CASES = sorted(path for path in Path("cases").glob("*.toml"))
-DOCS = sorted(Path("docs").glob("*.md"))
+EXAMPLES = {  # whole cases that the docs print
+    f"{page.stem}-{at}": text
+    for page in sorted(Path("docs").glob("*.md"))
+    for at, text in enumerate(re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    if "[fluid]" in text and "[nodes." in text
+}
 
 SLIPS = {  # settings -> (place, key, value, limit, what the text says)
     "diameter in mm": ({"links.main.diameter": 304.8}, "links.main", "diameter", 304.8, 14.0, '"304.8 mm"'),
@@ -82,6 +88,15 @@ def test_notes_of_ranges_reach_check_and_summary():
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_shipped_cases_are_within_what_practice_knows(path):
     assert not [note.text for note in load(path).notes]
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_cases_of_the_docs_are_within_what_practice_knows(name):
+    try:
+        case = load({"numerics": {"end": 1.0}, **tomllib.loads(EXAMPLES[name])})
+    except (CaseError, tomllib.TOMLDecodeError):
+        pytest.skip("a part of a case")
+    assert not [note.text for note in case.notes]
 
 
 @pytest.mark.parametrize(
@@ -153,3 +168,59 @@ def test_a_list_never_hides_two():
     for count in range(1, 40):
         said = listing([f"n{k:02}" for k in range(count)])
         assert "in all" not in said or count - said.count("n") + 1 >= 3
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_loops_without_friction_are_named_once(law):
+    case = main(0.03)
+    case["fluid"] = {**case["fluid"], "law": law}
+    case["nodes"] |= {"a": scenes.junction(), "b": scenes.junction(), "out": case["nodes"].pop("end")}
+    case["links"]["main"]["to"] = "a"
+    case["links"] |= {name: scenes.pipe("a", "b", 100.0, 0.3, 1200.0, 5) for name in ("left", "right")}
+    case["links"]["stub"] = scenes.pipe("b", "out", 100.0, 0.3, 1200.0, 5)
+    (note,) = [one for one in model_of(load(case)).warnings if "loops" in one.text]
+    assert note.place == "links.left" and note.text.startswith("left, right: loops without friction")
+
+
+def test_check_summary_and_resolved_case_hold_the_fluid():
+    case = load(tomllib.loads(SCENE), {"numerics.end": 0.1, "fluid.name": "Water"})
+    said = model_of(case).checks["fluid"]
+    assert said == run(case).summary["fluid"]
+    assert list(said) == ["name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source"]
+    assert (said["name"], said["density"], said["vapor_pressure"]) == ("Water", 998.0, 2339.0)
+    assert said["sound_speed"] == pytest.approx(math.sqrt(2.2e9 / 998.0), rel=1e-15)
+    assert re.fullmatch(r"CoolProp [0-9.]+; density, bulk_modulus, viscosity, vapor_pressure given", said["source"])
+    text = case.resolved()
+    for key in ("density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure"):
+        assert f"\n# {key} = {said[key]!r}\n" in text
+    again = load(tomllib.loads(text))
+    assert again == case and again.properties == case.properties
+
+
+def ladder(pipes: int) -> dict:
+    """A row of pipes, the seventh of them narrower than the others."""
+    nodes = {"lake": scenes.lake(50.0)} | {f"n{k}": scenes.junction(0.01 if k == pipes else None)
+                                           for k in range(1, pipes + 1)}  # fmt: skip
+    friction = {"model": "quasi-steady", "roughness": 1e-4}
+    links = {f"p{k}": scenes.pipe("lake" if k == 1 else f"n{k - 1}", f"n{k}", 10.0, 0.3 - 0.1 * (k == 7), 1200.0, 3,
+                                  friction=friction) for k in range(1, pipes + 1)}  # fmt: skip
+    links["p9"]["wave_speed"] = 2500.0
+    return scenes.scene(nodes, links, 0.1, scenes.SMOOTH, output={"units": {"pressure": "barg", "velocity": "cm/s"}})
+
+
+def test_check_shows_what_stands_out_of_many_in_the_units_of_the_output(capsys):
+    from fvsolve.cli import report
+
+    model = model_of(load(ladder(50)))
+    report.checks(model.case, model.checks)
+    short = capsys.readouterr().out
+    report.checks(model.case, model.checks, every=True)
+    whole = capsys.readouterr().out
+    rows = lambda text: {line.split()[0] for line in text.splitlines() if re.match(r" *[pn]\d+ ", line)}  # noqa: E731
+    assert {f"p{k}" for k in range(1, 51)} | {f"n{k}" for k in range(1, 51)} == rows(whole)
+    assert {"p7", "p9", "p1", "p50", "n50"} <= rows(short) and len(rows(short)) < 20
+    assert "more of 50" in short and "--all" in short and "more of" not in whole
+    assert "pressure [barg]" in short and "velocity [cm/s]" in short
+    (fluid,) = [line for line in short.splitlines() if line.startswith("fluid user:")]
+    assert "bulk modulus 22000 bar" in fluid and "vapor pressure -0.99025 barg" in fluid
+    assert "sound speed 148324 cm/s" in fluid and "viscosity 0.001 Pa s" in fluid

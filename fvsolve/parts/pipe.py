@@ -67,7 +67,11 @@ class Pipe(Conduit, kind="pipe"):
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from super().unusual()
         wall = self.wall
-        if isinstance(wall, Wall) and MODULI.least <= wall.youngs_modulus < PLASTIC and wall.thickness < THIN * self.diameter:
+        if (
+            isinstance(wall, Wall)
+            and MODULI.least <= wall.youngs_modulus < PLASTIC
+            and wall.thickness < THIN * self.diameter
+        ):
             text = (f"{wall.youngs_modulus:g} Pa is softer than any plastic, {PLASTIC:g} Pa, and as rubber a wall of "
                     f"{wall.thickness:g} m is too thin for a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
             yield ("wall", "youngs_modulus"), wall.youngs_modulus, PLASTIC, text
