@@ -110,8 +110,12 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f'; did you mean "{close}"?' if close else ""
 
 
+FEW = 2  # more names are not worth hiding
+
+
 def listing(names: Iterable[str], limit: int = 12) -> str:
     """The names in one line, sorted, each once, cut where there are many."""
     names = sorted({*names})
-    more = f", ... ({len(names)} in all)" if len(names) > limit else ""
-    return ", ".join(names[:limit]) + more
+    if len(names) <= limit + FEW:
+        return ", ".join(names)
+    return ", ".join(names[:limit]) + f", ... ({len(names)} in all)"

@@ -631,6 +631,46 @@ BAD = {
         SCENE + '[compare]\n"gate.head" = { fil = "good.csv" }',
         'compare."gate.head".fil: unknown key; did you mean "file"?',
     ),
+    # what was meant
+    "a closing time": (
+        swap("discharge_coefficient = 0.6", "closing_time = 3"),
+        'links.valve.closing_time: unknown key; say opening = { start = "1 s", duration = "2 s", value = [1, 0] }',
+    ),
+    "a roughness beside its friction": (
+        swap("cells = 200", "roughness = 3e-4"),
+        'links.main.roughness: unknown key; say friction = { model = "quasi-steady", roughness = ',
+    ),
+    "friction after Colebrook": (
+        swap('"steady"', '"Colebrook"'),
+        'friction.model: no friction model named "Colebrook"; say "quasi-steady" or "steady" with a roughness',
+    ),
+    "friction of one key": (
+        swap('"steady", roughness = "0.26 mm"', '"hazen-williams"'),
+        "links.main.friction: coefficient is missing",
+    ),
+    "some oil": (
+        swap('name = "user"', 'name = "oil"'),
+        'fluid.name: "oil" is no CoolProp fluid; oils are ISO VG 32, ISO VG 46, ISO VG 68, or give a "user" fluid',
+    ),
+    "a fluid that is a text": (
+        re.sub(r"\[fluid\](\n.+)*\n", "", SCENE).replace("schema = 1", 'schema = 1\nfluid = "oil"'),
+        'line 2: fluid: "oil" is no table; wanted [fluid] with name = "ISO VG 46"',
+    ),
+    "water at 20 K": (
+        swap('name = "user"', 'name = "Water"\ntemperature = 20'),
+        'outside the range of Water, 0.01 degC to 1726.85 degC; a bare number is in K, did you mean "20 degC"?',
+    ),
+    "a hose": (swap('type = "pipe"', 'type = "hose"'), 'links.main.type: no type "hose"; say a "pipe" with'),
+    "a filter": (swap('type = "valve"', 'type = "Filter"'), 'links.valve.type: no type "Filter"; say an "orifice"'),
+    "a bare name with an umlaut": (
+        swap("[links.valve]", "[links.düse]"),
+        'line 32: TOML: a name with letters beyond a to z wants quotes: "düse"',
+    ),
+    "a bare name with a blank": (
+        swap("[links.valve]", "[links.main valve]"),
+        "line 32: TOML: a bare name has no blank; write main_valve",
+    ),
+    "a bare key with a blank": (swap("cells = 200", "wave speed = 3"), "a bare name has no blank; write wave_speed"),
     # TOML
     "syntax": (swap("end = ", "end "), "line 41: TOML: expected '=' after a key in a key/value pair: "),
     "a key twice": (add("links.main", "cells = 3"), 'TOML: this key is given twice: "cells = 200"'),
@@ -718,7 +758,13 @@ SHUT = SHUT.replace('type = "pipe"', 'type = "valve"\nopening = 0\narea = 0.1').
 )
 for key in ("length", "diameter", "wave_speed", "friction", "cells", "courant"):
     SHUT = re.sub(rf"^{key} = .*\n", "", SHUT, flags=re.MULTILINE)
+FED = SHUT.replace('type = "junction"\ndemand = 0.1', 'type = "inflow"\nflow = 30')
 CANNOT_START = {
+    "an inflow before shut valves": (
+        FED,
+        {},
+        "line 15: nodes.gate: no steady state: 30 m3/s come in here but every way out is shut",
+    ),
     "a demand behind shut valves": (SHUT, {}, "line 15: nodes.gate: no steady state: 0.1 m3/s are drawn here but"),
     "unequal heads and no friction": (
         SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace('"junction"', '"reservoir"\nhead = 3'),

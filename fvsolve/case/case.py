@@ -8,10 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import basins, text
+from fvsolve.case import basins, ranges, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.errors import Notice
 from fvsolve.fluid import Fluid
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.table import plain
@@ -107,6 +108,11 @@ class Case(Shown):
             found |= part.inner(name)[1]
         return found
 
+    @cached_property
+    def notes(self) -> list[Notice]:
+        """What it says beyond what practice knows."""
+        return ranges.notices(self)
+
     @property
     def elevations_stated(self) -> bool:
         """Whether the places of the fluid state elevations."""
@@ -135,8 +141,13 @@ class Case(Shown):
         return wave_speed(self.links[name], self.properties)
 
     def resolved(self) -> str:
-        """TOML text with every default filled in, in SI; it reads back as an equal case beside its files."""
-        return text.write(self.table())
+        """TOML text with every default filled in, in SI; it reads back as an equal case beside its files.
+
+        What the fluid's name came to stands there as a comment: as keys it would hold at any other temperature.
+        """
+        fluid = self.properties.plain()
+        came = [f"# {key} = {text.inline(value)}" for key, value in fluid.items() if value is not None]
+        return text.write(self.table()).replace("\n[fluid]\n", "\n".join(["", "[fluid]", *came[1:], ""]), 1)
 
     def table(self) -> dict[str, Any]:
         """The same as nested dicts."""

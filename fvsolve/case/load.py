@@ -20,6 +20,7 @@ from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
 from fvsolve.parts.basin import Place
+from fvsolve.parts.meant import MEANT
 from fvsolve.parts.pipe import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -252,8 +253,19 @@ class _Reader:
                 spec = spec.model_copy(update={"viscosity": asked["viscosity"]})
             return spec, properties(**asked)
         except FluidError as error:
-            self.fault(("fluid", error.key), error.message)
+            self.fault(("fluid", error.key), error.message + self.in_celsius(asked, error.key))
             return spec, None
+
+    def in_celsius(self, asked: dict[str, Any], key: str) -> str:
+        """What to add where a bare temperature is none of the fluid's in kelvin, but one in degrees Celsius."""
+        given = self.raw.get(("fluid", "temperature"))
+        if key != "temperature" or isinstance(given, str):
+            return ""
+        try:
+            properties(**{**asked, "temperature": asked["temperature"] + 273.15})
+        except FluidError:
+            return ""
+        return f'; a bare number is in K, did you mean "{given:g} degC"?'
 
     def kinds(self, group: str) -> dict[str, Any]:
         found = {}
@@ -316,7 +328,9 @@ class _Reader:
             hint = did_you_mean(str(kind), known)
             if isinstance(kind, str) and kind in KINDS[other]:
                 hint = f"; it belongs under [{other}]"
-            self.fault((group, name, "type"), f"no type {show(kind)}; types are {listing(known)}{hint}")
+            said = MEANT.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
+            hint = f"; say {said}" if said else f"; types are {listing(known)}{hint}"
+            self.fault((group, name, "type"), f"no type {show(kind)}{hint}")
             return None
         return known[kind]
 

@@ -159,11 +159,28 @@ def _syntax_fault(error: ValueError, text: str) -> Fault:
     said = text.splitlines()[line - 1].strip() if 0 < line <= len(text.splitlines()) else ""
     message = message.replace(match[0], "") if match else message
     message = message[:1].lower() + message[1:]
+    if bare := _bare_name(said):
+        return Fault("", f"TOML: {bare}: {show(said)}", line)
     if message == "cannot overwrite a value":
         message = "this key is given twice"
     elif message.startswith("cannot declare"):
         message = "this table is given twice"
     return Fault("", f"TOML: {message}: {show(said)}" if said else f"TOML: {message}", line)
+
+
+def _bare_name(said: str) -> str:
+    """What is wrong with names outside quotes on a line of TOML; empty where they are in order."""
+    match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", said)
+    names = [name.strip() for name in (match[1] or match[2]).split(".")] if match else []
+    odd = next((name for name in names if name and not re.fullmatch(r"[A-Za-z0-9_-]+", name)), None)
+    if odd is None:
+        return ""
+    if re.fullmatch(r"[\w-]+", odd):
+        return f"a name with letters beyond a to z wants quotes: {show(odd)}"
+    joined = re.sub(r"\s+", "_", odd)
+    if joined != odd:
+        return f"a bare name has no blank; write {joined} (in quotes a key may have one, the name of a part may not)"
+    return f"a bare name has letters, digits, _ and -; wanted quotes: {show(odd)}"
 
 
 def _copy(value: Any, depth: int = 0) -> Any:

@@ -11,6 +11,7 @@ from fvsolve import units
 from fvsolve.errors import did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
+from fvsolve.fluid.coolprop import OILY
 from fvsolve.parts.table import Named, Table
 from fvsolve.parts.value import (
     Choice,
@@ -21,6 +22,7 @@ from fvsolve.parts.value import (
     Rows,
     Setting,
     Text,
+    Usual,
     Value,
     Whole,
     between,
@@ -45,6 +47,13 @@ DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cel
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 
 
+# What liquids have, after CoolProp's and the CRC Handbook's: liquid hydrogen to mercury, light ones to cold heavy oil.
+TEMPERATURES = Usual(60.0, 1000.0, "liquefied gases to molten salt")  # of "user": others know their own
+DENSITIES = Usual(60.0, 14e3, "liquid hydrogen to mercury")
+MODULI = Usual(1e7, 4e10, "liquefied gases to mercury")
+VISCOSITIES = Usual(1e-5, 5.0, "liquefied gases to heavy fuel oil")
+
+
 class FluidSpec(Table):
     """`[fluid]`: which fluid, at which state, under which density law; numbers here override CoolProp's."""
 
@@ -52,9 +61,9 @@ class FluidSpec(Table):
     temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = 293.15
     pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]")] = 101325.0
     law: Annotated[str, Choice("density law", LAWS, "one for the case")] = "linear"
-    density: Annotated[float | None, Quantity("density", positive, "[kg/m3]")] = None
-    bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]")] = None
-    viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]")] = None
+    density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES)] = None
+    bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI)] = None
+    viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]", VISCOSITIES)] = None
     vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
     air_fraction: Annotated[float | None, Number(between(0, 1), "of the volume at 1 atm, law mixture")] = None
     gas_exponent: Annotated[float | None, Number(between(1, 2), "polytropic, 1 isothermal, 1.4 adiabatic")] = None
@@ -62,6 +71,21 @@ class FluidSpec(Table):
         None
     )
     cavitation: Annotated[bool | None, Flag("vapour pressure adds to that of the gas, law mixture")] = None
+
+    @classmethod
+    def wanted(cls, given: Any) -> str:
+        if not isinstance(given, str):
+            return super().wanted(given)
+        return (
+            f"[fluid] with name = {show('ISO VG 46' if given.casefold() in OILY else given)}, its temperature and more"
+        )
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        found, usual = self.temperature, TEMPERATURES
+        if self.name == "user" and not usual.least <= found <= usual.greatest:
+            text = f"{found:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.practice}"
+            text += units.likely(found, "temperature", usual.least, usual.greatest)
+            yield ("temperature",), found, usual.least if found < usual.least else usual.greatest, text
 
 
 class MethodNames(Collection):

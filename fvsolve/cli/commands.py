@@ -49,7 +49,12 @@ def run(
 
 
 @app.command()
-def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B006
+def check(
+    case: One,
+    set: Set = [],  # noqa: B006
+    every: Annotated[bool, typer.Option("--all", help="all rows of long tables")] = False,
+    as_json: Json = False,
+) -> None:
     """What was understood of a case, how it starts, what it will cost."""
     from fvsolve.cli import report
     from fvsolve.limits.step import step_limits
@@ -61,7 +66,7 @@ def check(case: One, set: Set = [], as_json: Json = False) -> None:  # noqa: B00
     if as_json:
         print_json(found)
     else:
-        report.checks(model.case, found)
+        report.checks(model.case, found, every)
 
 
 @app.command("list")

@@ -8,15 +8,24 @@ from fvsolve.cli.terminal import table as _table
 from fvsolve.output.directory import pictures
 
 ROWS = 20  # of a table at most; the rest is on disk
+MANY = 40  # rows of a table of `check`: beyond, those that stand out
+FLUID = {
+    "density": "density", "bulk_modulus": "modulus", "sound_speed": "velocity", "viscosity": "viscosity",
+    "vapor_pressure": "pressure",
+}  # fmt: skip
+NODE = {"elevation": ("elevation", "length"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
+BODY = {
+    "position": ("position", "position"), "velocity": ("velocity", "velocity"), "force": ("net force", "force")
+}  # fmt: skip
 PIPE = {
-    "length": "length [m]",
-    "cells": "cells",
-    "wave_speed": "wave speed [m/s]",
-    "velocity": "velocity [m/s]",
-    "reynolds": "Reynolds",
-    "friction_factor": "friction factor",
-    "from_head": "head at from [m]",
-    "to_head": "head at to [m]",
+    "length": ("length", "length"),
+    "cells": ("cells", "number"),
+    "wave_speed": ("wave speed", "velocity"),
+    "velocity": ("velocity", "velocity"),
+    "reynolds": ("Reynolds", "number"),
+    "friction_factor": ("friction factor", "number"),
+    "from_head": ("head at from", "head"),
+    "to_head": ("head at to", "head"),
 }
 
 BASIN = {
@@ -64,21 +73,18 @@ def exit_code(one) -> int:
     return 0 if one.ok and all(claim.ok for claim in one.expectations) else 1
 
 
-def checks(case, found: dict) -> None:
-    """Nodes, pipes and basins at the start, the step and its cost, what will move."""
+def checks(case, found: dict, every: bool = False) -> None:
+    """Fluid, nodes, pipes and basins at the start, the step and its cost, what will move; `every` row, or what stands
+    out of many."""
     console = _console()
     _line(console, case.title or case.name, "bold")
-    rows = [[name, *map(_number, one.values())] for name, one in found["nodes"].items()]
-    _table(["node", "elevation [m]", "pressure [Pa]", "head [m]"], rows, console)
-    _line(console, "")
-    rows = [[name, *map(_number, one.values())] for name, one in found["bodies"].items()]
-    if rows:
-        _table(["body", "position [m]", "velocity [m/s]", "net force [N]"], rows, console)
-        _line(console, "")
-    rows = [[name, *(_number(one[key]) for key in PIPE)] for name, one in found["pipes"].items()]
-    if rows:
-        _table(["pipe", *PIPE.values()], rows, console)
-        _line(console, "")
+    _line(console, _fluid(case, found["fluid"]))
+    odd = {one["place"] for one in found["warnings"]}
+    for group, word, keys in (("nodes", "node", NODE), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)):
+        place = "links" if group == "pipes" else "nodes"
+        _states(
+            console, case, word, found[group], keys, every, {name for name in found[group] if f"{place}.{name}" in odd}
+        )
     rows = [[name, *(_number(one.get(key)) for key in BASIN)] for name, one in found["basins"].items()]
     if rows:
         _table(["basin", *BASIN.values()], rows, console)
@@ -91,18 +97,77 @@ def checks(case, found: dict) -> None:
     if rows:
         _table(["patch", *PATCH.values()], rows, console)
         _line(console, "")
-    for name, one in found["pipes"].items():
-        if "unsteady" in one:
-            _line(console, f"friction of {name} remembers: {_memory(one['unsteady'])}")
-    for text in found["moving"]:
-        _line(console, f"moves from the start: {text}")
-    _notices(console, found["warnings"])
+    said = [f"friction of {name} remembers: {_memory(one['unsteady'])}"
+            for name, one in found["pipes"].items() if "unsteady" in one]  # fmt: skip
+    _cut(console, said, every)
+    _cut(console, [f"moves from the start: {text}" for text in found["moving"]], every)
+    _notices(console, found["warnings"], every)
     _line(console, _step(found))
 
 
-def _notices(console, warnings: list[dict]) -> None:
+def _states(console, case, word: str, found: dict, keys: dict, every: bool, odd: set[str]) -> None:
+    """Parts at the start in the units of `[output]`; of many, least and greatest of each column and the `odd`."""
+    from fvsolve.output.column import column
+
+    if not found:
+        return
+    columns = [column(said, dimension, case) for said, dimension in keys.values()]
+    names = list(found) if every or len(found) <= MANY else _outstanding(found, keys, odd)
+    rows = [[name, *(_number(_in(one, found[name][key])) for key, one in zip(keys, columns, strict=True))]
+            for name in names]  # fmt: skip
+    _table([word, *(one.name if one.dimension == "number" else one.header for one in columns)], rows, console)
+    if len(names) < len(found):
+        _line(console, f"... {len(found) - len(names)} more of {len(found)}; here stand least and greatest of each "
+                       "column and what is noted, --all shows all")  # fmt: skip
+    _line(console, "")
+
+
+def _outstanding(found: dict, keys: dict, odd: set[str]) -> list[str]:
+    """Names with the least or greatest value of a column, and the `odd` ones, in their order."""
+    kept = set(sorted(odd)[:MANY])
+    for key in keys:
+        there = [name for name, one in found.items() if one[key] is not None]
+        if there:
+            kept |= {pick(there, key=lambda name: found[name][key]) for pick in (min, max)}  # noqa: B023
+    return [name for name in found if name in kept]
+
+
+def _fluid(case, found: dict) -> str:
+    """The fluid in the units of `[output]`; its modulus in that of pressures."""
+    from fvsolve.output.column import column
+    from fvsolve.units import UNITS
+
+    said = []
+    for key, dimension in FLUID.items():
+        one = column(key, dimension, case)
+        if dimension == "modulus" and (UNITS[one.unit].gauge or UNITS[one.unit].absolute):
+            one = column(key, dimension, case, one.unit[:-1])
+        said.append(f"{key.replace('_', ' ')} {'unknown' if found[key] is None else _number(_in(one, found[key]))}"
+                    f"{'' if found[key] is None else ' ' + one.unit}")  # fmt: skip
+    name = "" if found["name"] == found["source"] else f" ({found['source']})"
+    return f"fluid {found['name']}{name}: {', '.join(said)}"
+
+
+def _in(column, value):
+    """A number in the unit of a column; None where there is none."""
+    return value if value is None or column.plain else float(column.from_si(value))
+
+
+def _cut(console, lines: list[str], every: bool) -> None:
+    """Lines, the first ones of many."""
+    shown = len(lines) if every or len(lines) <= EVENTS_SHOWN + 2 else EVENTS_SHOWN
+    for text in lines[:shown]:
+        _line(console, text)
+    if len(lines) > shown:
+        _line(console, f"... {len(lines) - shown} more like these")
+
+
+def _notices(console, warnings: list[dict], every: bool = False) -> None:
+    """What is wrong, and of what is only to be known the first ones of many."""
     for one in warnings:
-        _line(console, f"note: {one['text']}", None if one["ok"] else "bold red")
+        if not one["ok"]:
+            _line(console, f"note: {one['text']}", "bold red")
+    _cut(console, [f"note: {one['text']}" for one in warnings if one["ok"]], every)
 
 
 def _memory(one: dict) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid.cache import cached
@@ -58,6 +59,11 @@ class Fluid:
         """Isentropic speed of sound, sqrt(bulk_modulus / density) [m/s]."""
         return math.sqrt(self.bulk_modulus / self.density)
 
+    def plain(self) -> dict[str, Any]:
+        """As JSON says it: the liquid at its reference state, SI, and where its numbers are from."""
+        keys = ("name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source")
+        return {key: getattr(self, key) for key in keys}
+
 
 def properties(
     name: str,
@@ -92,6 +98,8 @@ def properties(
     mixed = dict(air_fraction=air_fraction, gas_exponent=gas_exponent)
     mixed |= dict(saturation_pressure=saturation_pressure, cavitation=cavitation)
     air = _air(law, {key: value for key, value in mixed.items() if value is not None})
+    if given and name != "user":
+        found = found | {"source": f"{found['source']}; {', '.join(given)} given"}
     fluid = Fluid(name=name, law=law, air=air, **(found | state | given))
     for key in ("density", "bulk_modulus"):
         if getattr(fluid, key) is None:

@@ -9,6 +9,8 @@ from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid.oils import OILS
 from fvsolve.fluid.table import isentrope, known
 
+OILY = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "hm", "iso vg", "vg")
+
 
 def ask(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
     """The keys of Fluid that CoolProp knows; None: density where the fluid boils, bulk_modulus of INCOMP."""
@@ -58,6 +60,8 @@ def _suggestion(name: str) -> str:
 
     pure = CoolProp.get_global_param_string("FluidsList").split(",")
     oils = _incompressible_names()
+    if name.casefold().replace("-", " ").strip() in OILY:
+        return f'; oils are {", ".join(OILS)}, or give a "user" fluid'
     if name in oils:
         return f'; did you mean "INCOMP::{name}"?'
     if name.startswith("INCOMP::"):

@@ -16,6 +16,7 @@ from fvsolve.model.devices import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
+from fvsolve.model.ranges import flow_notices
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import quicker, scheme_settings
@@ -59,7 +60,7 @@ class Scene:
         self.moving_names = {f"{name}.{place}" for name in cylinders for place in "AB"}
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.faults: list[Fault] = []
-        self.warnings: list[Notice] = []
+        self.warnings: list[Notice] = [*case.notes]
         self.size = self.tanks = self.cells = 0
         self.state_names: list[str] = []
         self.scale: list[float] = []
@@ -381,7 +382,7 @@ class Scene:
             (t, jump) for t, jump in self.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
         )
         start = self.start_state()
-        self.warnings += [*dispersion.warnings(self.basins, start), *coarse_for_cavities(self)]
+        self.warnings += [*dispersion.warnings(self.basins, start), *coarse_for_cavities(self), *flow_notices(self)]
         return Model(
             case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
             list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,

@@ -59,7 +59,7 @@ def checks(model) -> dict[str, Any]:
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     return {
-        "nodes": nodes, "bodies": bodies, "pipes": pipes,
+        "fluid": model.case.properties.plain(), "nodes": nodes, "bodies": bodies, "pipes": pipes,
         "basins": {one.name: basin_facts(one) for one in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,

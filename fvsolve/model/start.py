@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from random import Random
 from typing import Any
 
@@ -35,6 +36,7 @@ def start_profile(scene) -> dict[str, Any]:
 
         start = BarotropicStart(scene)
     start.solve()
+    start.report_split()
     start.freeze_factors()
     start.fill_nodes()
     start.fill_pipes()
@@ -271,10 +273,11 @@ class Start:
         names = list(self.case.places)
         for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
             drawn = self.demand[i] / self.scene.fluid.density
+            what = f"{drawn:.4g} m3/s are drawn here but every way to it" if drawn > 0.0 else (
+                f"{-drawn:.4g} m3/s come in here but every way out")  # fmt: skip
             self.scene.fault(
                 f"nodes.{names[i]}",
-                f"no steady state: {drawn:.4g} m3/s are drawn here but every way to it is shut; "
-                'open a valve, or use initial = "rest"',
+                f'no steady state: {what} is shut; open a valve, or use initial = "rest"',
             )
         for name, row in zip(self.scene.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
@@ -289,10 +292,22 @@ class Start:
         if not self.scene.faults and not self.answer.converged:
             self.scene.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
                              'and frictionless ways between unequal heads, or use "rest"')  # fmt: skip
-        if self.answer.split:
-            text = "loops without friction: flow in them is the least-norm split"
-            self.scene.warnings.append(Notice("start", "links", text))
         self.scene.check()
+
+    def report_split(self) -> None:
+        """The loops in which no friction says how the flow divides."""
+        held = {i: -1 for i, given in enumerate(self.held) if not np.isnan(given)}  # all of them one: ways between them
+        rows = [*zip(self.scene.pipe_names, self.pipes, strict=True),
+                *zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
+        ends = {name: [held.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")] for name, row in rows
+                if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
+        loops, before = ends, None
+        while self.answer.split and loops != before:  # what ends in a place that no other touches is in none
+            before, touched = loops, Counter(end for pair in loops.values() for end in pair)
+            loops = {name: pair for name, pair in loops.items() if min(touched[end] for end in pair) > 1}
+        if self.answer.split:
+            text = f"{listing(loops) or 'ways'}: loops without friction, in which flow is the least-norm split"
+            self.scene.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:
         """`steady` friction by roughness: the factor of the starting flow, at rest the fully rough one."""

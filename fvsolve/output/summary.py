@@ -37,6 +37,7 @@ def described(summary, model) -> dict:
         "time_unit": time_column(model.case).unit,
         "envelope_units": {one.name: one.unit for one in envelope_columns(model.case)},
         "ambient_pressure": model.case.ambient_pressure,
+        "fluid": model.case.properties.plain(),
         "extremes": _extremes(summary, model),
         "ledgers": plain(summary.ledgers),
         **summary.counts,

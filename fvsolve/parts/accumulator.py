@@ -8,7 +8,11 @@ from fvsolve.parts.connection import Connection, Joined, joined
 from fvsolve.parts.junction import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Number, Quantity, Range, positive
+from fvsolve.parts.value import Number, Quantity, Range, Usual, positive
+
+VOLUMES = Usual(1e-7, 1e5, "pilot accumulators to air cushions in rock")
+GAS = Usual(1e4, 2e8, "vacuum to test rigs")
+EXPONENTS = Usual(1.0, 2.0, "isothermal to adiabatic real gases")
 
 
 class Accumulator(Node, kind="accumulator"):
@@ -26,10 +30,12 @@ class Accumulator(Node, kind="accumulator"):
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
 
-    volume: Annotated[float, Quantity("volume", positive, "that gas and fluid share [m3]")]
-    precharge: Annotated[float | None, Quantity("pressure", about="of the gas when it fills the vessel [Pa]")] = None
-    gas_volume: Annotated[float | None, Quantity("volume", positive, "of the gas at the start [m3]")] = None
-    exponent: Annotated[float, Number(Range(1.0), "n of p V^n: 1 isothermal, 1.4 adiabatic air")] = 1.2
+    volume: Annotated[float, Quantity("volume", positive, "that gas and fluid share [m3]", VOLUMES)]
+    precharge: Annotated[
+        float | None, Quantity("pressure", about="of the gas when it fills the vessel [Pa]", usual=GAS)
+    ] = None
+    gas_volume: Annotated[float | None, Quantity("volume", positive, "of the gas at the start [m3]", VOLUMES)] = None
+    exponent: Annotated[float, Number(Range(1.0), "n of p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)] = 1.2
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="of the gas at the start [Pa]; in equilibrium if left out")
     ] = None

@@ -9,7 +9,7 @@ from fvsolve.parts.connection import Connection, behind
 from fvsolve.parts.junction import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.value import Number, Quantity, between, positive
+from fvsolve.parts.value import Number, Quantity, Usual, between, positive
 
 BORE = between(0, 1, open=True)  # m: a bare 50 is meant in mm
 BODY = 3.0  # width and length of the float's chamber where its volume is not given, in diameters of the inlet
@@ -33,7 +33,9 @@ class AirValve(Node, kind="air-valve"):
     outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air out [m]")]
     discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of both bores")] = 0.6
     volume: Annotated[float | None, Quantity("volume", positive, "of the float's chamber [m3]")] = None
-    temperature: Annotated[float, Quantity("temperature", positive, "of the air [K]")] = 293.15
+    temperature: Annotated[
+        float, Quantity("temperature", positive, "of the air [K]", Usual(220.0, 370.0, "outdoors to hot rooms"))
+    ] = 293.15
 
     initial_pressure: ClassVar[None] = None
     at_ambient: ClassVar[bool] = True

@@ -11,7 +11,19 @@ from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.table import Named, Table, at_most_one, read_keys
-from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Value, anything, nonnegative, positive
+from fvsolve.parts.value import (
+    Choice,
+    Misfit,
+    Quantity,
+    Rows,
+    Setting,
+    Text,
+    Usual,
+    Value,
+    anything,
+    nonnegative,
+    positive,
+)
 from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
@@ -211,8 +223,14 @@ class Basin(Node, kind="basin"):
 
     level: Annotated[float | None, Quantity("level", anything, "of the water at rest, above the elevation [m]")] = None
     bed: Annotated[Formula | None, Shaped("length", "height above the elevation, 0 if left out [m]")] = None
-    manning: Annotated[float | None, Quantity("number", nonnegative, "Manning's n [s/m^(1/3)]")] = None
-    factor: Annotated[float | None, Quantity("number", nonnegative, "friction factor after Darcy [-]")] = None
+    manning: Annotated[
+        float | None,
+        Quantity("number", nonnegative, "Manning's n [s/m^(1/3)]", Usual(0.005, 0.5, "glass to dense brush")),
+    ] = None
+    factor: Annotated[
+        float | None,
+        Quantity("number", nonnegative, "friction factor after Darcy [-]", Usual(0.002, 3.0, "glass to boulders")),
+    ] = None
 
     pressure: Annotated[float | None, Quantity("pressure", positive, "at rest")] = None
     thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]")] = None

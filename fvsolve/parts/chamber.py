@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from fvsolve.parts.node import Node
-from fvsolve.parts.value import Quantity, positive
+from fvsolve.parts.value import Quantity, Usual, positive
 
 
 class Chamber(Node, kind="chamber"):
@@ -17,7 +17,7 @@ class Chamber(Node, kind="chamber"):
 
     fixes_pressure: ClassVar[bool] = True
 
-    volume: Annotated[float, Quantity("volume", positive, "fluid held [m3]")]
+    volume: Annotated[float, Quantity("volume", positive, "fluid held [m3]", Usual(1e-10, 1e5, "cylinders to caverns"))]
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium if left out")
     ] = None

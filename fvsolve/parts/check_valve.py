@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.disc import Disc
+from fvsolve.parts.disc import DROPS, Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import Quantity, nonnegative, positive
 from fvsolve.parts.valve import Sized
@@ -21,9 +21,12 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    cracking_pressure: Annotated[float, Quantity("pressure_drop", nonnegative, "drop above which it opens [Pa]")] = 0.0
+    cracking_pressure: Annotated[
+        float, Quantity("pressure_drop", nonnegative, "drop above which it opens [Pa]", DROPS)
+    ] = 0.0
     overpressure: Annotated[
-        float | None, Quantity("pressure_drop", positive, "drop above cracking_pressure that opens it fully [Pa]")
+        float | None,
+        Quantity("pressure_drop", positive, "drop above cracking_pressure that opens it fully [Pa]", DROPS),
     ] = None
 
     @classmethod

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
+from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.friction import NONE, Friction
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.sizes import FITTINGS, bore, loss
 from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Misfit, Number, Quantity, Setting, Text, Value, nonnegative, positive
+from fvsolve.parts.value import Misfit, Number, Quantity, Setting, Text, Usual, Value, nonnegative, positive
 from fvsolve.units import show
 
-DIAMETER = Quantity("length", positive, "inner diameter [m]")
+BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela are 13.7 m wide
+DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES)
 LOSS = Number(nonnegative, "loss coefficient on its velocity, spread along it")
+
+
+ROUGHEST = 0.05  # relative roughness, Moody 1944
 
 
 class Fittings(Value):
@@ -42,7 +48,17 @@ class Conduit(TwoPort):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
 
-    length: Annotated[float, Quantity("length", positive, "along its axis [m]")]
+    meant: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("roughness", "factor", "friction_factor", "darcy_factor"),
+        'friction = { model = "quasi-steady", roughness = "0.1 mm" } or { model = "steady", factor = 0.02 }',
+    ) | dict.fromkeys(
+        ("celerity", "sound_speed", "youngs_modulus", "thickness", "wall_thickness", "material"),
+        'wave_speed, or wall = { youngs_modulus = "210 GPa", thickness = "8 mm" }',
+    )
+
+    length: Annotated[
+        float, Quantity("length", positive, "along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"))
+    ]
     diameter: Annotated[float, DIAMETER] = None  # nominal stands in for it
     nominal: Annotated[str | None, Text('nominal size in place of diameter, "DN100" or "NPS 4"')] = None
     schedule: Annotated[str | None, Text('of the nominal size, "40" if left out')] = None
@@ -54,6 +70,16 @@ class Conduit(TwoPort):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         return super().key_faults(given) + at_least_one(given, ("diameter", "nominal"))
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        if self.diameter > self.length:
+            text = f"{self.diameter:g} m is more than its length of {self.length:g} m, and the flow is not along it"
+            yield ("diameter",), self.diameter, self.length, text
+        rough, most = self.friction.roughness or 0.0, ROUGHEST * self.diameter
+        if rough > most:
+            text = f"{rough:g} m in a bore of {self.diameter:g} m; Moody's chart ends at {ROUGHEST:g} of the bore"
+            likely = units.likely(rough, "length", 0.0, most) if rough <= 1e3 * most else ""
+            yield ("friction", "roughness"), rough, most, text + likely
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:

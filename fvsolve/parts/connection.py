@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.table import Table, at_least_one
-from fvsolve.parts.value import Number, Quantity, Setting, Value, positive
+from fvsolve.parts.value import Number, Quantity, Setting, Usual, Value, positive
 from fvsolve.units import show
 
 
@@ -16,8 +16,12 @@ class Connection(Table):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
 
-    area: Annotated[float | None, Quantity("area", positive, "of the throat [m2]")] = None
-    diameter: Annotated[float | None, Quantity("length", positive, "of the throat [m]")] = None
+    area: Annotated[
+        float | None, Quantity("area", positive, "of the throat [m2]", Usual(1e-9, 200.0, "capillaries to shafts"))
+    ] = None
+    diameter: Annotated[
+        float | None, Quantity("length", positive, "of the throat [m]", Usual(5e-5, 14.0, "capillaries to shafts"))
+    ] = None
     loss_in: Annotated[float, Number(positive, "K on the velocity in the throat, into the vessel")]
     loss_out: Annotated[float, Number(positive, "K out of the vessel")]
 

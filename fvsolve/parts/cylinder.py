@@ -7,7 +7,10 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.chamber import Chamber
 from fvsolve.parts.link import Link, Ports
-from fvsolve.parts.value import Quantity, nonnegative, positive
+from fvsolve.parts.value import Quantity, Usual, nonnegative, positive
+
+SIZES = Usual(5e-4, 30.0, "micro-hydraulics to ship lifts")
+AREAS = Usual(1e-7, 30.0, "micro-hydraulics to presses")
 
 
 class Cylinder(Link, kind="cylinder"):
@@ -24,11 +27,15 @@ class Cylinder(Link, kind="cylinder"):
     quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
 
     ports: Annotated[dict[str, str], Ports(("rod", "case"))]
-    stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]")]
-    area_A: Annotated[float | None, Quantity("area", positive, "of the piston at A [m2]")] = None
-    area_B: Annotated[float | None, Quantity("area", positive, "of the piston at B, without the rod [m2]")] = None
-    piston_diameter: Annotated[float | None, Quantity("length", positive, "in place of area_A [m]")] = None
-    rod_diameter: Annotated[float | None, Quantity("length", nonnegative, "on B's side, in place of area_B [m]")] = None
+    stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]", SIZES)]
+    area_A: Annotated[float | None, Quantity("area", positive, "of the piston at A [m2]", AREAS)] = None
+    area_B: Annotated[float | None, Quantity("area", positive, "of the piston at B, without the rod [m2]", AREAS)] = (
+        None
+    )
+    piston_diameter: Annotated[float | None, Quantity("length", positive, "in place of area_A [m]", SIZES)] = None
+    rod_diameter: Annotated[
+        float | None, Quantity("length", nonnegative, "on B's side, in place of area_B [m]", SIZES)
+    ] = None
     dead_volume_A: Annotated[float, Quantity("volume", positive, "of A at x = 0 [m3]")]
     dead_volume_B: Annotated[float, Quantity("volume", positive, "of B at x = stroke [m3]")]
     initial_pressure_A: Annotated[

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fvsolve.parts.table import Table, at_most_one
-from fvsolve.parts.value import Number, Quantity, nonnegative, positive
+from fvsolve.parts.value import Number, Quantity, Usual, nonnegative, positive
+
+DROPS = Usual(20.0, 1e8, "millimetres of water to the springs of test rigs")
 
 
 class Disc(Table):
@@ -14,8 +16,14 @@ class Disc(Table):
     time_constant dx/dt = target - x, or x'' = w^2 (target - x) - 2 damping_ratio w x' with w = 2 pi natural_frequency.
     """
 
-    time_constant: Annotated[float | None, Quantity("time", positive, "damper over spring of its disc [s]")] = None
-    natural_frequency: Annotated[float | None, Quantity("frequency", positive, "undamped, of its disc [Hz]")] = None
+    time_constant: Annotated[
+        float | None,
+        Quantity("time", positive, "damper over spring of its disc [s]", Usual(1e-6, 300.0, "poppets to damped flaps")),
+    ] = None
+    natural_frequency: Annotated[
+        float | None,
+        Quantity("frequency", positive, "undamped, of its disc [Hz]", Usual(1e-2, 2e4, "flaps to poppets")),
+    ] = None
     damping_ratio: Annotated[float | None, Number(nonnegative, "of its disc, 1 is critical")] = None
 
     @property

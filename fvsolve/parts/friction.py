@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.table import Table, at_least_one
-from fvsolve.parts.value import Choice, Number, Quantity, between, nonnegative, positive
+from fvsolve.parts.value import Choice, Number, Quantity, Usual, between, nonnegative, positive
 
 MODELS = ("none", "steady", "quasi-steady", "unsteady", "hazen-williams", "chezy-manning")
 WEIGHTINGS = ("zielke", "vardy-brown")
 DARCY = ("roughness", "factor")
+DARCY_WEISBACH = '"quasi-steady" or "steady" with a roughness, whose factor is Colebrook\'s'
+MEANT = dict.fromkeys(
+    ("colebrook", "colebrook-white", "swamee-jain", "moody", "haaland", "darcy", "darcy-weisbach", "d-w", "dw"),
+    DARCY_WEISBACH,
+) | {"h-w": '"hazen-williams"', "hw": '"hazen-williams"', "manning": '"chezy-manning"', "c-m": '"chezy-manning"'}
 KEYS = {  # of each model; at least one of the Darcy pair, or the coefficient
     "none": (),
     "steady": DARCY,
@@ -17,6 +23,14 @@ KEYS = {  # of each model; at least one of the Darcy pair, or the coefficient
     "unsteady": (*DARCY, "weighting", "accuracy"),
     "hazen-williams": ("coefficient",),
     "chezy-manning": ("coefficient",),
+}
+
+
+FACTORS = Usual(0.004, 0.5, "Moody's chart and slow laminar flow")  # the chart spans 0.008 to 0.1
+COEFFICIENTS = {  # of a model: the values that tables of textbooks and EPANET's manual have
+    # plastic has 155, more where an import made a pipe longer
+    "hazen-williams": Usual(40.0, 500.0, "C of tuberculated iron to plastic"),
+    "chezy-manning": Usual(0.006, 0.06, "n of glass to unlined rock"),
 }
 
 
@@ -29,9 +43,9 @@ class Friction(Table):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("roughness", "factor"),)
 
-    model: Annotated[str, Choice("friction model", MODELS, "how the wall brakes the flow")]
+    model: Annotated[str, Choice("friction model", MODELS, "how the wall brakes the flow", MEANT)]
     roughness: Annotated[float | None, Quantity("length", nonnegative, "of the wall [m]")] = None
-    factor: Annotated[float | None, Number(nonnegative, "Darcy's factor, four times Fanning's [-]")] = None
+    factor: Annotated[float | None, Number(nonnegative, "Darcy's factor, four times Fanning's [-]", FACTORS)] = None
     coefficient: Annotated[float | None, Number(positive, "C of Hazen-Williams, or n of Manning")] = None
 
     weighting: Annotated[
@@ -49,6 +63,15 @@ class Friction(Table):
         stray = [key for key in given if key in cls.model_fields and key not in ("model", *allowed)]
         faults += [((key,), f'friction model "{model}" has no {key}') for key in stray]
         return faults + (at_least_one(given, allowed[:2]) if allowed else [])
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        usual, c = COEFFICIENTS.get(self.model), self.coefficient
+        if usual is None or usual.least <= c <= usual.greatest:
+            return
+        text = f"{c:g} is outside {usual.least:g} to {usual.greatest:g}, {usual.practice}"
+        other = next((m for m, one in COEFFICIENTS.items() if one.least <= c <= one.greatest), None)
+        text += f'; model = "{other}" meant?' if other else ""
+        yield ("coefficient",), c, usual.least if c < usual.least else usual.greatest, text
 
 
 NONE = Friction(model="none")

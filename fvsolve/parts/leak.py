@@ -9,7 +9,7 @@ from pydantic import Field
 from fvsolve.parts.link import Link
 from fvsolve.parts.outlet import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import Number, Text, between, positive
+from fvsolve.parts.value import Number, Text, Usual, between, positive
 
 
 class Leak(Link, kind="leak"):
@@ -22,7 +22,9 @@ class Leak(Link, kind="leak"):
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
     from_: Annotated[str, Text("the place it drains"), Field(alias="from")]
-    coefficient: Annotated[float, Number(positive, "q in m3/s at a drop of 1 Pa")]
+    coefficient: Annotated[
+        float, Number(positive, "q in m3/s at a drop of 1 Pa", Usual(1e-15, 0.1, "seeping to a main torn off"))
+    ]
     exponent: Annotated[float, Number(between(0, 3, open=True), "of the drop, 0.5 for a hole of fixed size")] = 0.5
     opening: Annotated[Schedule, Scheduled("number", between(0, 1), "share of the coefficient that is open")] = Field(
         default_factory=lambda: constant(1.0)

@@ -6,7 +6,9 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Quantity, Rows
+from fvsolve.parts.value import Quantity, Rows, Usual
+
+HEIGHTS = Usual(-12e3, 9e3, "boreholes to mountains")
 
 
 class Node(Table):
@@ -23,7 +25,9 @@ class Node(Table):
     fixes_pressure: ClassVar[bool] = False
     domain: ClassVar[str] = "hydraulic"  # | "translational"
 
-    elevation: Annotated[float | None, Quantity("length", about="height above datum [m], 0 if left out")] = None
+    elevation: Annotated[
+        float | None, Quantity("length", about="height above datum [m], 0 if left out", usual=HEIGHTS)
+    ] = None
     position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars that flow in from it, or that it holds at the start")] = {}
 

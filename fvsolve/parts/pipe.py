@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
 from fvsolve.parts.conduit import Conduit
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Number, Quantity, Setting, Value, Whole, between, positive
+from fvsolve.parts.value import Number, Quantity, Setting, Usual, Value, Whole, between, positive
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
 
 
+MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
+WAVES = Usual(30.0, 2000.0, "soft hoses to stiff pipes")  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
+PLASTIC = 2e8  # modulus of the softest plastic that pipes are made of, low-density polyethylene [Pa]
+THIN = 0.1  # wall over bore below which no rubber tube stands
+
+
 class Wall(Table):
     """An elastic wall: 1/K = 1/beta + diameter / (youngs_modulus thickness), wave speed sqrt(K / rho)."""
 
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]")]
-    thickness: Annotated[float, Quantity("length", positive, "of the wall [m]")]
+    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI)]
+    thickness: Annotated[
+        float, Quantity("length", positive, "of the wall [m]", Usual(1e-6, 2.0, "foils to lined rock"))
+    ]
 
 
 class WallOrStiff(Value):
@@ -50,7 +59,19 @@ class Pipe(Conduit, kind="pipe"):
         "flow": "flow",
     }  # fmt: skip
 
-    wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]")] = None
+    wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     cells: Annotated[int | None, Whole(between(1, MOST_CELLS), "finite volumes along it")] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        yield from super().unusual()
+        wall = self.wall
+        if (
+            isinstance(wall, Wall)
+            and MODULI.least <= wall.youngs_modulus < PLASTIC
+            and wall.thickness < THIN * self.diameter
+        ):
+            text = (f"{wall.youngs_modulus:g} Pa is softer than any plastic, {PLASTIC:g} Pa, and as rubber a wall of "
+                    f"{wall.thickness:g} m is too thin for a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
+            yield ("wall", "youngs_modulus"), wall.youngs_modulus, PLASTIC, text

@@ -10,9 +10,10 @@ from fvsolve.parts.head_curve import Efficiency, HeadCurve, Points, ShaftPower, 
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Flag, Quantity, nonnegative, positive
+from fvsolve.parts.value import Flag, Quantity, Usual, nonnegative, positive
 
 EFFICIENCY = 0.75
+SPEEDS = Usual(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of small ones")
 
 
 class Pump(TwoPort, kind="pump"):
@@ -35,10 +36,12 @@ class Pump(TwoPort, kind="pump"):
     curve: Annotated[Points | None, HeadCurve()] = None
     power: Annotated[float | None, Quantity("power", positive, "given to the fluid whatever its flow [W]")] = None
     suter: Annotated[SuterTable | None, Suter()] = None
-    speed: Annotated[Schedule, Scheduled("number", nonnegative, "relative speed")] = Field(
-        default_factory=lambda: constant(1.0)
-    )
-    rated_speed: Annotated[float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]")] = None
+    speed: Annotated[
+        Schedule, Scheduled("number", nonnegative, "relative speed", Usual(0.0, 2.5, "of the rated speed"))
+    ] = Field(default_factory=lambda: constant(1.0))
+    rated_speed: Annotated[
+        float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]", SPEEDS)
+    ] = None
     inertia: Annotated[
         float | None, Quantity("inertia", positive, "of all that turns with the shaft, water too [kg m2]")
     ] = None

@@ -6,8 +6,11 @@ from typing import Annotated, ClassVar
 
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import Quantity, positive
+from fvsolve.parts.value import Quantity, Usual, positive
 from fvsolve.parts.valve import Sized
+
+STROKES = Usual(1e-4, 1e5, "servo valves to motor drives")
+BANDS = Usual(20.0, 1e8, "millimetres of water to servo valves")
 
 
 class Regulating(Sized, TwoPort):
@@ -15,7 +18,9 @@ class Regulating(Sized, TwoPort):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    time_constant: Annotated[float, Quantity("time", positive, "time in which an error of one band moves it fully [s]")]
+    time_constant: Annotated[
+        float, Quantity("time", positive, "time in which an error of one band moves it fully [s]", STROKES)
+    ]
 
 
 class PressureReducing(Regulating, kind="pressure-reducing"):
@@ -25,7 +30,9 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
     """
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="that it keeps at `to` [Pa]")]
-    band: Annotated[float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant")] = 1e5
+    band: Annotated[
+        float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant", BANDS)
+    ] = 1e5
 
 
 class PressureSustaining(Regulating, kind="pressure-sustaining"):
@@ -35,7 +42,9 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
     """
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="that it keeps at `from` [Pa]")]
-    band: Annotated[float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant")] = 1e5
+    band: Annotated[
+        float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant", BANDS)
+    ] = 1e5
 
 
 class FlowControl(Regulating, kind="flow-control"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.disc import Disc
+from fvsolve.parts.disc import DROPS, Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import Quantity, positive
 from fvsolve.parts.valve import Sized
@@ -20,4 +20,6 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     set_pressure: Annotated[float, Quantity("pressure", about="at `from` above which it opens [Pa]")]
-    overpressure: Annotated[float, Quantity("pressure_drop", positive, "above set_pressure that opens it fully [Pa]")]
+    overpressure: Annotated[
+        float, Quantity("pressure_drop", positive, "above set_pressure that opens it fully [Pa]", DROPS)
+    ]

@@ -21,6 +21,7 @@ from fvsolve.parts.value import (
     Rows,
     Setting,
     Text,
+    Usual,
     Value,
     anything,
     check_rising,
@@ -90,6 +91,7 @@ class Scheduled(Value):
     dimension: str
     range: Range = anything
     about: str = ""
+    usual: Usual | None = None
 
     def read(self, given: Any, setting: Setting) -> Schedule:
         if isinstance(given, Schedule):

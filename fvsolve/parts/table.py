@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -50,6 +51,7 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True)
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # keys of which one at most is given
+    meant: ClassVar[dict[str, str]] = {}  # keys of other programs -> what says it here
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
@@ -67,7 +69,7 @@ class Table(BaseModel):
         if isinstance(given, cls):
             return given
         if not isinstance(given, dict):
-            raise Misfit([((), f"{show(given)} is no table; wanted keys of {listing(cls.keys())}")])
+            raise Misfit([((), f"{show(given)} is no table; wanted {cls.wanted(given)}")])
         faults = cls.key_faults(given)
         try:
             given = cls.in_numbers(given, setting_of(info))
@@ -76,7 +78,7 @@ class Table(BaseModel):
         try:
             made = handler(given)
         except ValidationError as error:
-            raise Misfit(faults + misfits(error, cls.keys())) from None
+            raise Misfit(faults + misfits(error, cls.keys(), cls.meant)) from None
         if faults:
             raise Misfit(faults)
         return made
@@ -85,6 +87,15 @@ class Table(BaseModel):
     def keys(cls) -> list[str]:
         """The keys the file may use."""
         return [info.alias or name for name, info in cls.model_fields.items()]
+
+    @classmethod
+    def wanted(cls, given: Any) -> str:
+        """What a value should have been that is no table."""
+        return f"keys of {listing(cls.keys())}"
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        """What is odd of its keys beside one another: (keys, value, limit, text)."""
+        yield from ()
 
     def table(self) -> dict[str, Any]:
         """The table that reads back as this object: SI numbers, defaults filled in, absent keys left out."""
@@ -140,11 +151,13 @@ def at_most_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tupl
 
 def at_least_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
     """The fault of none of the keys given."""
-    return [] if any(key in given for key in keys) else [((), f"wanted one of {', '.join(keys)}")]
+    if any(key in given for key in keys):
+        return []
+    return [((), f"wanted one of {', '.join(keys)}" if len(keys) > 1 else f"{keys[0]} is missing")]
 
 
-def misfits(error: ValidationError, keys: list[str]) -> list[tuple[tuple[Any, ...], str]]:
-    """Pydantic's errors in our words, with the keys they lie under."""
+def misfits(error: ValidationError, keys: list[str], meant: dict[str, str] = {}) -> list[tuple[tuple[Any, ...], str]]:  # noqa: B006
+    """Pydantic's errors in our words, with the keys they lie under; `meant` : unknown keys -> what says it here."""
     found = []
     for one in error.errors(include_url=False):
         place, cause = tuple(one["loc"]), one.get("ctx", {}).get("error")
@@ -153,7 +166,8 @@ def misfits(error: ValidationError, keys: list[str]) -> list[tuple[tuple[Any, ..
         elif one["type"] == "missing":
             found.append((place[:-1], f"{place[-1]} is missing"))
         elif one["type"] == "extra_forbidden":
-            found.append((place, f"unknown key{_near(str(place[-1]), keys)}"))
+            hint = meant.get(str(place[-1]).casefold().replace("-", "_"))
+            found.append((place, f"unknown key{f'; say {hint}' if hint else _near(str(place[-1]), keys)}"))
         else:
             found.append((place, str(cause) if cause else one["msg"]))
     return found

@@ -18,11 +18,14 @@ from fvsolve.parts.value import (
     Quantity,
     Rows,
     Setting,
+    Usual,
     Value,
     check_rising,
     nonnegative,
     positive,
 )
+
+LEVELS = Usual(0.0, 2000.0, "tanks to lakes and shafts")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,8 @@ class Surface(Value):
     """A free surface: one area, or a table of areas over levels."""
 
     about = "free surface [m2], or { level = [...], area = [...] }"
+    usual = Usual(1e-6, 1e10, "tubes to lakes")
+    dimension = "area"
     keys = {"level": (Rows("level", nonnegative), NEEDED), "area": (Rows("area", positive), NEEDED)}
 
     def read(self, given: Any, setting: Setting) -> float | AreaTable:
@@ -88,8 +93,8 @@ class Tank(Node, kind="tank"):
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
-    level: Annotated[float, Quantity("level", nonnegative, "level at the start, above its bottom [m]")]
-    height: Annotated[float | None, Quantity("level", positive, "level above which it spills [m]")] = None
+    level: Annotated[float, Quantity("level", nonnegative, "level at the start, above its bottom [m]", LEVELS)]
+    height: Annotated[float | None, Quantity("level", positive, "level above which it spills [m]", LEVELS)] = None
     connection: Annotated[Connection | None, Joined()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
@@ -64,6 +64,14 @@ class Range:
         return f"between {self.least:g} and {self.greatest:g}"
 
 
+class Usual(NamedTuple):
+    """The values that practice knows, SI, both ends among them; outside a number is legal, but noted. 0 is none."""
+
+    least: float
+    greatest: float
+    practice: str  # whose, or what it spans
+
+
 anything = Range()
 positive = Range(0, open=True)
 nonnegative = Range(0)
@@ -101,6 +109,7 @@ class Quantity(Value):
     dimension: str
     range: Range = anything
     about: str = ""
+    usual: Usual | None = None
 
     def read(self, given: Any, setting: Setting) -> float:
         value = units.parse(given, self.dimension)
@@ -123,9 +132,9 @@ class Quantity(Value):
         return {"type": ["number", "string"], "examples": [example], "x-dimension": self.dimension}
 
 
-def Number(range: Range = anything, about: str = "") -> Quantity:
+def Number(range: Range = anything, about: str = "", usual: Usual | None = None) -> Quantity:
     """A number without a unit."""
-    return Quantity("number", range, about)
+    return Quantity("number", range, about, usual)
 
 
 @dataclass(frozen=True)
@@ -152,12 +161,18 @@ class Choice(Value):
     what: str
     words: Collection[str]
     about: str = ""
+    meant: Mapping[str, str] = field(default_factory=dict)  # words of others -> what says it here
 
     def read(self, given: Any, setting: Setting) -> str:
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is no text; wanted one of {', '.join(self.words)}")
         if given not in self.words:
-            hint = did_you_mean(given, self.words) or f"; wanted one of {', '.join(self.words)}"
+            said = self.meant.get(given.casefold().replace("_", "-"))
+            hint = (
+                f"; say {said}"
+                if said
+                else did_you_mean(given, self.words) or f"; wanted one of {', '.join(self.words)}"
+            )
             raise ValueError(f"no {self.what} named {show(given)}{hint}")
         return given
 

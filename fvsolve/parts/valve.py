@@ -20,6 +20,7 @@ from fvsolve.parts.value import (
     Quantity,
     Rows,
     Setting,
+    Usual,
     Value,
     between,
     check_rising,
@@ -28,6 +29,7 @@ from fvsolve.parts.value import (
 
 DISCHARGE_COEFFICIENT = 0.61  # sharp edge
 GALLON, PSI, MINUTE = 3.785411784e-3, 6894.757293168361, 60.0
+COEFFICIENTS = Usual(1e-6, 1e6, "metering valves to butterfly valves of dams")
 WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defined [kg/m3]
 
 
@@ -98,10 +100,14 @@ class Sized(Table):
 
     discharge_coefficient: Annotated[float | None, Number(between(0, 1, open=True), "Cd, with area or diameter")] = None
     loss_coefficient: Annotated[float | None, Number(positive, "K on the velocity in area or diameter")] = None
-    Kv: Annotated[float | None, Number(positive, "m3/h of water at 1 bar")] = None
-    Cv: Annotated[float | None, Number(positive, "US gpm of water at 1 psi")] = None
-    area: Annotated[float | None, Quantity("area", positive, "of the opening [m2]")] = None
-    diameter: Annotated[float | None, Quantity("length", positive, "of the opening [m]")] = None
+    Kv: Annotated[float | None, Number(positive, "m3/h of water at 1 bar", COEFFICIENTS)] = None
+    Cv: Annotated[float | None, Number(positive, "US gpm of water at 1 psi", COEFFICIENTS)] = None
+    area: Annotated[
+        float | None, Quantity("area", positive, "of the opening [m2]", Usual(1e-12, 200.0, "leaks to sluices"))
+    ] = None
+    diameter: Annotated[
+        float | None, Quantity("length", positive, "of the opening [m]", Usual(1e-6, 14.0, "leaks to sluices"))
+    ] = None
     laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which it is laminar")] = None
 
     def model_post_init(self, _: Any) -> None:
@@ -136,12 +142,19 @@ class Sized(Table):
         return self.discharge_coefficient * area
 
 
+CLOSURE = 'opening = { start = "1 s", duration = "2 s", value = [1, 0] }'
+
+
 class Valve(Sized, TwoPort, kind="valve"):
     """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
 
     Ports: from, to; both directions alike; opening 0 is exactly no flow. Stored energy: none. Dissipated
     power: dp q [W].
     """
+
+    meant: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("closing_time", "closure_time", "close_time", "closing", "opening_time", "stroke_time", "schedule"), CLOSURE
+    )
 
     opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = Field(
         default_factory=lambda: constant(1.0)

@@ -11,10 +11,10 @@ import re
 from typing import Any
 
 from fvsolve.units.outside import ask_pint
-from fvsolve.units.spellings import DIMENSIONS, MEANT, UNITS, Dimension, Unit
+from fvsolve.units.spellings import DIMENSIONS, LIKELY, MEANT, UNITS, Dimension, Unit
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "parse", "show", "vacuum",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "vacuum",
     "wanted",
 ]  # fmt: skip
 
@@ -93,6 +93,16 @@ def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0)
     if found.gauge and dimension == "pressure":
         value_si = value_si - ambient
     return found.number(value_si)
+
+
+def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
+    """'; did you mean "304.8 mm"?': the number of `given` in the unit that brings it from `least` to `greatest`, SI."""
+    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+    number, said = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
+    fit = [unit for unit, weight in LIKELY.get(DIMENSIONS[dimension].base or dimension, {}).items()
+           if unit != _plain(said) and least <= weight * UNITS[unit].si(float(number)) <= greatest]  # fmt: skip
+    fit = [show(f"{number} {unit}") for unit in fit[: 2 if dimension == "viscosity" else 1]]
+    return f"; did you mean {' or '.join(fit)}?" if fit else ""
 
 
 def wanted(dimension: str) -> str:

@@ -232,3 +232,23 @@ MEANT = {
     "centistokes": "cSt",
     "centipoise": "cP", "kg": "", "kg/s": "", "kg/h": "", "t/h": "",
 }  # fmt: skip
+
+# Units in which a number that is far off was probably meant, the likeliest first -> what brings them to SI beside their
+# factor: a kinematic viscosity counts in water.
+LIKELY = {
+    dimension: dict.fromkeys(units, 1.0) | ({"cSt": 1000.0} if dimension == "viscosity" else {})
+    for dimension, units in {
+        "length": ("mm", "um", "cm", "m", "in"),
+        "area": ("mm2", "cm2", "m2"),
+        "volume": ("l", "cm3", "mm3", "m3"),
+        "time": ("ms", "s", "us", "min"),
+        "pressure": ("GPa", "bar", "MPa", "kPa", "Pa"),
+        "velocity": ("m/s", "km/s", "mm/s", "ft/s"),
+        "density": ("g/cm3", "kg/m3"),
+        "viscosity": ("mPa s",),
+        "temperature": ("degC",),
+        "mass": ("kg", "g", "t"),
+        "frequency": ("Hz", "kHz"),
+        "angular_velocity": ("rpm",),
+    }.items()
+}

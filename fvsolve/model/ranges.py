@@ -1,0 +1,66 @@
+"""What is odd of the flow that a run starts from, and of cells too few for their scheme. Knows numbers of pipes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import Notice, listing
+
+QUICKEST = 60.0  # of pipe flow [m/s]: penstocks keep below 10, jets of 180 m of head reach it
+LAMINAR, AT_REST = 2000.0, 1.0  # Reynolds numbers below which a flow is laminar, and none at all
+WIDE, WATERY = 0.05, (950.0, 1050.0)  # pipes [m] and liquids [kg/m3] in which flow is turbulent: mains, not oil drives
+FEWEST = {"upwind5": 3, "weno5": 3}  # cells that a scheme of five needs to be what it is
+SHORT = 0.1  # of the longest travel time: pipes that may have fewer
+
+
+def flow_notices(scene: Any) -> list[Notice]:
+    """Notices of velocity, of laminar water, of cells; one each for all pipes, at the worst of them."""
+    if not scene.pipe_names:
+        return []
+    return [*_quick(scene), *_laminar(scene), *_coarse(scene)]
+
+
+def _quick(scene: Any) -> list[Notice]:
+    names, pipes = scene.pipe_names, scene.pipe_table
+    speed = np.abs(pipes["flow"]) / (scene.fluid.density * pipes["area"])
+    worst = int(np.argmax(speed))
+    if speed[worst] <= QUICKEST:
+        return []
+    text = (f"{_all(names, speed > QUICKEST)}: {speed[worst]:.4g} m/s at the start in {names[worst]}, above "
+            f"{QUICKEST:g} m/s; a flow or a diameter in other units?")  # fmt: skip
+    return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), QUICKEST)]
+
+
+def _laminar(scene: Any) -> list[Notice]:
+    """Where the quickest flow of water in wide pipes is laminar: a flow or a viscosity in other units."""
+    names, pipes, fluid = scene.pipe_names, scene.pipe_table, scene.fluid
+    if not fluid.viscosity or not WATERY[0] <= fluid.density <= WATERY[1]:
+        return []
+    reynolds = np.abs(pipes["flow"]) * pipes["diameter"] / (pipes["area"] * fluid.viscosity)
+    reynolds = np.where(pipes["diameter"] >= WIDE, reynolds, 0.0)
+    worst = int(np.argmax(reynolds))
+    if not AT_REST < reynolds[worst] < LAMINAR:
+        return []
+    flow = float(abs(pipes["flow"][worst]) / fluid.density)
+    text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar as water hardly is in "
+            f"pipes this wide; are {flow:.4g} m3/s and a viscosity of {fluid.viscosity:.4g} Pa s right?")  # fmt: skip
+    return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
+
+
+def _coarse(scene: Any) -> list[Notice]:
+    scheme, cells = scene.case.numerics.scheme, scene.pipe_table["cells"]
+    travel = cells * scene.pipe_table["dx"] / scene.pipe_table["speed"]
+    few = (cells < FEWEST.get(scheme, 0)) & (travel > SHORT * travel.max())
+    if not few.any():
+        return []
+    worst = int(np.argmax(np.where(few, travel, 0.0)))
+    fewest = FEWEST[scheme]
+    text = (f"{_all(scene.pipe_names, few)}: fewer than {fewest} cells, where {scheme} has no room and is of first "
+            f'order; {fewest} cells at least, or scheme = "upwind"')  # fmt: skip
+    return [Notice("range", f"links.{scene.pipe_names[worst]}", text, "cells", float(cells[worst]), float(fewest))]
+
+
+def _all(names: list[str], chosen: np.ndarray) -> str:
+    return listing([name for name, one in zip(names, chosen, strict=True) if one], 6)
