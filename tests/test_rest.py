@@ -196,7 +196,8 @@ def test_what_the_ledger_says_flowed_out_is_the_demand():
     links = {"main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 20)}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["gate.pressure"]))
-    assert result.ledger["mass"]["outflow"] == pytest.approx(1000.0 * (0.05 + 4 * 0.01), rel=1e-9)
+    gate = result.ledger["mass"]["nodes"]["gate"]  # the lake takes some of it back, as waves come and go
+    assert gate == {"inflow": 0.0, "outflow": pytest.approx(1000.0 * (0.05 + 4 * 0.01), rel=1e-9)}
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

@@ -24,8 +24,7 @@ class Functions:
             self.rhs = self.one(calls.RHS, rates, calls.rhs_in_turn)
         for job, name in INSIDE.items():
             self.enter(job, scene.functions(name))
-        if scene.kinds:  # their events are read off closed nodes
-            self.enter(calls.CLOSE, scene.functions("before", "core"))
+        self.enter(calls.CLOSE, scene.functions("before", "core"))
         self.observe = self.one(calls.OBSERVE, scene.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, scene.functions("record"))
         self.enter(calls.EVENTS, scene.functions("events"))

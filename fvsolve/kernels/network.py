@@ -8,6 +8,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.calls import BRAKE, MOVE, run
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.pipes import family_of, pipe_rates
 from fvsolve.kernels.records import (
@@ -111,7 +112,7 @@ def stiffness_of(nodes, layout, out, i):
 
 @njit(forceinline=True)
 def stored_rates(y, dydt, out, tables):
-    """d/dt of stored masses; what reservoirs give, tanks spill, and dry tanks are asked for goes to supply."""
+    """d/dt of stored masses; what reservoirs give, full tanks spill, dry ones are asked for is supply."""
     layout, nodes, armed = tables[I_LAYOUT][0], tables[I_NODES], tables[I_ARMED]
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
@@ -121,8 +122,8 @@ def stored_rates(y, dydt, out, tables):
         if kind == FIXED:
             supply = -net
         elif kind == TANK:
-            k = 2 * nodes[i]["row"]  # as `events` numbers them: empty, full
-            if (armed[k] > 0.0 and net < 0.0) or (armed[k + 1] > 0.0 and net > 0.0):
+            k = EVENTS * nodes[i]["row"]
+            if armed[k + BOTTOM] > 0.0 or armed[k + RIM] > 0.0:
                 supply = -net
         if kind != FIXED and dydt.size > 0:
             dydt[nodes[i]["y"]] = net + supply

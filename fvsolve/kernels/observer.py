@@ -1,9 +1,13 @@
 """What is read off a state: probes, least and greatest values, marks and events. Changes no state."""
 
 from fvsolve.jit import njit
+from fvsolve.kernels.calls import CLOSE, run
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM, base_mass, limit_events, near
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
+    I_ARMED,
+    I_DEVICES,
     I_ENVELOPE,
     I_EXTREMES,
     I_FLOATS,
@@ -27,6 +31,7 @@ from fvsolve.kernels.tanks import tank_level
 
 HUGE = 1e100  # waves beyond it are not finite, though their squares might still be
 BLOCK = 64
+TRACE = 1e-9  # of a level [m/s]: a slower supply of a tank is rounding, and no mark
 STOP_HERE = -2.0  # in out[WHERE]: the run is to end
 
 
@@ -186,7 +191,7 @@ def record_nodes(t, y, out, handle, values):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
             marks[at] = t
-        if nodes[i]["kind"] == TANK and out[layout["supply"] + i] != 0.0:
+        if nodes[i]["kind"] == TANK and abs(out[layout["supply"] + i]) > TRACE * base_mass(nodes[i]):
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
                 marks[at] = t
@@ -198,11 +203,17 @@ def record_nodes(t, y, out, handle, values):
 
 @njit
 def tank_events(t, y, out, handle, g):
-    """Functions that are located where they fall through zero: a tank's content, and its room below the rim."""
+    """Event functions of the bottom and the rim of tanks; at either nodes are closed, as what flows then counts."""
     tables = open_tables(handle)
-    nodes, k = tables[I_NODES], 0
+    nodes, armed, closed = tables[I_NODES], tables[I_ARMED], tables[I_DEVICES].size > 0  # whose events have done so
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK:
-            stored = nodes[i]["mass"] + y[nodes[i]["y"]]
-            g[k], g[k + 1] = stored, nodes[i]["full"] - stored
-            k += 2
+            node, k = nodes[i], EVENTS * nodes[i]["row"]
+            stored = node["mass"] + y[node["y"]]
+            room = node["full"] - stored
+            if not closed and (near(node, stored) or near(node, room)):
+                run(CLOSE, t, y, y[:0], out, handle)
+                closed = True
+            net = out[tables[I_LAYOUT][0]["net"] + i]
+            limit_events(node, armed, g, k + BOTTOM, stored, net)
+            limit_events(node, armed, g, k + RIM, room, -net)

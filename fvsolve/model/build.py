@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.errors import CaseError, Fault, Notice
+from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
@@ -359,7 +360,7 @@ class Scene:
             self.device_table, self.basin_table, self.patch_table, self.scalar_table,
             np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
             np.zeros(max((5 if many else 4) * most + 64, system, 2 * len(self.body_table), 4 * carried)), marks,
-            np.zeros(2 * (self.tanks + len(self.stop_table)) + len(self.events)), np.zeros(at),
+            np.zeros(limits.EVENTS * self.tanks + len(self.events) + 2 * len(self.stop_table)), np.zeros(at),
             self.plane(),
             pieces, envelope, extremes,
         )  # fmt: skip

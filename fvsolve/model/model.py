@@ -234,7 +234,7 @@ class Model(Shown):
         """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
         t, y = self.given(t, y)
         armed, g = self.tables[rec.I_ARMED], np.zeros(self.tables[rec.I_ARMED].size)
-        for _ in range(1 + 2 * len(self.events)):
+        for _ in range(3 + 2 * len(self.events)):
             self.functions.events(t, y, self.handle, g)
             changed = np.any((g <= 0.0) != (armed > 0.0))
             armed[:] = g <= 0.0

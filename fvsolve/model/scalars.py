@@ -133,22 +133,30 @@ def amount(model, q: int, y: np.ndarray) -> float:
 
 
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
-    """Of each scalar: stored, come in, gone out, decayed, and the remainder [kg, times its unit]."""
+    """Of each scalar: stored, come in, gone out, decayed, and the remainder [kg, times its unit].
+
+    ledger : float64[2, m]  what came in, and, negative, what went out
+    """
     found, n = {}, len(model.node_names)
     for q, (name, row) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
-        own, lost = ledger[n + q * n : n + (q + 1) * n], ledger[n * (1 + len(model.case.scalars)) + row["loss"] :]
-        decayed = -float(np.sum(lost[: row["losses"]]))
+        both = ledger[:, n + q * n : n + (q + 1) * n]
+        lost = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
+        decayed = -float(np.sum(lost[:, : row["losses"]]))
         initial, final = amount(model, q, model.start), amount(model, q, y)
-        gained = [float(x) for x in own]
-        remainder = final - initial - (float(np.sum(own)) - decayed)
-        moved = max(abs(initial), abs(final), float(np.sum(np.abs(own))) + abs(decayed))
+        remainder = final - initial - (float(np.sum(both)) - decayed)
+        moved = max(abs(initial), abs(final), float(np.sum(np.abs(both))) + abs(decayed))
         found[name] = {
             "initial": initial,
             "final": final,
-            "inflow": sum(x for x in gained if x > 0),
-            "outflow": sum(-x for x in gained if x < 0),
+            "inflow": float(both[0].sum()),
+            "outflow": float(-both[1].sum()),
             "decayed": decayed,
-            "by_node": {node: x for node, x in zip(model.node_names, gained, strict=True) if x != 0.0},
+            "by_node": {node: float(x) for node, x in zip(model.node_names, both.sum(axis=0), strict=True) if x != 0.0},
+            "nodes": {
+                node: {"inflow": float(x), "outflow": float(-y)}
+                for node, x, y in zip(model.node_names, *both, strict=True)
+                if x != 0.0 or y != 0.0
+            },
             "remainder": remainder,
             "relative": abs(remainder) / moved if moved > 0.0 else 0.0,
         }

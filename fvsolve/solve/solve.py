@@ -25,6 +25,7 @@ from fvsolve.solve.summary import (
 )
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
+from fvsolve.steppers.ledger import SUMS
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
@@ -326,8 +327,8 @@ class Run:
             self.save()
         if reason == "finished":
             self.waves.look(loop.t, loop.now)
-        ledger = loop.stepper.ledger[: loop.stepper.ledger.size // 2]
-        ledgers = {"mass": mass_ledger(model, loop.now, ledger[: len(model.node_names)])}
+        ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
+        ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers), *run_downs(model)]
         ok = reason == "finished" and all(one.ok for one in warnings)

@@ -162,27 +162,26 @@ def relative(remainder: float, largest: float) -> float:
 
 
 def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
-    """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the largest term."""
-    nodes = model.tables[rec.I_NODES]
+    """Stored, come in, gone out, and the remainder [kg]; `relative` is the remainder over the largest term.
+
+    ledger : float64[2, nodes]  what came in by each, and, negative, what went out
+    """
+    kinds = model.tables[rec.I_NODES]["kind"]
     initial, change = model.contents(y)
     passes = {int(row["node"]) for row in model.tables[rec.I_PATCHES] if row["open"]}
-    named = list(zip(range(len(nodes)), model.node_names, ledger, nodes, strict=True))
-    tanks = [(x, row["full"]) for i, _, x, row in named if row["kind"] in (rec.TANK, rec.PATCH) and i not in passes]
-    spilled = sum(-x for x, full in tanks if x < 0 and full < np.inf)
-    made_up = sum(x for x, full in tanks if x > 0 or full == np.inf)
-    outside = [(name, float(x)) for i, name, x, row in named
-               if row["kind"] in (rec.FIXED, rec.JUNCTION) or i in passes]  # fmt: skip
+    own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]  # that make up for it
+    words = [("made_up", "spilled") if within else ("inflow", "outflow") for within in own]
+    rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
+    nodes = {name: {come: float(x), gone: float(0.0 - y)} for name, (come, gone), x, y in rows if x != 0.0 or y != 0.0}
+    total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
     remainder = change - float(np.sum(ledger))
-    come, gone = sum(x for _, x in outside if x > 0), sum(-x for _, x in outside if x < 0)
-    largest = max(initial, initial + change, come, gone, float(spilled), float(made_up))
+    largest = max(initial, initial + change, *total.values()) if total else max(initial, initial + change)
     return {
         "initial": initial,
         "final": initial + change,
-        "inflow": come,
-        "outflow": gone,
-        "spilled": float(spilled),
-        "made_up": float(made_up),
-        "by_node": {name: x for name, x in outside if x != 0.0},
+        **{word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")},
+        "by_node": {name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row},
+        "nodes": nodes,
         "remainder": remainder,
         "relative": relative(remainder, largest),
     }

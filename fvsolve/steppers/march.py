@@ -8,9 +8,10 @@ import functools
 from math import isfinite
 
 from fvsolve.jit import njit
-from fvsolve.steppers.coefficients import row_of, weights_of
+from fvsolve.steppers.coefficients import error_of, row_of, weights_of
 from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
+from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.orders import (
     BAD_STATUS,
     BAD_VALUE,
@@ -47,6 +48,7 @@ from fvsolve.steppers.orders import (
     READY,
     REJECTIONS,
     SEEN,
+    SIZE,
     STATUS,
     STEP,
     STEPS,
@@ -63,7 +65,7 @@ from fvsolve.steppers.orders import (
 )
 from fvsolve.steppers.rows import emit, next_due
 from fvsolve.steppers.signatures import function_types
-from fvsolve.steppers.step import add_stored, all_finite, book, copy
+from fvsolve.steppers.step import add_stored, all_finite, copy
 
 
 @njit(forceinline=True)
@@ -86,7 +88,7 @@ def march(
     leap(t, h, y, y_new, out, handle, values), where orders[LEAPS] allows it, is a whole step to t of a method of one
     stage, with the `out` and the record of its end: taken wherever no row is due;
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
-    ledger : float64[2 m], sums of out[where:] with the step's own weights, and their carries; stored : int64[q],
+    ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
     within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
     implicit step keeps.
@@ -122,7 +124,8 @@ def march(
             if out[STATUS] != 0.0:
                 return BAD_STATUS
             if memory[UNBOOKED] > 0.0:
-                book(memory[UNBOOKED], b, supply, ledger)
+                known = steep and work[KNOWN] == 1.0
+                book(memory[UNBOOKED], b, supply, dense, steep, known, out[where:], ledger)
                 memory[UNBOOKED] = 0.0
             for m in range(supply.shape[1]):
                 supply[0, m] = out[where + m]
@@ -178,6 +181,8 @@ def march(
                 continue
             if orders[CONTROL] != TOLERANCE:
                 break
+            if scale.size == 0:
+                e = book_error(h, error_of(coefficients, s), supply, orders[SIZE], ledger)
             if e <= 1.0 or (e == e and rest <= 1e3 * shortest(orders, memory)):  # round-off rules before a kink
                 grow = grown(orders, memory, h, e)
                 if failed == NEWTON_STUCK:

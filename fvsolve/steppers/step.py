@@ -1,4 +1,4 @@
-"""What steps of every kind share: sums, error norm, dense output, ledgers. Knows arrays; controls nothing."""
+"""What steps of every kind share: sums, error norm, dense output. Knows arrays; controls nothing."""
 
 from math import sqrt
 
@@ -130,14 +130,3 @@ def add_stored(h, b, k, y, y_new, stored, carry):
         changed = changed or new != y_new[i]
         y_new[i] = new
     return changed
-
-
-@njit(forceinline=True)
-def book(h, b, supply, ledger):
-    """Add a step of length h to the ledger, by the step's own weights; only once its end is known to be sound."""
-    count = supply.shape[1]
-    for m in range(count):
-        total = 0.0
-        for i in range(b.size):
-            total += b[i] * supply[i, m]
-        ledger[m], ledger[count + m] = add_up(ledger[m], h * total, ledger[count + m])

@@ -11,6 +11,7 @@ import numpy as np
 from fvsolve.jit import argument, beside
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.coefficients import coefficients
+from fvsolve.steppers.ledger import SUMS
 from fvsolve.steppers.march import compiled
 from fvsolve.steppers.signatures import compiled_step, no_algebra
 from fvsolve.steppers.structure import Structure
@@ -28,7 +29,7 @@ class Stepper:
         self, method: Method, n: int, ledgers: int, structure: Callable[[], Structure], scale: np.ndarray
     ) -> None:
         self.structure, self.scale, self.march = structure, scale, compiled()
-        self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(2 * ledgers)
+        self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(SUMS * ledgers)
         self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
         self.flags = np.array([told.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -41,7 +42,7 @@ class Stepper:
 
     def use(self, method: Method) -> None:
         """Step by this method from now on."""
-        n, ledgers = self.scale.size, self.ledger.size // 2
+        n, ledgers = self.scale.size, self.ledger.size // SUMS
         self.method = method
         self.coefficients, self.dense, s = coefficients(method)
         self.algebra = no_algebra()

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 
 
@@ -114,7 +115,7 @@ def lower_devices(scene) -> None:
         for state, scale in zip(states, device.scales(scene, name, part), strict=True):
             at = scene.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
-        row["event"] = 2 * scene.tanks + len(scene.events)
+        row["event"] = limits.EVENTS * scene.tanks + len(scene.events)
         scene.events += [(name.removesuffix(".inside"), text) for text in device.events]
 
 

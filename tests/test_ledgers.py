@@ -1,0 +1,119 @@
+"""What the mass ledger says: gross, by node, one-sided, and as much as has flowed, under every family of methods."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from truth import scenes, vessels
+from truth.scenes import AMBIENT, GRAVITY, lake, reservoir, scene, tank, valve
+
+import fvsolve
+
+ADAPTIVE = ("auto", "rodas-5p", "rodas-4", "radau-iia-5", "tr-bdf2", "esdirk-4", "dormand-prince", "bogacki-shampine")
+FIXED = ("rk4", "ssp-rk3", "trapezoid", "implicit-midpoint", "alexander-3", "gauss-4", "lobatto-iiic-4")
+
+
+def settings(method: str, step: float, rtol: float = 1e-6) -> dict:
+    return {"method": method, "step": step} if method in FIXED else {"method": method, "rtol": rtol}
+
+
+def drains(section: float, bore: float, numerics: dict, level: float = 3.0, end: float = 1500.0):
+    nodes = {"vat": tank(section, level), "air": reservoir(AMBIENT)}
+    links = {"hole": {"type": "orifice", "from": "vat", "to": "air", "diameter": bore}}
+    return fvsolve.run(scene(nodes, links, end, numerics, ["hole.flow"], 1.0))
+
+
+@pytest.mark.parametrize("method", ["auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "rk4"])
+def test_a_tank_that_runs_empty_makes_up_no_water(method):
+    for section in (0.5, 1.0, 2.0, 3.0, 5.0):
+        for bore in (0.05, 0.08, 0.1):
+            result = drains(section, bore, settings(method, 0.25))
+            mass, contents = result.ledger["mass"], 3000.0 * section
+            left = vessels.prism(section, 0.61 * scenes.area(bore), 3.0, np.array([1500.0]))[0]
+            assert result.ok and not result.marks
+            assert mass["outflow"] == pytest.approx(contents - mass["final"], abs=1e-8 * contents)
+            assert mass["final"] == pytest.approx(1000.0 * section * left, abs=5e-6 * contents)  # as steps are
+            assert max(mass["made_up"], mass["spilled"], mass["inflow"]) <= 1e-8 * contents
+            assert min(mass["made_up"], mass["spilled"], mass["inflow"]) >= 0.0
+            assert abs(mass["remainder"]) <= 1e-12 * contents
+
+
+def test_an_explicit_method_makes_up_none_either():
+    mass = drains(2.0, 0.08, settings("dormand-prince", 0.25), end=600.0).ledger["mass"]
+    assert mass["outflow"] == pytest.approx(6000.0, rel=1e-6) and mass["made_up"] <= 6e-8 and mass["spilled"] <= 6e-8
+
+
+@pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
+def test_what_spills_and_what_is_made_up_are_rows_of_their_own(method):
+    flow = {"time": [0.0, 100.0], "value": [0.01, -0.03], "kind": "step"}
+    nodes = {"mouth": {"type": "inflow", "flow": flow}, "vat": tank(1.0, 1.9, height=2.0)}
+    links = {"way": {"type": "valve", "from": "mouth", "to": "vat", "diameter": 0.1}}
+    result = fvsolve.run(scene(nodes, links, 200.0, settings(method, 0.3), ["vat.level"], 1.0))
+    mass = result.ledger["mass"]
+    truth = {"inflow": 1000.0, "outflow": 3000.0, "spilled": 900.0, "made_up": 1000.0}
+    assert {key: mass[key] for key in truth} == pytest.approx(truth, rel=1e-9)
+    assert mass["nodes"]["mouth"] == pytest.approx({"inflow": 1000.0, "outflow": 3000.0}, rel=1e-9)
+    assert mass["nodes"]["vat"] == pytest.approx({"spilled": 900.0, "made_up": 1000.0}, rel=1e-9)
+    assert mass["by_node"] == pytest.approx({"mouth": -2000.0}, rel=1e-9)
+    assert abs(mass["remainder"]) < 1e-9
+    assert [(mark.what, mark.time) for mark in result.marks] == [
+        ("dry", pytest.approx(100.0 + 2000.0 / 30.0)), ("spilling", pytest.approx(10.0)),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
+def test_a_dry_tank_fills_again_and_a_full_one_empties(method):
+    """Triangles of 20 l/s, each of which brings or takes 500 l: the tank of 300 l spills and runs dry by turns."""
+    times = [0.0, *np.arange(25.0, 400.0, 50.0).tolist(), 400.0]
+    flow = {"time": times, "value": [0.0, *(4 * [0.02, -0.02]), 0.0]}
+    nodes = {"mouth": {"type": "inflow", "flow": flow}, "vat": tank(1.0, 0.1, height=0.3)}
+    links = {"way": {"type": "valve", "from": "mouth", "to": "vat", "diameter": 0.3}}
+    mass = fvsolve.run(scene(nodes, links, 400.0, settings(method, 0.25), ["vat.level"], 1.0)).ledger["mass"]
+    truth = {"inflow": 2000.0, "outflow": 2000.0, "spilled": 300.0 + 3 * 200.0, "made_up": 4 * 200.0, "final": 0.0}
+    assert {key: mass[key] for key in truth} == pytest.approx(truth, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
+def test_what_swings_to_and_fro_counts_on_both_sides(method):
+    """Between a lake and a tank z = z0 cos(w t), w^2 = g A_c / (L A), and each period brings 2 z0 A both ways."""
+    section, bore, length, swing, periods = 0.5, 0.3, 100.0, 0.4, 3
+    period = 2 * math.pi / math.sqrt(GRAVITY * scenes.area(bore) / (length * section))
+    nodes = {"lake": lake(2.0, elevation=0.0), "vat": tank(section, 2.0 + swing, elevation=0.0)}
+    links = {"way": {"type": "rigid-column", "from": "lake", "to": "vat", "length": length, "diameter": bore,
+                     "friction": scenes.NO_FRICTION}}  # fmt: skip
+    numerics = settings(method, period / 2000, 1e-9)
+    mass = fvsolve.run(scene(nodes, links, periods * period, numerics, ["way.flow"], period)).ledger["mass"]
+    each = 2 * 1000.0 * section * swing * periods
+    near = 1e-5 if method in ("trapezoid", "implicit-midpoint") else 1e-6
+    assert mass["inflow"] == pytest.approx(each, rel=near) and mass["outflow"] == pytest.approx(each, rel=near)
+
+
+def test_a_reservoir_that_waves_reach_counts_what_its_pipe_says():
+    case = scene(
+        {"lake": reservoir("5 barg"), "gate": scenes.junction(), "air": reservoir(AMBIENT)},
+        {"main": {"type": "pipe", "from": "lake", "to": "gate", "length": 500.0, "diameter": 0.3, "wave_speed": 1000.0,
+                  "cells": 40, "friction": {"model": "steady", "factor": 0.02}},
+         "tap": {**valve("gate", "air", 0.002), "opening": {"start": 0.2, "duration": 1.0, "value": [1.0, 0.0]}}},
+        8.0, {"courant": 0.8, "scheme": "upwind5", "method": "rk4"}, ["main.flow@0"], 0.001,
+    )  # fmt: skip
+    result = fvsolve.run(case)
+    flow, node = 1000.0 * result["main.flow@0"], result.ledger["mass"]["nodes"]["lake"]
+    assert node["inflow"] == pytest.approx(np.trapezoid(np.maximum(flow, 0.0), result.t), rel=1e-5)
+    assert node["outflow"] == pytest.approx(np.trapezoid(np.maximum(-flow, 0.0), result.t), rel=1e-4)
+
+
+@pytest.mark.parametrize("method", [*ADAPTIVE, "rk4"])
+def test_what_a_scene_without_a_state_passes_is_as_accurate_as_its_tolerance(method):
+    """From a pressure that falls through a valve to a demand that follows it: all, some, none (Wagner)."""
+    nodes = {
+        "lake": reservoir({"time": [0.0, 100.0], "value": [AMBIENT + 6e4, AMBIENT - 1e4]}),
+        "town": scenes.junction(0.02, required_pressure=AMBIENT + 4e4, minimum_pressure=AMBIENT + 2e4),
+    }
+    case = scene(nodes, {"way": valve("lake", "town", 0.01)}, 100.0, settings(method, 0.02), ["way.flow"], 0.01)
+    result = fvsolve.run(case)
+    mass, flowed = result.ledger["mass"], np.trapezoid(1000.0 * result["way.flow"], result.t)
+    for word in ("inflow", "outflow"):
+        assert mass[word] == pytest.approx(flowed, rel=5e-6)
+    assert mass["nodes"]["lake"]["outflow"] == 0.0 and mass["nodes"]["town.demand.outside"]["inflow"] == 0.0
