@@ -180,6 +180,9 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
         for k, i in enumerate(anchors, start=len(rows) + len(balances)):
             entries.append((k, column["node", i], 1.0))
         change = _solve(entries, right, len(column), result)
+        if not np.all(np.isfinite(change)):  # what was found last is the best there is
+            result.converged = False
+            return
         result.flow[active] += change[: len(active)] * f_scale
         result.potential[nodes] += change[len(active) :] * p_scale
         before, most = most, np.max(np.abs(change), initial=0.0)
@@ -215,6 +218,8 @@ def _edge_row(entries, column, k, e, edge, result, scale) -> float:
 def _solve(entries, right, size, result):
     """Least-norm solution of the Newton system; remembers whether it had to choose."""
     i, j, values = (np.array(part) for part in zip(*entries, strict=True))
+    if not (np.all(np.isfinite(values)) and np.all(np.isfinite(right))):
+        return np.full(size, np.nan)
     if max(len(right), size) > DENSE:
         found, chosen = _solve_sparse(values, i, j, right, size)
         result.split = result.split or chosen

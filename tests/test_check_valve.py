@@ -239,3 +239,34 @@ def test_bad_check_valves_are_refused(more, text):
     case["links"]["one"] = {**case["links"]["one"], **more}
     with pytest.raises(fvsolve.CaseError, match=text):
         fvsolve.load(case)
+
+
+DEAD_ENDS = {
+    "check valve": check("x", "m"),
+    "spring loaded": check("x", "m", cracking_pressure=2e3),
+    "pump": {"type": "pump", "from": "x", "to": "m", "check_valve": True, "curve": {"flow": [0.05], "head": [20.0]}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("twice", [False, True])
+@pytest.mark.parametrize("name", DEAD_ENDS)
+def test_before_a_valve_that_shuts_it_comes_to_rest(name, twice, turned, law):
+    """Behind it lie a plain junction and a valve that shuts: nothing flows any more, and nothing opens and shuts."""
+    tap = valve("m", "sink", 0.01, ramp(0.1, 0.1, 1.0, 0.0))
+    nodes = {"lake": reservoir(3e5), "x": junction(), "m": junction(), "sink": reservoir(2e5)}
+    links = {"one": DEAD_ENDS[name], "tap": tap}
+    if twice:
+        links["two"] = DEAD_ENDS[name]
+    ends = ("lake", "x")
+    if turned:  # the pipe lies behind the check valve, whose valve that shuts lies before it
+        links = {k: {**link, "from": "m", "to": "x"} for k, link in links.items() if k != "tap"}
+        links["tap"], ends = valve("lake", "m", 0.01, ramp(0.1, 0.1, 1.0, 0.0)), ("x", "sink")
+    links["way"] = pipe(*ends, 50.0, 0.2, 1000.0, 10, friction=FRICTION)
+    for numerics in ({**SHARP, "courant": 0.7}, {"method": "rodas-5p", "rtol": 1e-6}):
+        case = scene(nodes, links, 1.0, numerics, ["one.flow", "tap.flow"], 0.05, fluid={**WATER, "law": law})
+        result = fvsolve.run(case)
+        assert result.ok and len(result.summary["events"]) <= 6, result.reason
+        assert abs(result["one.flow"][-1]) < 1e-12
+        assert not result["tap.flow"][result.t > 0.2 + 1e-9].any()

@@ -291,3 +291,29 @@ def test_flows_that_are_given_are_volumes_at_the_reference_density(where):
     result = fvsolve.run(scene(nodes, {"line": line}, end, {}, ["line.flow@1"], fluid=fluid))
     assert result.ledger["mass"]["inflow"] == pytest.approx(scenes.RHO * flow * end, rel=1e-9)
     assert result["line.flow@1"][-1] == pytest.approx(flow / np.exp(2e8 / 2.2e9), rel=1e-6)
+
+
+@pytest.mark.parametrize("law", ["log", "table"])
+@pytest.mark.parametrize("heads", [(60.0, 58.0), (58.0, 60.0), (60.0, 59.99)])
+@pytest.mark.parametrize("length, diameter", [(30.0, 0.5), (2.0, 2.0), (1.0, 0.05), (500.0, 1.5)])
+def test_a_short_wide_pipe_starts_with_its_friction_and_the_jet_that_leaves_it(law, heads, length, diameter):
+    """f L / D v^2 / 2 + v^2 / 2 = g dH: that the jet takes more than friction, or all but all, does not matter."""
+    fluid = {**scenes.WATER, "law": "log"} if law == "log" else {"name": "Water", "law": "table"}
+    factor = 0.011
+    friction = {"model": "quasi-steady", "factor": factor}
+    links = {"main": stiff_pipe("a", "b", length, diameter, 4, friction=friction)}
+    model = fvsolve.build(
+        fvsolve.load(scene({"a": lake(heads[0]), "b": lake(heads[1])}, links, 1.0, {}, ["main.flow"], 0.1, fluid=fluid))
+    )
+    asked = np.sqrt(2.0 * scenes.GRAVITY * abs(heads[0] - heads[1]) / (factor * length / diameter + 1.0))
+    assert abs(model.checks["pipes"]["main"]["velocity"]) == pytest.approx(asked, rel=1e-3)
+    still = np.abs(model.rhs(0.0, fvsolve.initial_state(model).y))
+    assert still.max() <= 1e-9 * abs(model.checks["pipes"]["main"]["velocity"]) * 1000.0
+
+
+def test_heads_beyond_what_a_law_holds_are_refused_by_the_name_of_the_pipe():
+    fluid = {"name": "Water", "law": "table"}
+    links = {"main": stiff_pipe("a", "b", 1.0, 2.0, 4, friction={"model": "quasi-steady", "factor": 0.01})}
+    case = scene({"a": lake(1e6), "b": lake(0.0)}, links, 1.0, {}, ["main.flow"], 0.1, fluid=fluid)
+    with pytest.raises(fvsolve.FvsolveError, match="main"):
+        fvsolve.build(fvsolve.load(case))

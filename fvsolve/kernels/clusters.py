@@ -26,7 +26,7 @@ from fvsolve.kernels.records import (
 from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step
 
 BAR = 1e5
-ROUNDING = 1e-15  # of pressures, relative
+ROUNDING = 1e-15  # of pressures, relative; and of a flow, of that at 1 Pa
 UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has not only met rounding
 
 
@@ -236,10 +236,15 @@ def is_held(cluster, tables, e, held):
 
 @njit
 def finish(cluster, tables, out, g, m, c, held, group, moved):
-    """Write the flows; give nodes that only shut valves reach their pressures; status where it failed."""
+    """Write the flows; give nodes that only shut valves reach their pressures; status where it failed.
+
+    What Newton's rounding leaves of a flow into a dead end is none: which way it points says nothing of the pressures.
+    """
     scale = 1e-300
     for e in range(m.size):
         k = tables[I_INTEGERS][cluster["first_valve"] + e]
+        if abs(m[e]) <= ROUNDING * sqrt(tables[I_VALVES][k]["conductance"]):  # of its flow at 1 Pa
+            m[e] = 0.0
         out[tables[I_LAYOUT][0]["valve"] + k] = m[e]
         scale = max(scale, abs(tables[I_VALVES][k]["flow"]), sqrt(tables[I_VALVES][k]["conductance"]))
     if moved > UNSETTLED:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fvsolve.kernels import density as law
@@ -19,6 +21,8 @@ class BarotropicStart(Start):
         super().__init__(scene)
         self.st, self.floats = scene.tables[rec.I_SETTINGS][0], scene.tables[rec.I_FLOATS]
         self.rho, self.g = scene.fluid.density, self.case.gravity
+        self.jets = {name: self.jet(row, *2 * [self.rho * float(row["area"])]) for name, row in
+                     zip(scene.pipe_names, self.pipes, strict=True)}  # fmt: skip
         self.end_flow = end_flow
         if self.st["floor"] > 0.0:
             from fvsolve.kernels.cavitating_nodes import end_flow_cavitating
@@ -31,10 +35,26 @@ class BarotropicStart(Start):
             super().solve()
             now = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
             scale = 1 + np.max(np.abs(now), initial=0.0)  # bodies alone have no unknowns here
-            if before is not None and np.max(np.abs(now - before), initial=0.0) <= 1e-14 * scale:
-                break
+            moves = np.full(now.size, np.inf) if before is None else np.abs(now - before) / scale
+            if np.max(moves, initial=0.0) <= 1e-14:
+                return
             before = now
             self.correct()
+        if np.max(moves) > 1e-9:
+            scene, worst = self.scene, int(np.argmax(moves))
+            names = [*self.case.places, *scene.pipe_names, *scene.column_names, *scene.valve_names, *self.case.links]
+            scene.fault("numerics.initial", f"no steady state was found: {names[worst]} moves with the densities; "
+                        'look at the heads around it, or use initial = "rest"')  # fmt: skip
+            self.scene.check()
+
+    def jet(self, row, m_from: float, m_to: float) -> tuple[float, float]:
+        """What a pipe's flow M loses over M^2 [Pa s2/kg2] where it leaves at its `from` end and at its `to` end.
+
+        rho / (2 m^2), m [kg/m] the mass per length there; none where nothing is at rest.
+        """
+        ends = ((int(row["from_node"]), m_from), (int(row["to_node"]), m_to))
+        back, ahead = (0.5 * self.rho / m**2 if self.still(i) else 0.0 for i, m in ends)
+        return back, ahead
 
     def potential_of(self, pressure: float, elevation: float) -> float:
         return self.rho * (law.enthalpy(self.st, self.floats, float(pressure)) + self.g * elevation)
@@ -65,11 +85,14 @@ class BarotropicStart(Start):
             row["flow"] = flow
             row["drag"] = self.pipe_drop(row)
             b_to = self.march(row, mesh, flow)[2]
-            plain = self.edges[k].drop(flow) - self.extra.get(names[k], 0.0)
-            if flow > 0.0 and self.still(j):
-                m = self.ends[1]
-                b_to -= 0.5 * (flow / m) ** 2
-            self.extra[names[k]] = (potential[i] - self.rho * b_to) - plain if flow != 0.0 else 0.0
+            if not math.isfinite(b_to):
+                self.scene.fault(f"links.{names[k]}", "no steady state: its pressure falls below what the density law "
+                                 'can hold; look at the heads at its ends, or use initial = "rest"')  # fmt: skip
+                self.scene.check()
+            lost = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
+            self.jets[names[k]] = self.jet(row, *self.ends)
+            plain = row["drag"] / row["area"] * mesh.length + self.jets[names[k]][flow > 0.0] * abs(flow) * flow
+            self.extra[names[k]] = (potential[i] - self.rho * (b_to - lost)) - plain if flow != 0.0 else 0.0
         for k, row in enumerate(self.valves):
             i, j = int(row["from_node"]), int(row["to_node"])
             denser, wider = self.denser(i, j)

@@ -66,6 +66,7 @@ class Start:
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         self.extra: dict[str, float] = {}  # drop beside the law's [Pa], of laws with a changing density
+        self.jets: dict[str, tuple[float, float]] = {}  # of pipes: what leaves them at their ends loses these M^2 [Pa]
         self.dense_of: dict[int, tuple[float, float]] = {}  # of valves: density over reference, drive over potential
         self.factor: dict[int, float] = {}  # on the conductance of valves, likewise
         self.ratio: dict[int, float] = {}  # of what drives valves to the change of potential, likewise
@@ -185,13 +186,14 @@ class Start:
         least = drag_slope(*law, 1e-6 * self.scene.fluid.density * float(row["area"]))
         link = self.case.links[name]
 
-        extra = self.extra.get(name, 0.0)
+        extra, (back, ahead) = self.extra.get(name, 0.0), self.jets.get(name, (0.0, 0.0))
 
         def drop(flow):
-            return per * drag(*law, flow) + extra
+            return per * drag(*law, flow) + extra + (ahead if flow > 0.0 else back) * abs(flow) * flow
 
         def newton(flow, present):
-            return per * max(drag_slope(*law, flow), least), 1.0, present - drop(flow)
+            jet = 2.0 * (ahead if flow > 0.0 else back) * abs(flow)
+            return per * max(drag_slope(*law, flow), least) + jet, 1.0, present - drop(flow)
 
         i, j = int(row["from_node"]), int(row["to_node"])
         if self.rest:

@@ -146,7 +146,8 @@ def march(
                     work[HAS], work[SEEN] = 0.0, -1.0
                 return SWITCHED
             flags[PHASE] = READY
-        if memory[T] >= orders[END]:
+        if too_short(orders, memory, orders[END] - memory[T]):  # what is left of the segment is rounding
+            memory[T] = orders[END]
             return DONE
         if out[WHERE] == STOP_HERE:
             return STOPPED

@@ -44,7 +44,7 @@ def slope_in_time(rhs, handle, t, h, y, k, supply, where, out, memory, work, vec
     later = t + step
     rhs(later, y, slope, out, handle)
     memory[CALLS] += 1.0
-    per = 1.0 / (later - t)
+    per = 1.0 / (later - t) if later > t else 0.0  # in a step of so few roundings it counts for nothing
     for e in range(n):
         slope[e] = (slope[e] - k[0, e]) * per
     for m in range(ledgers):

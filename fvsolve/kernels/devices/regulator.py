@@ -80,7 +80,9 @@ def regulator_events(t, y, out, tables, device, g):
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
     drop, back = head_drop(tables, out, device["valve"])[1], 1.0
     if device["kind"] != FLOW_CONTROL:
-        back = out[layout["valve"] + device["valve"]] if x > ALMOST_SHUT else drop + RELUCTANCE
+        back = out[layout["valve"] + device["valve"]]
+        if x <= ALMOST_SHUT or back == 0.0:
+            back = drop + RELUCTANCE
         if armed[at] > 0.0:
             back = drop - RELUCTANCE
     full, seat = -error - AT_REST, error - AT_REST
