@@ -406,7 +406,9 @@ class Start:
         asked = emitter_flow(floats, at, g, float(row["drop"]))
         if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
             row["open"] = 0.0
-        elif row["drop"] - floats[at + 1] >= LEAST_DROP and asked < math.sqrt(g * floats[at + 2]) * floats[at + 3]:
+            return
+        bends = g > 0.0 and asked < math.sqrt(g * floats[at + 2]) * floats[at + 3]  # not yet all that is asked
+        if bends and row["drop"] - floats[at + 1] >= LEAST_DROP:
             row["drop"] = emitter_drop(floats, at, g, flow)
 
     def begin_devices(self) -> None:

@@ -134,3 +134,7 @@ def smooth_ramp(start: float, duration: float, before: float, after: float, poin
 
 def pump(start: str, end: str, **more: Any) -> dict:
     return {"type": "pump", "from": start, "to": end, **more}
+
+
+def inflow(flow: Any, **more: Any) -> dict:
+    return {"type": "inflow", "flow": flow, **more}

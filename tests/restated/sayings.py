@@ -1,0 +1,147 @@
+"""The same network said in another way: each takes a case and gives one. Knows the keys; knows no answer."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+STRAIGHT = ("pipe", "valve", "orifice", "rigid-column")  # the same both ways
+
+
+def changed(case: dict, table: str, **keys: Any) -> dict:
+    """A copy with other keys in one of its tables."""
+    return {**copy.deepcopy(case), table: {**copy.deepcopy(case[table]), **keys}}
+
+
+def renamed(case: dict, call) -> dict:
+    """Every part has another name."""
+    said = copy.deepcopy(case)
+    said["nodes"] = {call(name): node for name, node in said["nodes"].items()}
+    said["links"] = {call(name): link for name, link in said["links"].items()}
+    for link in said["links"].values():
+        link |= {end: call(link[end]) for end in ("from", "to") if end in link}
+    said["output"]["probes"] = [called(probe, call) for probe in said["output"]["probes"]]
+    return said
+
+
+def called(probe: str, call) -> str:
+    group, part, what = probe.split(".", 2)
+    return f"{group}.{call(part)}.{what}"
+
+
+def reordered(case: dict, nodes: list[str], links: list[str]) -> dict:
+    """Its parts stand in another order in the file."""
+    said = copy.deepcopy(case)
+    return {**said, "nodes": {n: said["nodes"][n] for n in nodes}, "links": {n: said["links"][n] for n in links}}
+
+
+def swapped(case: dict, chosen: set[str]) -> dict:
+    """Some links are drawn from their other end; so are the probes along them."""
+    said = copy.deepcopy(case)
+    for name in chosen:
+        link = said["links"][name]
+        link["from"], link["to"] = link["to"], link["from"]
+    said["output"]["probes"] = [from_other_end(probe, case, chosen) for probe in said["output"]["probes"]]
+    return said
+
+
+def from_other_end(probe: str, case: dict, chosen: set[str]) -> str:
+    group, part, what = probe.split(".", 2)
+    if group == "nodes" or part not in chosen or case["links"][part]["type"] != "pipe":
+        return probe
+    return f"{group}.{part}.{ ({'flow': 'flow@1', 'flow@1': 'flow@0', 'pressure@0.37': 'pressure@0.63'}[what]) }"
+
+
+def raised(case: dict, height: float) -> dict:
+    """Everything stands higher."""
+    said = copy.deepcopy(case)
+    for node in said["nodes"].values():
+        node["elevation"] = node.get("elevation", 0.0) + height
+        if "head" in node:
+            node["head"] += height
+    return said
+
+
+TEXT = {
+    "length": (1e3, "mm"), "diameter": (100.0, "cm"), "wave_speed": (1e-3, "km/s"), "roughness": (1e6, "um"),
+    "pressure": (1e-5, "bar"), "head": (100.0, "cm"), "elevation": (1e-3, "km"), "level": (1e3, "mm"),
+    "volume": (1e3, "l"), "gas_volume": (1e6, "ml"), "demand": (1e3, "l/s"), "flow": (3600.0, "m3/h"),
+}  # fmt: skip
+
+
+def in_other_units(value: Any, key: str = "") -> Any:
+    """Every quantity that has a unit in `TEXT` is said in that; of schedules the values."""
+    if isinstance(value, dict) and key in TEXT and "value" in value:
+        return {**value, "value": [in_other_units(one, key) for one in value["value"]]}
+    if isinstance(value, dict):
+        return {
+            name: one if name in ("numerics", "output") else in_other_units(one, name) for name, one in value.items()
+        }
+    if key in TEXT and isinstance(value, float):
+        factor, unit = TEXT[key]
+        return f"{value * factor!r} {unit}"
+    return value
+
+
+def twice(case: dict, place: str) -> dict:
+    """Two copies, and a valve that is shut between them."""
+    said, other = copy.deepcopy(case), renamed(case, lambda name: f"{name}-too")
+    shut = {"type": "valve", "from": place, "to": f"{place}-too", "area": 0.01, "opening": 0.0}
+    said["nodes"] |= other["nodes"]
+    said["links"] |= {**other["links"], "shut": shut}
+    said["output"]["probes"] += other["output"]["probes"]
+    return said
+
+
+def later(case: dict, wait: float) -> dict:
+    """It starts at another time, and so does all that happens."""
+    said = shifted(copy.deepcopy(case), wait)
+    said["numerics"] |= {"start": wait, "end": case["numerics"]["end"] + wait}
+    return said
+
+
+def shifted(value: Any, wait: float) -> Any:
+    """Schedules at a later time."""
+    if isinstance(value, dict) and "value" in value:
+        return {
+            **value,
+            **({"time": [t + wait for t in value["time"]]} if "time" in value else {"start": value["start"] + wait}),
+        }
+    return {key: shifted(one, wait) for key, one in value.items()} if isinstance(value, dict) else value
+
+
+def denser(case: dict, times: float) -> dict:
+    """Fluid, air and all pressures weigh more; volumes, heads and times do not."""
+    said = copy.deepcopy(case)
+    fluid = said["fluid"]
+    fluid["pressure"] = 101325.0
+    for key in ("density", "bulk_modulus", "viscosity", "vapor_pressure", "pressure"):
+        fluid[key] *= times
+    said["ambient_pressure"] *= times
+    for node in said["nodes"].values():
+        if "pressure" in node:
+            node["pressure"] *= times
+    for link in said["links"].values():
+        for key in ("set_pressure", "overpressure", "cracking_pressure", "band"):
+            if key in link:
+                link[key] *= times
+        if "coefficient" in link:  # of a leak, over the root of the pressure
+            link["coefficient"] /= times**0.5
+    return said
+
+
+def drawn_backwards(case: dict) -> dict:
+    """What junctions give is brought by inflows of the opposite sign."""
+    said = copy.deepcopy(case)
+    for name, node in said["nodes"].items():
+        if node["type"] == "junction" and "demand" in node:
+            brought = negative(node["demand"])
+            said["nodes"][name] = {key: one for key, one in node.items() if key != "demand"} | {
+                "type": "inflow",
+                "flow": brought,
+            }
+    return said
+
+
+def negative(value: Any) -> Any:
+    return {**value, "value": [-one for one in value["value"]]} if isinstance(value, dict) else -value
