@@ -9,16 +9,16 @@ from types import ModuleType
 
 
 def offer(package: str, homes: Mapping[str, str]) -> list[str]:
-    """Let a package offer names from its modules, name -> module; the sorted names, for `__all__`.
+    """Let a package offer names from modules, name -> module within it, or beside it as `.room.module`.
 
-    A function is not hidden by the module of its own name that it lives in.
+    Returns the sorted names, for `__all__`. A function is not hidden by the module of its own name that it lives in.
     """
 
     class Offering(ModuleType):
         def __getattr__(self, name: str) -> object:
             if name not in homes:
                 raise AttributeError(f"module {package!r} has no attribute {name!r}")
-            value = getattr(import_module(f"{package}.{homes[name]}"), name)
+            value = getattr(import_module(f".{homes[name]}", package), name)
             super().__setattr__(name, value)
             return value
 

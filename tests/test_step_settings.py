@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
-from truth.scenes import lake, pipe, scene, tank, valve
+from truth.scenes import chamber, lake, pipe, scene, tank, valve
 
 import fvsolve
+from fvsolve import build, load
+from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.steppers import METHODS, integrate
 
@@ -128,3 +132,33 @@ def test_no_tableau_takes_the_place_of_a_method_that_is_there(name):
 def test_what_is_left_out_is_filled_in(numerics, found):
     filled = fvsolve.load(piped(**numerics)).numerics
     assert (filled.method, getattr(filled, found[1])) == (found[0], found[2])
+
+
+def joined(volume: float, **numerics) -> dict:
+    """A liquid between two plates that a valve joins to a chamber, which flows already at the start."""
+    pool = {"type": "basin", "size": [4.0, 2.0], "cells": [16, 8], "physics": "liquid", "pressure": 2e6,
+            "thickness": 0.1, "patches": {"out": {"side": "east"}}}  # fmt: skip
+    nodes = {"pool": pool, "pot": chamber(volume, 1e6)}
+    return scene(nodes, {"gate": valve("pool.out", "pot", 1e-4)}, 0.02, numerics, ["pot.pressure"], 1e-3)
+
+
+def test_check_says_what_explicit_steps_will_cost_and_not_of_the_remedy(tmp_path, fvs):
+    file = tmp_path / "joined.toml"
+    file.write_text(write(joined(1e-6)))
+    code, out, _ = fvs("check", file, "--json")
+    (said,) = [one for one in json.loads(out)["warnings"] if one["kind"] == "cost"]
+    assert code == 0 and said["value"] > 20_000 and said["value"] > 10 * said["limit"] and "links.gate" in said["text"]
+    assert 'method = "auto" or "rodas-5p" with rtol = 1e-6' in said["text"]
+    for method in ("auto", "rodas-5p"):
+        remedy = {"numerics.method": method, "numerics.rtol": 1e-6}
+        settings = [f"--set={key}={value}" for key, value in remedy.items()]
+        _, out, _ = fvs("check", file, "--json", *settings)
+        assert not [one for one in json.loads(out)["warnings"] if one["kind"] == "cost"]
+
+
+@pytest.mark.parametrize("given", [{"method": "rk4", "courant": 0.8}, {"method": "dormand-prince", "rtol": 1e-6}])
+def test_the_cost_is_told_for_all_explicit_control_and_not_where_waves_rule(given):
+    def told(volume):
+        return [one for one in build(load(joined(volume, **given))).checks["warnings"] if one["kind"] == "cost"]
+
+    assert told(1e-6) and not told(1.0)

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.basins import behind, patch_names
-from fvsolve.errors import listing
+from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
 from fvsolve.steppers.automatic import first_method
+from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.tableau import method_named
 
 TRIED = 1e-3  # of what counts as a small deviation: the states whose rates are timed, for at rest much is skipped
@@ -21,6 +22,8 @@ SECONDS_PER_STEP = 5e-7  # beside the rates
 LOCAL = 0.05  # by which sound at a pressure may be quicker than at the reference, where the law is not linear
 QUICKER = 0.1  # share of the greatest rate that a valve must make to be what sets the step
 MOST_TRIED = 100  # valves
+DEAR, MANY = 10.0, 20_000  # times the waves' rate, and steps, from which on `check` warns of the cost
+BOUNDARY = 3.3  # of h times the greatest rate: what explicit methods with an error estimate bear, about
 STIFF = 3.0  # times as many steps as waves ask for: from there on an implicit method is worth a try
 
 
@@ -63,13 +66,33 @@ def checks(model) -> dict[str, Any]:
         "basins": {one.name: basin_facts(one) for one in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
-        "moving": model.steady["moving"], "warnings": [one.plain() for one in model.warnings],
+        "moving": model.steady["moving"],
+        "warnings": [one.plain() for one in (*model.warnings, *dear(model, steps, set_by))],
     }  # fmt: skip
 
 
 def rubbed(loss: float, link, rho: float, velocity: float) -> float:
     """Pressure that a pipe's wall takes of all that it loses [Pa]: the rest is its minor loss."""
     return abs(loss) - link.minor_loss * rho * velocity**2 / 2.0
+
+
+def dear(model, steps: int | None, set_by: str) -> list[Notice]:
+    """A notice where explicit steps follow something far quicker than waves, and many of them."""
+    numerics, start = model.case.numerics, model.case.numerics.start
+    explicit = numerics.method != AUTO and method_named(numerics.method).explicit
+    waves = max([*model.wave_rates, *(basin.pace(model.start)[0] for basin in model.basins)], default=0.0)
+    if not explicit or numerics.step is not None or not waves > 0.0:
+        return []
+    rate = float(model.evaluate(start, model.start, start)[1][rec.RATE])
+    ratio, most = rate / waves, steps or math.ceil((numerics.end - start) * rate / BOUNDARY)
+    if ratio <= DEAR or most <= MANY:
+        return []
+    why = set_by if numerics.rtol is None else "it"
+    text = (
+        f"{numerics.method}: some {most} steps, {ratio:.3g} times what waves ask for ({why}); "
+        'method = "auto" or "rodas-5p" with rtol = 1e-6 does not follow it'
+    )
+    return [Notice("cost", "numerics", text, "method", float(most), float(most / ratio))]
 
 
 def basin_facts(basin) -> dict[str, Any]:
