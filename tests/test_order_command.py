@@ -20,7 +20,7 @@ SPACE = {"upwind": 1, "linear-upwind": 2, "fromm": 2, "central": 2, "upwind3": 3
 def test_every_scheme_shows_its_order_against_the_exact_solution(scheme, p):
     cells = {1: 160, 5: 40}.get(p, 80)
     case = pulses.case(points=pulses.FINE if p == 5 else pulses.FEW)
-    found = order(case, scheme=scheme, cells=cells, levels=4).plain()
+    found = order(case, schemes=scheme, cells=cells, levels=4).plain()
     assert found["reference"]["kind"] == "exact" and found["scheme"] == scheme
     for variable in ("pressure", "flow"):
         fit = found["fits"][variable]["L1"]
@@ -35,7 +35,7 @@ TIME = {"euler": 1, "ssp-rk2": 2, "ssp-rk3": 3, "rk4": 4, "implicit-euler": 1, "
 def test_every_method_shows_its_order_in_time_on_one_grid(method, p):
     points = pulses.FINE if p == 4 else pulses.FEW
     case, levels = pulses.case(20, courant=0.4, points=points), 6 if p == 1 else 4
-    found = order(case, method=method, refine="time", levels=levels).plain()
+    found = order(case, methods=method, refine="time", levels=levels).plain()
     assert found["reference"]["kind"] == "finer" and found["measure"] == "step [s]"  # exact only in space and time
     fit = found["fits"]["pressure"]["L2"]
     assert fit["order"] == approx(p, abs=0.15) and abs(fit["order"] - p) <= max(fit["spread"], 0.05)

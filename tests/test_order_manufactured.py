@@ -44,7 +44,7 @@ def drive(pipe, x, t):
 @pytest.mark.parametrize(("scheme", "p"), [("upwind", 1), ("fromm", 2), ("upwind3", 3), ("upwind5", 5)])
 def test_a_standing_wave_shows_the_order_of_the_scheme(scheme, p):
     cells = {1: 80, 5: 15}.get(p, 40)
-    found = order(case(cells), scheme=scheme, exact=free, levels=5)
+    found = order(case(cells), schemes=scheme, exact=free, levels=5)
     assert found.kind == "function"
     fit = found.fits["pressure"]["L2"]
     assert fit.order == approx(p, abs=0.15), fit
@@ -54,7 +54,7 @@ def test_a_standing_wave_shows_the_order_of_the_scheme(scheme, p):
 @pytest.mark.parametrize("probe", ["main.pressure@0.37", "main.flow@0.61", "end.pressure", "main.flow@0"])
 def test_reading_at_a_point_does_not_cap_the_order(scheme, p, probe):
     """0.37 falls on another part of its cell at every level."""
-    found = order(case(20), scheme=scheme, exact=free, levels=4)
+    found = order(case(20), schemes=scheme, exact=free, levels=4)
     fit = found.fits[probe]["L2"]
     assert fit.order > p - 0.2, fit
     slow = [e.errors[probe]["L2"] for e in found.rows]
@@ -64,7 +64,7 @@ def test_reading_at_a_point_does_not_cap_the_order(scheme, p, probe):
 @pytest.mark.parametrize(("scheme", "p"), [("upwind3", 3), ("upwind5", 5)])
 def test_a_source_is_fed_in_at_the_order_of_the_scheme(scheme, p):
     """In max: the error is largest at the ends; inside it falls by one order more for a while."""
-    found = order(case(30), scheme=scheme, exact=driven, source=drive, levels=4)
+    found = order(case(30), schemes=scheme, exact=driven, source=drive, levels=4)
     assert found.fits["pressure"]["max"].order == approx(p, abs=0.25)
     slow = [row.errors["flow"]["max"] for row in found.rows]
     assert slow[0] / slow[-1] > 2.0 ** (3 * (p - 0.2))
@@ -98,14 +98,14 @@ def test_a_wrong_exact_solution_is_found_out():
 
 
 def test_a_start_alone_is_judged_by_a_finer_run():
-    found = order(case(20), scheme="upwind3", initial=lambda pipe, x: free(pipe, x, 0.0), levels=4)
+    found = order(case(20), schemes="upwind3", initial=lambda pipe, x: free(pipe, x, 0.0), levels=4)
     assert found.kind == "finer" and found.fits["pressure"]["L1"].order == approx(3.0, abs=0.2)
 
 
 def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_asked_for():
-    grid = order(case(20), method="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
+    grid = order(case(20), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
     assert grid.kind == "finer" and grid.fits["pressure"]["L2"].order == approx(3.0, abs=0.1)
-    asked = order(case(20), method="ssp-rk3", exact=free, refine="time", levels=4, against="exact")
+    asked = order(case(20), methods="ssp-rk3", exact=free, refine="time", levels=4, against="exact")
     assert asked.kind == "function" and asked.rows[-1].errors["pressure"]["L2"] > 1.0  # the error of the grid
     with pytest.raises(FvsolveError, match="wants the function"):
         order(case(20), initial=lambda pipe, x: free(pipe, x, 0.0), against="exact")

@@ -31,7 +31,7 @@ def test_averages_over_other_cells_are_those_of_the_same_function(cells):
 
 def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
     case = pulses.case(30, points=pulses.FEW)
-    exact, finer = (order(case, scheme="upwind3", levels=3, against=one) for one in ("exact", "finer"))
+    exact, finer = (order(case, schemes="upwind3", levels=3, against=one) for one in ("exact", "finer"))
     assert (exact.kind, finer.kind) == ("exact", "finer") and "upwind5" in finer.words
     for a, b in zip(exact.rows, finer.rows, strict=True):
         for variable in ("pressure", "flow", "gate.pressure", "main.pressure@0.37"):
@@ -56,10 +56,10 @@ def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case,
 
 def test_rows_that_the_reference_cannot_judge_are_marked_and_said():
     """Both have a front, which a finer grid hardly sharpens: the reference is no better than the last rows."""
-    found = order(pulses.front(), scheme="fromm", against="finer", levels=4)
+    found = order(pulses.front(), schemes="fromm", against="finer", levels=4)
     assert found.kind == "finer" and "reference" in found.fits["pressure"]["L1"].marks
     assert any("no judge" in note and "[exact]" in note for note in found.notes)
-    exact = order(pulses.front(), scheme="fromm", levels=4).fits["pressure"]["L1"]
+    exact = order(pulses.front(), schemes="fromm", levels=4).fits["pressure"]["L1"]
     assert set(exact.marks) == {""} and exact.order == approx(2 / 3, abs=0.05)
 
 
@@ -82,8 +82,8 @@ def test_where_no_reference_will_do_each_row_is_judged_by_the_next():
 
 def test_richardson_finds_the_errors_and_the_order_without_a_reference():
     case = pulses.case(30, points=pulses.FEW)
-    exact = order(case, scheme="upwind3", levels=5)
-    found = order(case, scheme="upwind3", levels=5, against="richardson")
+    exact = order(case, schemes="upwind3", levels=5)
+    found = order(case, schemes="upwind3", levels=5, against="richardson")
     assert found.kind == "richardson" and found.fits["pressure"]["L1"].order == approx(3.0, abs=0.1)
     for a, b in list(zip(exact.rows, found.rows, strict=True))[1:-1]:
         assert b.errors["pressure"]["L1"] == approx(a.errors["pressure"]["L1"], rel=0.1)
@@ -92,11 +92,11 @@ def test_richardson_finds_the_errors_and_the_order_without_a_reference():
 
 def test_refining_space_alone_shows_the_error_of_the_step_as_a_floor():
     case = pulses.case(20, courant=0.9)
-    found = order(case, scheme="upwind5", method="euler", refine="space", levels=5)
+    found = order(case, schemes="upwind5", methods="euler", refine="space", levels=5)
     assert len({row.level.step for row in found.rows}) == 1
     fit = found.fits["pressure"]["L1"]
     assert fit.reason or "floor" in fit.marks or fit.order < 2.0
-    sharp = order(case, scheme="upwind3", method="verner-7", refine="space", levels=4, cells=40)
+    sharp = order(case, schemes="upwind3", methods="verner-7", refine="space", levels=4, cells=40)
     assert sharp.fits["pressure"]["L1"].order == approx(3.0, abs=0.15)
 
 
@@ -123,7 +123,7 @@ def test_a_lumped_case_shows_the_order_of_a_method_against_its_exact_solution():
     case = scenes.scene(nodes, links, 100.0, {"step": 2.0, "method": "rk4"}, ["a.level"], every=10.0,
                         exact={"name": "oscillation"})  # fmt: skip
     for method, p in (("euler", 1), ("ssp-rk2", 2), ("heun", 3), ("rk4", 4), ("trapezoid", 2), ("radau-iia-5", 5)):
-        found = order(case, method=method, refine="time", levels=7 if p < 2 else 5)
+        found = order(case, methods=method, refine="time", levels=7 if p < 2 else 5)
         fit = found.fits["a.level"]["L2"]
         assert found.kind == "exact" and abs(fit.order - p) <= max(fit.spread, 0.1) < 0.5, (method, fit)
 
@@ -167,14 +167,14 @@ def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
     """A smooth pulse under a law that has no exact solution here: the order shows against a finer run."""
     case = pulses.case(20, exact=False, points=pulses.FEW)
     case["fluid"] = {"name": "Water", "law": law}
-    found = order(case, scheme="upwind3", levels=3, cells=40)
+    found = order(case, schemes="upwind3", levels=3, cells=40)
     assert found.kind == "finer" and found.fits["flow"]["L1"].order == approx(3.0, abs=0.25)
 
 
 @pytest.mark.parametrize(("cells", "levels"), [(24, 4), (28, 4), (20, 5)])
 def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, levels):
     """Upwind blurs the pulse away: orders of differences stay near 0.42 between the coarse rows and climb to 1 late."""
-    exact, found = (order(pulses.case(cells, points=pulses.FEW), scheme="upwind", levels=levels, against=way)
+    exact, found = (order(pulses.case(cells, points=pulses.FEW), schemes="upwind", levels=levels, against=way)
                     for way in ("exact", "richardson"))  # fmt: skip
     for norm, fit in found.fits["pressure"].items():
         assert fit.reason or abs(fit.order - 1.0) <= fit.spread + 0.1, (norm, fit)
@@ -188,7 +188,7 @@ def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, leve
 
 def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
     case = pulses.case(160, points=pulses.FEW)
-    exact, found = (order(case, scheme="upwind", levels=5, against=way) for way in ("exact", "richardson"))
+    exact, found = (order(case, schemes="upwind", levels=5, against=way) for way in ("exact", "richardson"))
     assert abs(found.fits["pressure"]["L1"].order - 1.0) <= found.fits["pressure"]["L1"].spread
     for a, b in zip(exact.rows[:-1], found.rows[:-1], strict=True):
         assert b.errors["pressure"]["L1"] == approx(a.errors["pressure"]["L1"], rel=0.15)
@@ -197,7 +197,7 @@ def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
 @pytest.mark.parametrize(("scheme", "method", "p"), [("upwind5", "rk4", 5), ("upwind3", "ssp-rk3", 3)])
 def test_refining_space_alone_shows_the_order_of_the_scheme_by_default(scheme, method, p):
     """At the case's Courant number, 0.9, the error of the step would hide it."""
-    found = order(pulses.case(20, courant=0.9), scheme=scheme, method=method, refine="space", levels=4, cells=30)
+    found = order(pulses.case(20, courant=0.9), schemes=scheme, methods=method, refine="space", levels=4, cells=30)
     assert len({row.level.step for row in found.rows}) == 1
     assert f"Courant number {0.19 if p == 5 else 0.22}" in found.plan.words
     assert found.fits["pressure"]["L1"].order == approx(p, abs=0.3)
@@ -205,5 +205,5 @@ def test_refining_space_alone_shows_the_order_of_the_scheme_by_default(scheme, m
 
 def test_where_the_step_hides_the_order_of_the_cells_a_smaller_one_is_named():
     case = pulses.case(20, courant=0.9)
-    found = order(case, scheme="upwind5", method="euler", refine="space", levels=4, cells=30)
+    found = order(case, schemes="upwind5", methods="euler", refine="space", levels=4, cells=30)
     assert any("--set numerics.courant=0.005" in note for note in found.notes), found.notes

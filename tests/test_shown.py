@@ -15,7 +15,7 @@ import fvsolve
 from fvsolve import advance, build, initial_state, load, run, tableau
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS
-from fvsolve.studies import chart, order, response, sweep
+from fvsolve.studies import advection_limits, chart, order, response, sweep
 
 CASE = "two-tanks"
 ROW = "0 |\n1 | 1\n--+--\n | 1/2 1/2\n"
@@ -28,7 +28,7 @@ def objects():
     state = advance(model, initial_state(model), 1.0)
     return {
         "Case": case, "Model": model, "State": state, "Result": run(model),
-        "Order": order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, method="rk4"),
+        "Order": order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4"),
         "Sweep": sweep(CASE, {"numerics.rtol": [1e-4, 1e-5]}),
         "Chart": chart(CASE, methods=["rk4"], step=[4.0, 2.0]),
     }  # fmt: skip
@@ -129,3 +129,18 @@ def test_the_first_run_on_a_machine_says_that_it_compiles(fvs, tmp_path, monkeyp
     monkeypatch.setattr(jit, "cold", lambda: True)
     assert "compiles" in fvs("check", CASE)[2]
     assert "compiles" not in fvs("check", CASE)[2]
+
+
+def test_a_name_stands_for_a_list_of_it_in_all_studies():
+    one = order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4")
+    both = order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods=["rk4", "heun"])
+    assert one.method == "rk4" and [found.method for found in both] == ["rk4", "heun"]
+    assert {point.setting.method for point in chart(CASE, methods="rk4", step=[4.0, 2.0]).points} >= {"rk4"}
+    assert [one.method for one in advection_limits("upwind", "rk4")] == ["rk4"]
+
+
+def test_a_model_reads_any_state():
+    model = build(load(CASE))
+    state = advance(model, initial_state(model), 1.0)
+    assert model.observe(state) == pytest.approx(model.observe(state.t, state.y), abs=0.0)
+    assert model.observe(state).shape == (len(model.probes),)

@@ -58,8 +58,10 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
     try:
         case = load(path, settings)
     except CaseError as error:
-        first = {f"numerics.{key}": text.split(",")[0].strip() for key, text in
-                 (("scheme", scheme), ("method", method)) if text}  # fmt: skip
+        from fvsolve.cli.studying import listed, methods_of
+
+        given = {"scheme": listed(scheme), "method": methods_of(method)}
+        first = {f"numerics.{key}": names[0] for key, names in given.items() if names}
         if first and not faults:
             try:
                 return load(path, first | settings)

@@ -40,12 +40,10 @@ def order(
 
     scene = load_case(case, overrides, scheme, method)
     folder = folder_of(scene, "order", out)
-    found = []
-    pairs = [(s, m) for s in listed(scheme, "--scheme") or [None] for m in methods_of(method) or [None]]
     with told() as progress, Points(folder) as points:
-        for one, other in pairs:
-            found.append(study(scene, refine=refine, key=key, levels=levels, cells=cells, scheme=one, method=other,
-                               against=against, points=points, progress=progress))  # fmt: skip
+        found = study(scene, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
+                      methods=methods_of(method), against=against, points=points, progress=progress)  # fmt: skip
+    found = found if isinstance(found, list) else [found]
     files = [write_table(folder / "order.csv", found), *draw(folder, found)]
     if as_json:
         print_json({"studies": [one.plain() for one in found], "files": [str(file) for file in files],

@@ -100,6 +100,7 @@ def advection_limits(
     """Rows of the table, schemes inside methods; None for all of them."""
     if courant is not None and not (math.isfinite(courant) and courant > 0):
         raise FvsolveError(f"courant = {courant:g}: wanted a positive number")
+    schemes, methods = ([x] if isinstance(x, str) else x for x in (schemes, methods))
     schemes = list(dict.fromkeys(schemes or WEIGHTS))
     for name in schemes:
         weights_of(name)

@@ -253,9 +253,9 @@ class Model(Shown):
             found[:, j] = (self.rhs(t, high) - self.rhs(t, low)) / (high[j] - low[j])
         return found
 
-    def observe(self, t: float, y: np.ndarray, limit: float = np.inf) -> np.ndarray:
-        """Values of all probes : float64[probes] [SI]."""
-        t, y = self.given(t, y)
+    def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
+        """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI]."""
+        t, y = self.given(t.t, t.y) if isinstance(t, State) and y is None else self.given(t, y)
         out = self.evaluate(t, y, limit)[1]
         values = np.zeros(len(self.probes))
         self.functions.observe(float(t), y, out, self.handle, values)

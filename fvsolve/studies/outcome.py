@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.run import model_of
+
+
+def names(given: str | Sequence[str] | None) -> list[str] | None:
+    """Names as a list, each once, one name standing for a list of it; None where nothing is said."""
+    return None if given is None else list(dict.fromkeys([given] if isinstance(given, str) else given))
 
 
 def grown(reason: str) -> bool:

@@ -21,7 +21,7 @@ from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, 
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
-from fvsolve.studies.outcome import Told, prepared, refusal
+from fvsolve.studies.outcome import Told, names, prepared, refusal
 from fvsolve.studies.points import Points
 
 WRONG = 1.0  # an error as great as all that the component does
@@ -139,6 +139,7 @@ class _Study:
         self.given_up: dict[tuple, str] = {}  # curve -> the fineness at which it was
 
     def go(self, schemes, methods, cells, rtol, step, target) -> Chart:
+        schemes, methods = names(schemes), names(methods)
         known(schemes, methods)
         if longest(self.case):
             self.coarse = Coarse(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarsely))

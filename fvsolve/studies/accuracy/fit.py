@@ -150,7 +150,8 @@ class Rows:
     def drifting(self) -> str:
         """Why a window says nothing whose orders may go on to zero, or to twice what they are."""
         told = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
-        return f"no order: orders between rows still drift ({told}); refine further"
+        rows = self.good.size
+        return f"no order: orders between rows still drift ({told}); {rows} rows do not settle, ask for {rows + 2}"
 
 
 def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:

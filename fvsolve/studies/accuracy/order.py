@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from fvsolve.errors import FvsolveError, did_you_mean
@@ -11,7 +11,7 @@ from fvsolve.shown import Shown
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan
-from fvsolve.studies.outcome import Told, without_basins
+from fvsolve.studies.outcome import Told, names, without_basins
 from fvsolve.studies.points import Points
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
@@ -90,38 +90,48 @@ class Order(Shown):
 
 def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
-    cells: int | None = None, scheme: str | None = None, method: str | None = None, against: str = "auto",
-    initial: Callable | None = None, source: Callable | None = None, exact: Callable | None = None,
-    points: Points | None = None, progress: Told | None = None,
-) -> Order:  # fmt: skip
-    """Errors of a case over a refinement and the order at which they fall.
+    cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
+    against: str = "auto", initial: Callable | None = None, source: Callable | None = None,
+    exact: Callable | None = None, points: Points | None = None, progress: Told | None = None,
+) -> Order | list[Order]:  # fmt: skip
+    """Errors of a case over a refinement and the order at which they fall; a list where several are asked for.
 
     case, set : as `run` takes them; refine, key, levels, cells : as `studies.refine.plan` takes them
-    scheme, method : in place of the case's; against : "auto" (exact if the case names one, else finer, with basins
-    richardson), "exact", "finer" (two levels finer by another scheme and method) or "richardson" (each row against the
-    next)
+    schemes, methods : in place of the case's, names or lists of them
+    against : "auto" (exact if the case names one, else finer, with basins richardson), "exact", "finer" (two levels finer
+    by another scheme and method) or "richardson" (each row against the next)
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start where `initial` is left out
     points : finished rows, reused; progress(done, total, next)
     Raises CaseError, FvsolveError.
     """
-    from fvsolve.case import load
-
     if against not in REFERENCES:
         raise FvsolveError(
             f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}; wanted {", ".join(REFERENCES)}'
         )
-    given = {"numerics.scheme": scheme, "numerics.method": method}
-    case = load(case, {**(set or {}), **{name: value for name, value in given.items() if value is not None}})
+    told, found = progress or (lambda *_: None), []
+    for scheme in names(schemes) or [None]:
+        for method in names(methods) or [None]:
+            given = {"numerics.scheme": scheme, "numerics.method": method}
+            settings = {**(set or {}), **{name: value for name, value in given.items() if value is not None}}
+            found.append(
+                _order(case, settings, refine, key, levels, cells, against, (initial, source, exact), points, told)
+            )
+    return found[0] if len(found) == 1 else found
+
+
+def _order(case, settings: Mapping, refine, key, levels, cells, against, given, points, progress) -> Order:
+    """The study of one scheme and method; given : initial, source and exact solution, or None for each."""
+    from fvsolve.case import load
+
+    case = load(case, settings)
     made = affordable(case, refine, key, levels, cells, against, points)
-    if initial is None and source is None and exact is None:
+    if given == (None, None, None):
         from fvsolve.studies.accuracy.judge import Judge
 
-        judge = Judge(case, made, against)
-    else:
-        from fvsolve.studies.accuracy.manufactured import Manufactured
+        return Judge(case, made, against).study(points, progress)
+    from fvsolve.studies.accuracy.manufactured import Manufactured
 
-        without_basins(case, "order by functions of pipes")
-        judge = Manufactured(case, made, against, initial, source, exact)
-    return judge.study(points, progress or (lambda *_: None))
+    without_basins(case, "order by functions of pipes")
+    return Manufactured(case, made, against, *given).study(points, progress)

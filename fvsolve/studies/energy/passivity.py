@@ -18,6 +18,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.model.schemes import LINEAR, ORDER
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT
+from fvsolve.studies.outcome import names
 
 CELLS = 20  # of the pipe
 SLACK = 1e-10  # of a norm over one: rounding
@@ -112,16 +113,17 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
     return Passivity(of_methods, of_schemes, pairs)
 
 
-def checked(names, known: list[str], what: str) -> list[str]:
-    """The names, all if there are none; FvsolveError where one is unknown."""
-    for name in names or ():
+def checked(given, known: list[str], what: str) -> list[str]:
+    """The names, one or several, all if there are none; FvsolveError where one is unknown."""
+    given = names(given)
+    for name in given or ():
         if name not in known:
             if name == AUTO:
                 raise FvsolveError(
                     f'method "{AUTO}" is none of its own: it changes between {EXPLICIT} and {IMPLICIT}; give these'
                 )
             raise FvsolveError(f'no {what} named "{name}"{did_you_mean(name, known)}; {what}s are {", ".join(known)}')
-    return list(names or known)
+    return given or list(known)
 
 
 def method_claim(name: str) -> MethodClaim:

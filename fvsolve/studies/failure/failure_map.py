@@ -14,7 +14,7 @@ from fvsolve.studies.failure.converged import Converged, converged
 from fvsolve.studies.failure.eigen_limit import LINEAR_TWIN, greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.outcome import Told, without_basins
+from fvsolve.studies.outcome import Told, names, without_basins
 from fvsolve.studies.points import Points
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
@@ -90,7 +90,7 @@ def failures(
         raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
     across = columns(case, base, courants, steps, key)
-    schemes, methods = _known(schemes or default_schemes(case, across), methods or METHODS)
+    schemes, methods = _known(names(schemes) or default_schemes(case, across), names(methods) or METHODS)
     trials = Trials(case, base, across, tolerance, points or Points())
     asked = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(across.sets))]
     squares = []
@@ -196,8 +196,8 @@ def _explicit(method: str) -> bool:
 def _known(*asked: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     from fvsolve.case.sections import SCHEMES, MethodNames
 
-    for what, names, known in zip(("scheme", "method"), asked, (SCHEMES, tuple(MethodNames())), strict=True):
-        for name in names:
+    for what, given, known in zip(("scheme", "method"), asked, (SCHEMES, tuple(MethodNames())), strict=True):
+        for name in given:
             if name not in known:
                 raise FvsolveError(f'no {what} named "{name}"{did_you_mean(name, known)}')
     return tuple(dict.fromkeys(asked[0])), tuple(dict.fromkeys(asked[1]))

@@ -21,6 +21,7 @@ from fvsolve.limits.symbol import WEIGHTS, Weights
 from fvsolve.model.schemes import LIMITERS
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.tableau import method_named
+from fvsolve.studies.outcome import names
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
@@ -107,7 +108,7 @@ def limited_limits(
     Raises FvsolveError for names that are none, implicit methods, and a circle or a run that is too short.
     """
     check_size(cells, steps)
-    named = [method_named(name) for name in methods or METHODS]
+    schemes, named = names(schemes), [method_named(name) for name in names(methods) or METHODS]
     implicit = [one.name for one in named if not one.explicit]
     if implicit:
         raise FvsolveError(f"{implicit[0]} is implicit: limited schemes are measured with explicit methods")

@@ -24,6 +24,7 @@ from fvsolve.steppers.ode import watchers
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
+from fvsolve.studies.outcome import names
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
@@ -84,8 +85,8 @@ def measured_limits(
     Raises FvsolveError for names that are none, and for a circle or a run that is too short.
     """
     check_size(cells, steps)
-    schemes = list(dict.fromkeys(schemes or WEIGHTS))
-    named = [method_named(name) for name in methods] if methods else list(METHODS.values())
+    schemes = names(schemes) or list(WEIGHTS)
+    named = [method_named(name) for name in names(methods) or ()] or list(METHODS.values())
     pairs = [(scheme, one.name) for one in dict.fromkeys(named) if one.explicit for scheme in schemes]
     for scheme in schemes:
         weights_of(scheme)

@@ -21,6 +21,7 @@ from fvsolve.steppers.methods import AUTO
 from fvsolve.studies.linear.frozen import FROZEN_AS, Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
+from fvsolve.studies.outcome import names
 from fvsolve.studies.points import Points
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
 from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
@@ -103,8 +104,8 @@ def stability(
     if steps < 10 or not threshold > 1.0:
         raise FvsolveError(f"steps = {steps}, threshold = {threshold:g}: wanted at least 10 steps and growth above 1")
     case = load(case, dict(set or {}))
-    schemes = list(dict.fromkeys(schemes or [case.numerics.scheme]))
-    asked = list(methods or [case.numerics.method])
+    schemes = names(schemes) or [case.numerics.scheme]
+    asked = names(methods) or [case.numerics.method]
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
     said = (AUTOMATIC,) if AUTO in asked else ()
     found, makers = [], {scheme: Maker(case, scheme, at, before, steps, threshold) for scheme in schemes}
