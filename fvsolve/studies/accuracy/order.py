@@ -98,8 +98,8 @@ def order(
 
     case, set : as `run` takes them; refine, key, levels, cells : as `studies.refine.plan` takes them
     schemes, methods : in place of the case's, names or lists of them
-    against : "auto" (exact if the case names one, else finer, with basins richardson), "exact", "finer" (two levels finer
-    by another scheme and method) or "richardson" (each row against the next)
+    against : "auto" (exact if the case names one, else finer, with basins richardson), "exact", "finer" (two levels
+    finer by another scheme and method) or "richardson" (each row against the next)
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start where `initial` is left out
