@@ -259,3 +259,13 @@ def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}))
     assert said in str(error.value)
+
+
+def test_where_rigid_columns_alone_join_it_it_is_refused_by_name():
+    """Shut, nothing would set its pressure."""
+    column = {"type": "rigid-column", "length": 50.0, "diameter": 0.2}
+    nodes = {"a": reservoir(3.2e5), "v": {"type": "air-valve", "volume": 0.02, "inlet": 0.05, "outlet": 0.01}}
+    nodes["b"] = reservoir(3e5)
+    links = {"one": {**column, "from": "a", "to": "v"}, "two": {**column, "from": "v", "to": "b"}}
+    with pytest.raises(fvsolve.CaseError, match="nodes.v: only rigid columns join this air valve"):
+        fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}, ["one.flow"])))

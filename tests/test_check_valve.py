@@ -207,6 +207,7 @@ def test_a_disc_that_slams_on_a_rigid_column_stops_it_dead_and_opens_again(rtol)
     assert opens["time"] == pytest.approx(8.0 + 2.0 * (lift - 5.0) / 25.0, rel=1e-9)
     stands = (result.t > shuts["time"]) & (result.t < opens["time"])
     assert np.all(result["c.flow"][stands] == 0.0) and result["c.flow"][-1] > 0.0
+    assert [w["place"] for w in result.summary["warnings"]] == ["links.cv"]  # from there on it is not to be trusted
 
 
 @pytest.mark.parametrize("disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}])

@@ -50,6 +50,7 @@ def sort_nodes(scene) -> None:
             nodes["row"][i] = 0
             clusters.append((len(integers), 1, len(integers) + 1, 0))
             integers.append(int(i))
+    refuse_columns_at_air_valves(scene)
     gates(scene)
     soften(scene, np.flatnonzero(known))
     scene.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
@@ -58,6 +59,22 @@ def sort_nodes(scene) -> None:
             name = list(scene.case.places)[i]
             scene.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+
+def refuse_columns_at_air_valves(scene) -> None:
+    """A place where rigid columns alone meet an air valve: nothing sets its pressure while that is shut."""
+    nodes, valves, columns = scene.node_table, scene.valve_table, scene.column_table
+    names = list(scene.case.places)
+    for k in np.flatnonzero(valves["device"] >= 0):
+        if not scene.devices[valves["device"][k]][2].vessel:
+            continue
+        i = int(valves["from_node"][k])
+        joined = sum(i in (v["from_node"], v["to_node"]) for v in valves)
+        met = sum(i in (c["from_node"], c["to_node"]) for c in columns)
+        if nodes["kind"][i] == rec.JUNCTION and nodes["admittance"][i] == 0.0 and joined == 1 and met > 0:
+            name = names[i].removesuffix(".connection")
+            scene.fault(f"nodes.{name}", "only rigid columns join this air valve, so nothing sets its pressure while "
+                        "it is shut; make one of them a pipe, or join it by a valve")  # fmt: skip
 
 
 def gates(scene) -> None:

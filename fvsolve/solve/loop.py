@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -23,6 +24,7 @@ ROW_CAPACITY = 512
 NO_LIMIT = 1e308
 STATELESS_STEPS = 1000  # at least, of a scene that stores nothing: a kink within one counts less than 1e-6
 MOST_AT_ONCE = 20  # events at one time: more is chatter
+MOST_IN_A_SPAN, SPAN = 2000, 1e-6  # events within this share of the run, or within one given step: so is this
 
 
 class Loop:
@@ -33,6 +35,8 @@ class Loop:
         self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
+        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * model.tables[rec.I_ARMED].size)  # their last times
+        self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
         self.rhs, self.observe, self.record, self.events = arguments((call.rhs, call.observe, call.record, call.events))
@@ -127,11 +131,14 @@ class Loop:
             device.settle(self.model, row, self.now, self.stepper.scale)
 
     def switch(self, before: np.ndarray) -> bool:
-        """Note the events that have just happened; False where they go to and fro at one time."""
+        """Note the events that have just happened; False where they go to and fro at one time, or crowd."""
         self.note(before)
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
-        return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size
+        self.crowd.append(self.t)
+        step = self.orders[told.SIZE] if self.orders[told.CONTROL] == told.FIXED_STEP else 0.0
+        crowded = len(self.crowd) == self.crowd.maxlen and self.t - self.crowd[0] <= max(self.span, step)
+        return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size and not crowded
 
     def take_rows(self) -> np.ndarray:
         """Rows written since the last call, as a copy."""

@@ -292,7 +292,8 @@ class Run:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {loop.t:.6g} s"
         if code == told.CHATTERS:
-            names = sorted({model.events[k][0] for t, k in loop.switched if t == loop.t})
+            first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
+            names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
             found = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
             return f"stopped: {listing(names)} opens and shuts without end at {when}; {', or '.join(found)}"
         if code == told.STOPPED:

@@ -187,6 +187,14 @@ class CheckDisc(Lifting, kind=""):
 
         return newton
 
+    def tell(self, start, name, x):
+        """A column and a disc that leave rest together start as powers of time, which steps do not resolve."""
+        valve = start.valves[start.scene.valve_names.index(name)]
+        if any(start.nodes["gates"][valve[end]] >= 0 for end in ("from_node", "to_node")):
+            text = (f"{name}: its disc alone holds a rigid column: its lift and flow are not to be trusted from "
+                    "where it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
+            start.scene.warnings.append(Notice("range", f"links.{name}", text))
+
     def next(self, x, back, now):
         return "shut" if back and now != "shut" else super().next(x, back, now)
 
