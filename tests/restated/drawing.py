@@ -43,7 +43,6 @@ FLUIDS = {
     "table": {"name": "Water", "temperature": 293.15, "law": "table"},
     "mixture": {**WATER, "law": "mixture", "air_fraction": 1e-3},
 }
-DISCS = [{}, {"time_constant": 0.1, "overpressure": 2e4}]
 FRICTIONS = [
     {"model": "none"},
     {"model": "steady", "factor": 0.02},
@@ -113,7 +112,6 @@ def across(draw, start: str, end: str) -> dict:
         valve(start, end, draw(between(1e-4, 3e-3)), draw(openings())),
         draw(pipes(start, end)),
         {"type": "rigid-column", **ends, "length": length, "diameter": 0.1, "friction": FRICTIONS[1]},
-        {"type": "check-valve", **ends, "area": draw(between(2e-4, 5e-3)), **draw(st.sampled_from(DISCS))},
         {"type": "pump", **ends, "curve": {"flow": [flow], "head": [head]}},
     ]))  # fmt: skip
 
