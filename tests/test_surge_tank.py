@@ -88,8 +88,9 @@ def test_a_tank_behind_a_pipe_starts_at_rest_and_stays():
 
 
 def test_marks_and_what_moves_name_the_tank_itself():
+    """What lies below its bottom asks an empty tank for more."""
     nodes = {"t": {"type": "tank", "area": 1.0, "level": 0.5,
-                   "connection": {"diameter": 0.2, "loss_in": 1.0, "loss_out": 1.0}}, "air": lake(0.0)}  # fmt: skip
+                   "connection": {"diameter": 0.2, "loss_in": 1.0, "loss_out": 1.0}}, "air": lake(-0.5)}  # fmt: skip
     result = fvsolve.run(scene(nodes, {"hole": valve("t", "air", 0.02)}, 40.0, {}, ["t.level"]))
     assert [mark.place for mark in result.marks] == ["nodes.t"] and result["t.level"][-1] == pytest.approx(
         0.0, abs=1e-6

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.basins import means, samples
 from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 
@@ -54,7 +53,7 @@ def bounds(case, name: str) -> tuple[float, float]:
         said += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
     for basin, mesh in case.meshes.items():
         if name in case.nodes[basin].scalars:
-            said += means(samples(case.nodes[basin].scalars[name], mesh)).tolist()
+            said += case.nodes[basin].scalars[name].at(*np.ascontiguousarray(mesh.centre.T)).tolist()
     return min(said), max(said)
 
 
@@ -149,11 +148,11 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
             "initial": initial,
             "final": final,
             "inflow": float(both[0].sum()),
-            "outflow": float(-both[1].sum()),
+            "outflow": float(0.0 - both[1].sum()),
             "decayed": decayed,
             "by_node": {node: float(x) for node, x in zip(model.node_names, both.sum(axis=0), strict=True) if x != 0.0},
             "nodes": {
-                node: {"inflow": float(x), "outflow": float(-y)}
+                node: {"inflow": float(x), "outflow": float(0.0 - y)}
                 for node, x, y in zip(model.node_names, *both, strict=True)
                 if x != 0.0 or y != 0.0
             },

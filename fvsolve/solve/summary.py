@@ -175,11 +175,12 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     nodes = {name: {come: float(x), gone: float(0.0 - y)} for name, (come, gone), x, y in rows if x != 0.0 or y != 0.0}
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
     remainder = change - float(np.sum(ledger))
-    largest = max(initial, initial + change, *total.values()) if total else max(initial, initial + change)
+    terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}
+    largest = max(initial, initial + change, *terms.values())
     return {
         "initial": initial,
         "final": initial + change,
-        **{word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")},
+        **terms,
         "by_node": {name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row},
         "nodes": nodes,
         "remainder": remainder,
