@@ -50,7 +50,8 @@ class Response:
 
     def __call__(self, s):
         """H at complex numbers s [1/s]; a number of a number, an array of an array."""
-        return self.transfer(s)
+        found = self.transfer(s)
+        return complex(found[0]) if np.ndim(s) == 0 else found
 
     def plain(self) -> dict:
         """As JSON says it: complex numbers as [re, im]."""

@@ -53,10 +53,9 @@ class Transfer:
         most = np.linalg.norm(self.b) * np.linalg.norm(self.c) / np.abs(overlap)
         return poles, residues, np.minimum(moved, DEFECT * norm), np.abs(residues) > SHOWN * most
 
-    def __call__(self, s):
-        """H at complex numbers s, a number of a number, complex128[k] of k of them; infinite at a pole."""
-        found = self.measured(s)[0]
-        return complex(found[0]) if np.ndim(s) == 0 else found
+    def __call__(self, s: np.ndarray) -> np.ndarray:
+        """H at complex numbers s : complex128[k]; infinite at a pole."""
+        return self.measured(s)[0]
 
     def measured(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(H, by how much rounding and the error of A may have moved it) : complex128[k], float64[k]."""
