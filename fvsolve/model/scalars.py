@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.case.basins import means, samples
 from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 
@@ -53,7 +54,7 @@ def bounds(case, name: str) -> tuple[float, float]:
         said += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
     for basin, mesh in case.meshes.items():
         if name in case.nodes[basin].scalars:
-            said += case.nodes[basin].scalars[name].at(*np.ascontiguousarray(mesh.centre.T)).tolist()
+            said += means(samples(case.nodes[basin].scalars[name], mesh)).tolist()
     return min(said), max(said)
 
 
