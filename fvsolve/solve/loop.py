@@ -147,8 +147,8 @@ class Loop:
         return self.stepper.rows[:count].copy()
 
     def step_back(self) -> None:
-        """Return to the state before the last step."""
-        if self.flags[told.BEHIND] == 1:
+        """Return to the state before the last step, unless that step is in the ledgers: then its end was sound."""
+        if self.flags[told.BEHIND] == 1 and self.memory[told.UNBOOKED] > 0.0:
             self.memory[told.T] -= self.memory[told.LAST]
             self.memory[told.UNBOOKED] = 0.0
             self.flags[told.NOW], self.flags[told.OLD] = self.flags[told.OLD], self.flags[told.NOW]
