@@ -519,7 +519,7 @@ def test_quantities_of_a_basin():
         ({"bed": "0.5*(y"}, 'nodes.pool.bed: "0.5*(y" is no formula of x and y: a bracket is left open'),
         ({"bed": "0.5*y)"}, "a bracket is closed that was not opened"),
         ({"bed": "2*x y"}, '"2*x y" is no formula of x and y: invalid syntax'),
-        ({"bed": {"file": "bed.csv"}}, 'nodes.pool.bed.file: bed.csv, line 4: "1,0,deep"; wanted x [m], y [m]'),
+        ({"bed": {"file": "bed.csv"}}, 'nodes.pool.bed.file: bed.csv, line 4: "deep" is no number in column "z"'),
     ],
 )
 def test_a_fault_in_a_basin_comes_once(changes, said, tmp_path):

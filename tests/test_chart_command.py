@@ -22,7 +22,8 @@ def test_a_chart_leaves_table_and_both_pictures_and_says_what_the_default_costs(
     assert (folder / "chart.png").read_bytes()[:4] == b"\x89PNG"
     assert "<svg" in (folder / "chart.svg").read_text()
     lines = list(csv.DictReader((folder / "chart.csv").open()))
-    assert [line["method"] for line in lines] == ["auto"] * 3 + ["rodas-5p"] * 3
+    methods = [line["method"] for line in lines]  # and coarser ones, until one misses the target
+    assert {*methods} == {"auto", "rodas-5p"} and min(methods.count(name) for name in {*methods}) >= 3
     assert "default: auto" in said
     assert "\nmethod = " in said and "\nrtol = " in said
 

@@ -124,8 +124,8 @@ HARM = {
     "memory longer": lambda kept: {"memory": np.append(kept["memory"], [0.0, 1.0])},
     "memory of one number": lambda kept: {"memory": np.zeros(1)},
     "a segment there is not": lambda kept: {"memory": np.concatenate([[99.0], kept["memory"][1:]])},
-    "changes below zero": lambda kept: {"memory": np.concatenate([kept["memory"][:2], [-4.0], kept["memory"][3:]])},
-    "changes without end": lambda kept: {"memory": np.concatenate([kept["memory"][:2], [1e300], kept["memory"][3:]])},
+    "changes below zero": lambda kept: {"memory": np.concatenate([kept["memory"][:3], [-4.0], kept["memory"][4:]])},
+    "changes without end": lambda kept: {"memory": np.concatenate([kept["memory"][:3], [1e300], kept["memory"][4:]])},
 }  # fmt: skip
 
 

@@ -151,7 +151,7 @@ def test_rows_that_are_finished_are_reused_and_give_the_same(capsys, tmp_path):
 def test_a_reference_that_fails_says_so():
     case = pulses.case(20, exact=False)
     case["numerics"]["end"] = 1e9
-    case["numerics"]["below_vapor"] = "stop"
+    case["numerics"]["below_vapor"], case["output"]["every"] = "stop", 1e6
     case["nodes"]["gate"] = scenes.junction(scenes.step(0.01, 0.0, 5.0))
     with pytest.raises(FvsolveError, match="reference run failed.*vapour"):
         order(case, levels=2, cells=4, against="finer")

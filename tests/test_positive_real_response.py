@@ -95,9 +95,7 @@ def test_friction_moves_a_line_off_the_boundary():
     # s -> 0: pipe and valve in parallel, each d dp / dq = 2 dp / q
     friction, loss = 0.02 * LENGTH / DIAMETER * RHO / (2.0 * area(DIAMETER) ** 2), RHO / (2.0 * (0.61 * 0.01) ** 2)
     q = math.sqrt(8e5 / (friction + loss))
-    assert response(case, "gate")(0.0).real == approx(
-        1.0 / (1.0 / (2 * friction * q) + 1.0 / (2 * loss * q)), rel=1e-6
-    )
+    assert response(case, "gate")(0.0).real == approx(1.0 / (1.0 / (2 * friction * q) + 1.0 / (2 * loss * q)), rel=1e-6)
 
 
 def test_ports_that_are_none_and_cases_that_are_too_large_are_refused():

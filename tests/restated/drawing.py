@@ -54,11 +54,16 @@ FRICTIONS = [
 
 @st.composite
 def numerics(draw) -> dict:
-    """Any scheme with an explicit method by Courant number, an implicit one by its own step, or one by its error."""
+    """Any scheme with an explicit method by Courant number, an implicit one by its own step, or one by its error.
+
+    Not limited ones with steps by Newton at a given length: whether it passes a kink is decided by rounding, and where
+    it does not the step is shorter, which moves first-order results by 1e-3.
+    """
     given = {"scheme": draw(st.sampled_from(SCHEMES))}
     if given["scheme"] == "muscl":
         given["limiter"] = draw(st.sampled_from(LIMITERS))
-    kind = draw(st.sampled_from(["courant", "implicit", "rtol"]))
+    kinds = ["courant", "rtol"] if given["scheme"] in ("muscl", "weno5") else ["courant", "implicit", "rtol"]
+    kind = draw(st.sampled_from(kinds))
     if kind == "courant":
         return given | {"method": draw(st.sampled_from(BY_COURANT)), "courant": draw(between(0.3, 0.5))}
     if kind == "implicit":
