@@ -10,6 +10,7 @@ NAMED = 40  # nodes up to which names are written
 PANELS = 4  # columns of a sweep that are drawn
 
 
+@style.as_it_stands
 def case_figure(case):
     """Nodes and links of a case: at their positions where all have one, else in columns by distance from the first."""
     at = places(case)
@@ -68,6 +69,7 @@ def places(case) -> dict[str, tuple[float, float]]:
     return found
 
 
+@style.as_it_stands
 def model_figure(model):
     """Heads at the nodes of a model at its start."""
     names = model.node_names
@@ -75,6 +77,7 @@ def model_figure(model):
     return bars(names, heads, "head at the start [m]", model.case.title or model.case.name)
 
 
+@style.as_it_stands
 def state_figure(state):
     """All numbers of a state by their place in the vector."""
     figure = style.figure(3.0)
@@ -86,6 +89,7 @@ def state_figure(state):
     return figure
 
 
+@style.as_it_stands
 def sweep_figure(sweep):
     """Greatest values of the first probes over the first key that varies, or over the runs."""
     names = [name for name in sweep.columns if name.startswith(("max(", "min("))][:PANELS]

@@ -24,6 +24,8 @@ from fvsolve.steppers.tableau import method_named
 PHASES = 33  # from 0 to pi, of one direction; of the other from -pi to pi
 GROWTH = 1e-9  # of |R| - 1 that is taken for growth
 MOST, HALVINGS = 64.0, 40
+FINE = 1001  # phases along a line
+LITTLE = 1.01  # times: what holds there needs no proof
 
 
 @functools.lru_cache(maxsize=64)
@@ -33,10 +35,10 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
     share : of the rate, in x; waves : of p, u, v, else of what is carried. Raises FvsolveError for a scheme
     without weights.
     """
-    z, r = modes(scheme, share, waves), stability_function(method_named(method))
+    z = modes(scheme, share, waves)
 
     def holds(courant: float) -> bool:
-        return bool(np.abs(r(courant * z)).max() <= 1.0 + GROWTH)
+        return not grows(z, method, courant)
 
     low, high = 0.0, 1.0 / 64.0
     while high <= MOST and holds(high):
@@ -47,6 +49,20 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
+
+
+def holds_well(scheme: str, method: str, courant: float, share: float = 1.0, waves: bool = False) -> bool:
+    """Whether no wave that is tried grows at a Courant number, nor at one that is a little greater."""
+    if share == 1.0 and not waves:
+        z = symbol(weights_of(scheme), np.linspace(0.0, np.pi, FINE))
+    else:
+        z = modes(scheme, share, waves)
+    return not grows(z, method, courant) and not grows(z, method, courant * LITTLE)
+
+
+def grows(z: np.ndarray, method: str, courant: float) -> bool:
+    """Whether one of the eigenvalues z, for a rate of one, is multiplied by more than one in a step."""
+    return bool(np.abs(stability_function(method_named(method))(courant * z)).max() > 1.0 + GROWTH)
 
 
 def modes(scheme: str, share: float, waves: bool) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.limits.grid import advection_limit, growth_of
-from fvsolve.limits.plane import plane_limit
+from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.symbol import weights_of
 from fvsolve.model.schemes import FROZEN_AS, QUICKER
 from fvsolve.steppers import automatic
@@ -61,10 +61,14 @@ def pipe_rooms(model, method: str) -> list[Room]:
         return []
     numerics, waves = model.case.numerics, model.wave_rates
     scheme, limited = frozen(numerics.scheme)
+    fixed = numerics.step is not None
+    quicker = model.tables[rec.I_PIPES]["quicker"]
+    fastest = float(numerics.step * waves.max() if fixed else numerics.courant)
+    if not (fixed and quicker.max() > 1.0) and holds_well(scheme, method, fastest):
+        return []
     one = advection_limit(scheme, method)
     cells = np.array([pipe.cells for pipe in model.pipes])
-    quicker = model.tables[rec.I_PIPES]["quicker"]
-    if numerics.step is None:
+    if not fixed:
         courant = numerics.courant * waves / (waves * quicker).max()
         short = np.full(waves.size, math.inf)  # the step minds their ends
     else:
@@ -93,8 +97,13 @@ def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
         else:
             courant = numerics.courant
         scheme, limited = frozen(basin.scheme)
-        limit = plane_limit(scheme, method, round(share, 2), basin.waving) if basin.is_grid else (
-            advection_limit(scheme, method).limit)  # fmt: skip
+        share = round(share, 2) if basin.is_grid else 1.0
+        if holds_well(scheme, method, courant / parts, share, basin.is_grid and basin.waving):
+            continue
+        if basin.is_grid:
+            limit = plane_limit(scheme, method, share, basin.waving)
+        else:
+            limit = advection_limit(scheme, method).limit
         fixed = basin.is_grid and basin.part.physics == "liquid" and model.case.fluid.law == "linear"
         rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
                           "in a wide basin"))  # fmt: skip

@@ -17,10 +17,10 @@ from fvsolve.shown import Shown
 from fvsolve.studies.outcome import grown, refusal
 from fvsolve.studies.points import Points
 
-FIRST = ("ok", "reason", "t [s]", "marks", "warnings")
+FIRST = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST = ("expectations", "steps", "seconds")
 REFUSED = "refused: "
-KEPT = {"row": 3}  # counts up when a row holds something else: older ones on disk are not reused
+KEPT = {"row": 4}  # counts up when a row holds something else: older ones on disk are not reused
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,8 +29,8 @@ class Sweep(Shown):
 
     keys : the keys that vary
     rows : their values, `ok`, `reason`, `t [s]`, `marks` (the first thing that the model could not follow, in words,
-    or nothing); `warnings` as in the summary; of each probe `min(...)`, `max(...)`, their times and `final(...)` in
-    the units of `[output]`, None where the run ended in a value that is not finite; `expectations` (whether all hold),
+    or nothing); `warnings` and `fluid` as in the summary; of each probe `min(...)`, `max(...)`, their times and
+    `final(...)` in the units of `[output]`, None where the run ended in a value that is not finite; `expectations` (whether all hold),
     `steps`, `seconds` of stepping
     reused : how many rows were there before
     """
@@ -69,6 +69,8 @@ class Sweep(Shown):
     def _cell(self, name: str, value: Any) -> Any:
         if name == "warnings":
             return "; ".join(one["text"] for one in value or ())
+        if name == "fluid":
+            return value["name"] if value else ""
         return pasted(value) if name in self.keys else "" if value is None else value
 
 
@@ -209,7 +211,7 @@ def row_of(source, settings: dict) -> dict[str, Any]:
         raise KeyboardInterrupt
     row = {"ok": result.ok, "reason": result.reason, "t [s]": result.summary["t"]}
     row["marks"] = min(result.marks, key=lambda mark: mark.time).text if result.marks else ""
-    row["warnings"] = result.summary["warnings"]
+    row |= {key: result.summary[key] for key in ("warnings", "fluid")}
     blown = grown(result.reason)  # the numbers before it mean nothing
     for name, one in result.extremes.items():
         unit = f"[{result.units[name]}]"
