@@ -30,8 +30,8 @@ class Sweep(Shown):
     keys : the keys that vary
     rows : their values, `ok`, `reason`, `t [s]`, `marks` (the first thing that the model could not follow, in words,
     or nothing); `warnings` and `fluid` as in the summary; of each probe `min(...)`, `max(...)`, their times and
-    `final(...)` in the units of `[output]`, None where the run ended in a value that is not finite; `expectations` (whether all hold),
-    `steps`, `seconds` of stepping
+    `final(...)` in the units of `[output]`, None where the run ended in a value that is not finite; `expectations`
+    (whether all hold), `steps`, `seconds` of stepping
     reused : how many rows were there before
     """
 
