@@ -115,3 +115,13 @@ def test_what_is_wrong_with_a_leak_is_said(wrong, said):
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(scene(nodes, links, 1.0, {}))
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("stated", [{}, {"position": [0.0, 0.0]}])
+def test_a_leak_is_drawn_where_it_drains(stated, tmp_path):
+    """It owns the place that it drains to, of which no other part speaks."""
+    nodes = {"a": lake(40.0, **stated), "j": junction(**stated)}
+    links = {"main": pipe("a", "j", 100.0, 0.1, 1000.0, 5), "hole": leak("j", 1e-6)}
+    result = fvsolve.run(scene(nodes, links, 0.5, {}, ["hole.flow"], 0.1, output={"every": 0.1, "fields": 2}),
+                         out=tmp_path / "run")  # fmt: skip
+    assert result.ok and (tmp_path / "run" / "fields.pvd").is_file()

@@ -20,7 +20,8 @@ BOW = 0.15  # how far parallel links bend aside, as part of their length
 def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     """Plan position float64[2] [m] of every part with places; `lengths` are those of the links that have one [m]."""
     ports = {name: [place(port) for port in link.ports.values()] for name, link in case.links.items()}
-    owners = dict.fromkeys(one for found in ports.values() for one in found if one not in case.nodes)
+    named = [one for found in ports.values() for one in found] + [place(one) for one in case.places]
+    owners = dict.fromkeys(one for one in named if one not in case.nodes)
     stated = {name: node.position for name, node in case.nodes.items() if node.position is not None}
     if len(stated) == len(case.nodes):
         plan = {name: np.array(place, float) for name, place in stated.items()}

@@ -8,6 +8,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.limits.step import step_limits
 
+FAR = 1e3  # times as much again for states that are driven by more than waves: contents, bodies, what is carried
 MOST = 1e6  # times what drives a scene: what is beyond has grown by itself
 OPEN = 1e-8  # of the largest term of a ledger: what does not close to that is wrong
 DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # keys of nodes that are schedules
@@ -17,7 +18,7 @@ class Soundness:
     """What is watched while a model runs: the pace of its basins, and the size of its waves.
 
     largest : float64[n]  what no state may exceed: MOST times the largest of the spread of the start, the range of what
-    is given over time, and the jump that stopping the start's flows makes (Joukowsky); inf where nothing is known
+    is given over time, and the jump that stopping the start's flows makes (Joukowsky)
     """
 
     def __init__(self, model) -> None:
@@ -63,8 +64,8 @@ def unclosed(name: str, ledger: dict) -> list[Notice]:
 
 
 def drives(model) -> np.ndarray:
-    """The largest of what drives each state of pipes and basins, inf for others : float64[n]."""
-    found, linear = np.full(model.y_size, np.inf), model.case.properties
+    """The largest of what drives each state of pipes and basins; of others what is small, times FAR : float64[n]."""
+    found, linear = FAR * model.scale, model.case.properties
     pressure, flow = given(model)
     pipes = model.tables[rec.I_PIPES]
     flow = max([flow, *np.abs(pipes["flow"])])
