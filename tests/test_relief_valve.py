@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from truth import discs
-from truth.scenes import RHO, SMOOTH, WATER, chamber, junction, pipe, reservoir, scene, valve
+from truth.scenes import RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy
@@ -16,6 +16,7 @@ from fvsolve.studies.energy.energy import energy
 AMBIENT, BETA = 101325.0, 2e7
 SOFT = {**WATER, "bulk_modulus": BETA}
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
+ROUGH = {"model": "steady", "factor": 0.02}
 RELIEF, SET, SPAN = 4e-4, 5e5, 1e5
 DISCS = {"lag": {"time_constant": 0.05}, "swing": {"natural_frequency": 8.0, "damping_ratio": 0.1}}
 
@@ -119,6 +120,68 @@ def test_a_gate_that_shuts_at_once_lifts_it_to_where_it_stays():
 def test_other_laws_lift_it_alike(law, near):
     ours, plain = (fvsolve.run(main(SMOOTH, law=one))["relief.opening"][-1] for one in (law, "linear"))
     assert ours == pytest.approx(plain, rel=near) and ours != plain
+
+
+Z = 1000.0 / (math.pi / 4 * 0.1**2)  # of a main [Pa s/kg]
+TURN, SLOPE = 4.0, 5e4  # of the lake above: it falls by so much a second, and from then on rises
+
+
+def backwards(flow_area, law="linear"):
+    """A relief valve between two long mains; the lake above falls below the one beyond, and rises again."""
+    falls = {"time": [0.0, 1.0, TURN, 7.0], "value": [3e5, 3e5, 3e5 - SLOPE * (TURN - 1.0), 3e5]}
+    nodes = {"up": reservoir(falls), "a": junction(), "b": junction(), "down": reservoir(2.4e5)}
+    links = {"to-a": pipe("up", "a", 5000.0, 0.1, 1000.0, 100), "from-b": pipe("b", "down", 5000.0, 0.1, 1000.0, 100),
+             "relief": relief("a", "b", flow_area, 1.5e5, 2e4)}  # fmt: skip
+    numerics = {"method": "rk4", "scheme": "upwind5", "courant": 0.5}
+    return scene(nodes, links, 12.5, numerics, ["a.pressure", "relief.flow"], 0.05, fluid={**WATER, "law": law})
+
+
+def seen(flow_area):
+    """Times at which it leaves full opening, shuts, opens and is full again, by what meets at a and b.
+
+    Backwards, M(x) raises p_a: of two lifts with x = (p_a(x) - set) / span it keeps the greater; it shuts where that
+    ends, and opens where the pressure without flow has come back.
+    """
+    g = 2.0 * RHO * flow_area**2
+    first = math.sqrt(g * 6e4)
+
+    def flow(x, fall):  # M |M| = x^2 G (drop - 2 Z (M - first)), below zero
+        free, gx = 2.0 * fall - 6e4 - 2.0 * Z * first, 2.0 * Z * g * x * x
+        return -2.0 * x * x * g * free / (gx + math.sqrt(gx * gx + 4.0 * x * x * g * free)) if x > 0.0 else 0.0
+
+    over = lambda x, fall: (3e5 - 2.0 * fall + Z * (first - flow(x, fall)) - 1.5e5) / 2e4 - x  # noqa: E731
+    x = np.linspace(0.0, 1.0, 2001)
+    least = 3e4 + Z * first  # where nothing drives it
+    greatest = lambda fall: max(over(one, fall) for one in x)  # noqa: E731
+    full = brentq(lambda fall: over(1.0, fall), least, 1.5e5, xtol=1e-3)
+    empty = brentq(lambda fall: over(0.0, fall), least, 1.5e5, xtol=1e-3)
+    shut = brentq(greatest, least, 1.5e5, xtol=1e-2)
+    falling, rising = (lambda fall: 6.0 + fall / SLOPE), (lambda fall: 5.0 + 2.0 * TURN - 1.0 - fall / SLOPE)
+    return [falling(full), falling(max(shut, full)), rising(empty), rising(min(empty, full))]
+
+
+@pytest.mark.parametrize("law, near", [("linear", 1e-3), ("log", 3e-3), ("mixture", 3e-3)])
+@pytest.mark.parametrize("flow_area", [1e-5, 2e-5, 4e-5])
+def test_flow_that_comes_back_holds_it_open_until_it_falls_shut(flow_area, law, near):
+    """A small one follows the pressure both ways; a greater one, lifted by its own backward flow, snaps."""
+    result = fvsolve.run(backwards(flow_area, law))
+    events = result.summary["events"]
+    assert result.ok
+    assert [e["what"] for e in events] == ["leaves full opening", "is shut", "opens", "is fully open"]
+    assert [e["time"] for e in events] == pytest.approx(seen(flow_area), abs=near)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-13
+
+
+@pytest.mark.parametrize("scheme", ["upwind3", "linear-upwind", "muscl"])
+def test_steps_of_a_lake_drive_it_both_ways_to_the_end(scheme):
+    """Its equation with the nodes had no root backwards where Newton sought one, and ran off."""
+    heads = {"time": [0.0, 0.3, 0.7], "value": [30.0, 12.0, 35.0], "kind": "step"}
+    nodes = {"up": lake(heads), "down": lake(20.0), "a": junction(), "b": junction()}
+    main = lambda start, end: pipe(start, end, 60.0, 0.1, 1000.0, 4, friction=ROUGH)  # noqa: E731
+    links = {"to-a": main("up", "a"), "to-b": main("down", "b"), "relief": relief("a", "b", 6.1e-5, 1.5e5, 2e4)}
+    numerics = {"method": "rk4", "scheme": scheme, "courant": 0.5}
+    result = fvsolve.run(scene(nodes, links, 1.0, numerics, ["relief.opening"], 0.05))
+    assert result.ok and len(result.summary["events"]) <= 8
 
 
 def test_order_is_not_lost_at_a_located_switch():

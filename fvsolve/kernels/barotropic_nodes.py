@@ -10,7 +10,9 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.clusters import (
+    any_back,
     finish,
+    let_fall,
     move,
     prepare,
     put_valve,
@@ -210,7 +212,7 @@ def valve_target(tables, out, k, g):
 
 
 @njit
-def valve_move(tables, out, k, g, m):
+def valve_move(tables, out, k, g, m, wide):
     """a, s with dM = a + s d(p_i - p_j) for the next Newton step of valve k, which carries m [kg/s]."""
     valve = tables[I_VALVES][k]
     if valve["law"] == CURVE:
@@ -222,7 +224,7 @@ def valve_move(tables, out, k, g, m):
         return emitter_step(tables[I_FLOATS], valve["data"], g * denser * denser, m, drop)
     target, slope = valve_target(tables, out, k, g)
     if valve["law"] == LIFT and is_lifting(tables, k):
-        return lifting_step(tables, out, k, full_flow(target, transition), slope, m)
+        return lifting_step(tables, out, k, full_flow(target, transition), slope, m, wide)
     if transition > 0.0:
         steepest = 45.0 / 32.0 * slope / transition
         return target - m, min(steepest, slope / max(abs(target) + abs(m), 1e-300))
@@ -239,41 +241,51 @@ def full_flow(target, transition):
 
 
 @njit
-def valve_lift(tables, out, k, g):
+def valve_lift(tables, out, k, g, wide):
     """`restriction_lift` at the density upstream."""
     valve = tables[I_VALVES][k]
     if valve["law"] != LIFT or not is_lifting(tables, k):
         return 0.0
-    return lifting_slope(tables, k, full_flow(valve_target(tables, out, k, g)[0], valve["transition"]))
+    return lifting_slope(tables, out, k, full_flow(valve_target(tables, out, k, g)[0], valve["transition"]), wide)
 
 
 @njit
-def newton_step(cluster, out, tables, g, m, c, held, slope, work):
-    """One Newton step of a cluster; returns its greatest change, relative."""
+def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right):
+    """`assemble` with the slopes of the pipe ends."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, n, k = tables[I_INTEGERS], c.size, g.size
-    matrix, right = work[: n * n], work[n * n : n * n + n]
-    at = n * n + n
-    a, s, lift = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
-    for r in range(n * n):
-        matrix[r] = 0.0
+    integers, n = tables[I_INTEGERS], c.size
+    matrix[:] = 0.0
     for r in range(n):
         i = integers[cluster["first_node"] + r]
         right[r] = out[layout["net"] + i] + c[r]
         matrix[n * r + r] = -slope[i]
-    for e in range(k):
+    for e in range(g.size):
         which = integers[cluster["first_valve"] + e]
         i, j = inner_row(nodes, valves[which]["from_node"]), inner_row(nodes, valves[which]["to_node"])
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if g[e] > 0.0:
-            a[e], s[e] = valve_move(tables, out, which, g[e], m[e])
-            lift[e] = valve_lift(tables, out, which, g[e])
+            a[e], s[e] = valve_move(tables, out, which, g[e], m[e], wide)
+            lift[e] = valve_lift(tables, out, which, g[e], wide)
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for r in range(n):
         if held[r] == 0.0:
             right[r], matrix[n * r + r] = 0.0, 1.0
-    if not solve_dense(matrix, right, n):
-        out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
+
+
+@njit
+def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
+    """One Newton step of a cluster; returns its greatest change, relative. wide: as of `lift_of`."""
+    n, k = c.size, g.size
+    matrix, right = work[: n * n], work[n * n : n * n + n]
+    at = n * n + n
+    a, s, lift = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
+    balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
+    side = solve_dense(matrix, right, n)
+    if side <= 0.0 and not wide and let_fall(cluster, tables, g, m):
+        balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
+        side = solve_dense(matrix, right, n)
+    if side == 0.0:
+        out[STATUS], out[WHERE] = NO_SOLUTION, tables[I_INTEGERS][cluster["first_node"]]
         return 0.0
     return move(cluster, tables, out, m, a, s, lift, right)
 
@@ -329,8 +341,8 @@ def begin_clusters(out, tables, space):
 
 
 @njit
-def step_clusters(sweep, out, tables, space):
-    """A Newton step of all clusters that something reaches; returns the greatest change, relative."""
+def step_clusters(sweep, out, tables, wide, space):
+    """A Newton step of all clusters that something reaches; returns the greatest change, relative; wide: `lift_of`."""
     clusters, (slope, c, held, _, quiet, g, m, rest) = tables[I_CLUSTERS], space
     a, b, moved = 0, 0, 0.0
     for which in range(clusters.size):
@@ -339,10 +351,22 @@ def step_clusters(sweep, out, tables, space):
         if sweep == 1 and quiet[which] == 1.0 and not is_quiet(cluster, tables, out):
             quiet[which] = 0.0
         if quiet[which] == 0.0:
-            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, rest)
+            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide, rest)
             moved = max(moved, step)
         a, b = i, j
     return moved
+
+
+@njit
+def any_backwards(tables, space):
+    """`any_back` of all clusters."""
+    clusters, m, b = tables[I_CLUSTERS], space[6], 0
+    for which in range(clusters.size):
+        j = b + clusters[which]["valves"]
+        if any_back(clusters[which], tables, m[b:j]):
+            return True
+        b = j
+    return False
 
 
 @njit
@@ -365,11 +389,13 @@ def close_nodes_barotropic(t, y, out, tables):
     space = node_space(tables)
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
-    moved, before = 1e300, 1e300
+    moved, before, wide = 1e300, 1e300, True
     for sweep in range(1, 101):
         ends_into_nodes(out, tables, space[0], False)
-        before, moved = moved, step_clusters(sweep, out, tables, space)
+        before, moved = moved, step_clusters(sweep, out, tables, wide, space)
         if settled(moved, before):
-            break
+            if not (wide and any_backwards(tables, space)):
+                break
+            moved, wide = 1e300, False
     finish_clusters(out, tables, space, moved)
     ends_into_nodes(out, tables, space[0], True)

@@ -6,6 +6,7 @@ that lets go more than the speed of sound hears nothing of its node, and no pres
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import (
+    any_backwards,
     begin_clusters,
     finish_clusters,
     given_flows,
@@ -148,22 +149,25 @@ def hold_back(sweep, out, tables, before, low, high):
 @njit
 def close_nodes_cavitating(t, y, out, tables):
     """`close_nodes_barotropic` above the law's floor; done when no pressure changes."""
-    space, n, work = node_space(tables), tables[I_NODES].size, tables[I_SCRATCH]
+    space, n, work, st = node_space(tables), tables[I_NODES].size, tables[I_SCRATCH], tables[I_SETTINGS][0]
     pressure, last = tables[I_LAYOUT][0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
-    low[:], high[:] = tables[I_SETTINGS][0]["floor"], UNBOUNDED
+    low[:], high[:] = st["floor"], UNBOUNDED
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
-    moved, before, worst = 1e300, 1e300, -1
+    moved, before, worst, wide = 1e300, 1e300, -1, True
     for sweep in range(1, 101):
         cavitating_ends(out, tables, space[0], False)
         for i in range(n):
             last[i] = out[pressure + i]
-        step_clusters(sweep, out, tables, space)
+        step_clusters(sweep, out, tables, wide, space)
         before = moved
         moved, worst = hold_back(sweep, out, tables, last, low, high)
         if settled(moved, before):
-            break
+            if not (wide and any_backwards(tables, space)):
+                break
+            moved, wide = 1e300, False
+            low[:], high[:] = st["floor"], UNBOUNDED
     finish_clusters(out, tables, space, moved)
     if out[STATUS] == NOT_CONVERGED:
         out[WHERE] = worst

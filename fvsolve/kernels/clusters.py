@@ -23,7 +23,7 @@ from fvsolve.kernels.records import (
     STATUS,
     WHERE,
 )
-from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step
+from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step, runs_back
 
 BAR = 1e5
 ROUNDING = 1e-15  # of pressures, relative; and of a flow, of that at 1 Pa
@@ -32,17 +32,20 @@ UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has
 
 @njit
 def solve_dense(a, b, n):
-    """b <- a^-1 b by elimination with partial pivoting; False where a is singular. Overwrites both.
+    """b <- a^-1 b by elimination with partial pivoting; returns the sign of det a, 0 where singular. Overwrites both.
 
     a : float64[n * n]  row by row
     """
+    sign = 1.0
     for i in range(n):
         pivot, row = i, n * i
         for k in range(i + 1, n):
             if abs(a[n * k + i]) > abs(a[n * pivot + i]):
                 pivot = k
         if a[n * pivot + i] == 0.0:
-            return False
+            return 0.0
+        if (pivot != i) != (a[n * pivot + i] < 0.0):
+            sign = -sign
         if pivot != i:
             for k in range(n):
                 a[row + k], a[n * pivot + k] = a[n * pivot + k], a[row + k]
@@ -57,7 +60,7 @@ def solve_dense(a, b, n):
         for k in range(i + 1, n):
             b[i] -= a[n * i + k] * b[k]
         b[i] /= a[n * i + i]
-    return True
+    return sign
 
 
 @njit(forceinline=True)
@@ -118,8 +121,8 @@ def put_valve(i, j, m, a, s, lift, n, matrix, right):
 
 
 @njit
-def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right):
-    """Linear system for the change of the cluster's pressures, with the valves' changes put in."""
+def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wide):
+    """Linear system for the change of the pressures, with the valves' changes put in; wide: as of `lift_of`."""
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     integers, n = tables[I_INTEGERS], c.size
     for i in range(matrix.size):
@@ -135,8 +138,8 @@ def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right):
         if g[e] > 0.0:
             drop = out[layout["pressure"] + valve["from_node"]] - out[layout["pressure"] + valve["to_node"]]
             k = integers[cluster["first_valve"] + e]
-            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop)
-            lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop)
+            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop, wide)
+            lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop, wide)
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for i in range(n):
         if held[i] == 0.0:
@@ -202,19 +205,44 @@ def close_cluster(out, tables, which):
     quiet = whole_inflows(cluster, tables, out, c) and unchanged
     find_held(cluster, tables, g, held)
     shut_out(cluster, tables, g, m, held)
-    moved = 1e300
+    moved, wide = 1e300, True
     for _ in range(100):
         if quiet:
             moved = 0.0
             break
-        assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right)
-        if not solve_dense(matrix, right, n):
+        assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wide)
+        side = solve_dense(matrix, right, n)
+        if side <= 0.0 and not wide and let_fall(cluster, tables, g, m):
+            continue
+        if side == 0.0:
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
             return
         before, moved = moved, move(cluster, tables, out, m, a, s, lift, right)
         if settled(moved, before):
-            break
+            if not (wide and any_back(cluster, tables, m)):
+                break
+            moved, wide = 1e300, False
     finish(cluster, tables, out, g, m, c, held, group, moved)
+
+
+@njit
+def any_back(cluster, tables, m):
+    """Whether a valve of a cluster that the pressure before it lifts carries its flow backwards."""
+    for e in range(m.size):
+        if runs_back(tables, tables[I_INTEGERS][cluster["first_valve"] + e], m[e]):
+            return True
+    return False
+
+
+@njit
+def let_fall(cluster, tables, g, m):
+    """Shut what would stay lifted by its own backward flow and cannot; whether there is any. Newton, coming down, has
+    met a system that is no longer positive: lower lifts would lack even more."""
+    some = False
+    for e in range(m.size):
+        if g[e] > 0.0 and runs_back(tables, tables[I_INTEGERS][cluster["first_valve"] + e], m[e]):
+            g[e], some = 0.0, True
+    return some
 
 
 @njit

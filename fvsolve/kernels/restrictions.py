@@ -45,10 +45,10 @@ def conductance_at(t, tables, out, k):
 
 
 @njit
-def restriction_step(tables, out, k, g, m, drop):
+def restriction_step(tables, out, k, g, m, drop, wide):
     """a, s with dM = a + s d(drop) for the next Newton step of restriction k, which carries m [kg/s] at a drop [Pa].
 
-    g : its conductance now, above zero.
+    g : its conductance now, above zero. wide : as of `lift_of`.
     """
     valve = tables[I_VALVES][k]
     if valve["law"] == POWER:
@@ -57,7 +57,7 @@ def restriction_step(tables, out, k, g, m, drop):
         rho = tables[I_SETTINGS][0]["rho"]
         return pump_step(tables, out, k, rho, g, m, drop)
     if valve["law"] == LIFT and is_lifting(tables, k):
-        return lifting_step(tables, out, k, flow_at_drop(g, valve["transition"], drop), g, m)
+        return lifting_step(tables, out, k, flow_at_drop(g, valve["transition"], drop), g, m, wide)
     if valve["law"] == TWO_WAY and drop < 0.0:
         g *= valve["back"]
     return valve_step(g, valve["transition"], m, drop)
@@ -96,7 +96,7 @@ def restriction_slope(tables, out, k, drop):
         return pump_step(tables, out, k, tables[I_SETTINGS][0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
     if valve["law"] == LIFT and is_lifting(tables, k):
         x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, valve["transition"], drop)
-        return x * flow_slope(g, valve["transition"], drop) + lifting_slope(tables, k, full)
+        return x * flow_slope(g, valve["transition"], drop) + max(full, 0.0) * lift_rise(tables, k)
     if valve["law"] == TWO_WAY and drop < 0.0:
         g *= valve["back"]
     return flow_slope(g, valve["transition"], drop)
@@ -118,22 +118,55 @@ def pressure_lift(tables, out, k):
 
 
 @njit
-def lifting_step(tables, out, k, full, g, m):
-    """a, s of the flow x `full` of a lifting valve; `full` is that at full opening [kg/s]."""
+def lift_rise(tables, k):
+    """Lift of such a valve over the pressure before it [1/Pa]."""
+    return 1.0 / tables[I_FLOATS][tables[I_VALVES][k]["data"] + 1]
+
+
+@njit
+def lift_of(tables, out, k, full, wide):
+    """Lift that counts in the nodes; `full` is the flow at full opening [kg/s].
+
+    Flow that comes back raises the pressure that lifts, so a lift is held between 0 and 1, and there may be two: the
+    greater one is stable. Newton comes to it from above, from where all of these are `wide` open.
+    """
     x = pressure_lift(tables, out, k)
-    return x * full - m, 0.5 * max(x, 0.0) * g / max(abs(full), LEAST * sqrt(g))
+    if full >= 0.0:
+        return x
+    return 1.0 if wide else min(max(x, 0.0), 1.0)
 
 
 @njit
-def lifting_slope(tables, k, full):
-    """What the pressure before a lifting valve adds to its flow by its lift [kg/s/Pa]."""
-    return max(full, 0.0) / tables[I_FLOATS][tables[I_VALVES][k]["data"] + 1]
+def lifting_step(tables, out, k, full, g, m, wide):
+    """a, s of the flow x `full` of a lifting valve: of the root the chord as in `valve_step`, backwards its slope."""
+    x, transition = lift_of(tables, out, k, full, wide), tables[I_VALVES][k]["transition"]
+    if x <= 0.0:
+        return x * full - m, 0.0
+    near = x * abs(full) if full < 0.0 and not wide else abs(m)
+    s = x * x * g / max(x * abs(full) + near, x * LEAST * sqrt(g))
+    if transition > 0.0:
+        s = min(s, 45.0 / 32.0 * x * g / transition)
+    return x * full - m, s
 
 
 @njit
-def restriction_lift(tables, out, k, g, drop):
+def lifting_slope(tables, out, k, full, wide):
+    """What the pressure before a lifting valve adds to its flow by its lift [kg/s/Pa]; backwards it takes."""
+    if full < 0.0 and (wide or not 0.0 < pressure_lift(tables, out, k) < 1.0):
+        return 0.0
+    return full * lift_rise(tables, k)
+
+
+@njit
+def restriction_lift(tables, out, k, g, drop, wide):
     """The same of restriction k at a drop; none of other laws. A Newton step adds it times the change before it."""
     valve = tables[I_VALVES][k]
     if valve["law"] != LIFT or not is_lifting(tables, k):
         return 0.0
-    return lifting_slope(tables, k, flow_at_drop(g, valve["transition"], drop))
+    return lifting_slope(tables, out, k, flow_at_drop(g, valve["transition"], drop), wide)
+
+
+@njit
+def runs_back(tables, k, m):
+    """Whether restriction k is such a valve and carries its flow m backwards."""
+    return m < 0.0 and tables[I_VALVES][k]["law"] == LIFT and is_lifting(tables, k)
