@@ -4,14 +4,30 @@ A column that leads to a node without storage is held by that node's valves alon
 (below a thousandth of their full area), its time constant goes to zero with their area F, and its flow follows them:
 I = sum of F sqrt(dP), with (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP) the pressure that slows it down. When the
 last of them shuts, nothing can flow: the column stands, and the node has the pressure of its other end.
+
+A column follows a disc that leaves its seat and alone holds it, too: lift x and flow start as powers of time, and
+dP = M^2 / (G x^2), of 0 / 0 there, would relax at an infinite rate. Until x has grown, dP is what drives both,
+(L / A) sqrt(G dP) dx/dt(dP) + dP = that at rest; the column's momentum is kept.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.devices.codes import RELIEF_DISC
+from fvsolve.kernels.devices.disc import disc_speed, leads
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_SETTINGS, I_VALVES, JUNCTION, RATE
+from fvsolve.kernels.records import (
+    I_COLUMNS,
+    I_DEVICES,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_SETTINGS,
+    I_VALVES,
+    JUNCTION,
+    RATE,
+)
 from fvsolve.kernels.restrictions import conductance, conductance_at, restriction_slope
 
 NEARLY = 1e-3  # share of their full area below which valves lead their column
@@ -40,10 +56,11 @@ def led_at(tables, out, i):
 
 @njit
 def foreseen(tables, i):
-    """Whether schedules alone open and shut the valves of node i, so that the rate of their area is known."""
+    """Whether the rate of area of node i's valves is known: schedules alone move them, or it is one disc that leads."""
     node = tables[I_NODES][i]
     for e in range(node["gate_count"]):
-        if tables[I_VALVES][tables[I_INTEGERS][node["gates"] + e]]["device"] >= 0:
+        k = tables[I_INTEGERS][node["gates"] + e]
+        if tables[I_VALVES][k]["device"] >= 0 and not leads(tables, k):
             return False
     return True
 
@@ -76,11 +93,66 @@ def standing_pressure(tables, out, k, end, solved):
 
 
 @njit
-def led_flow(t, tables, out, k, end, solved):
+def disc_drop(y, tables, device, before, drop, slack, heavy):
+    """(drop across a disc that leads its column, dx/dt), by Newton on its root r: r2 + heavy r dx/dt(r2) = drop.
+
+    drop : where nothing moves; slack : what it feels for a drop of 1 Pa more; heavy : (L / A) sqrt(G). From above: the
+    cubic is convex from its greatest root on.
+    """
+    still, slope = disc_speed(y, tables, device, before, drop)
+    if drop <= 0.0 or still == 0.0:
+        return drop, still
+    r, slope, speed = sqrt(drop), slope * slack, still
+    while r * r - drop + heavy * r * (still + slope * (r * r - drop)) < 0.0:
+        r *= 2.0
+    for _ in range(100):
+        speed = still + slope * (r * r - drop)
+        step = (r * r - drop + heavy * r * speed) / (2.0 * r + heavy * (speed + 2.0 * slope * r * r))
+        r -= step
+        if abs(step) <= 1e-14 * r:
+            break
+    return r * r, still + slope * (r * r - drop)
+
+
+@njit
+def lone_disc(tables, i):
+    """The disc that alone holds the column of node i and leads it; -1 for none."""
+    k = tables[I_INTEGERS][tables[I_NODES][i]["gates"]]
+    return k if leads(tables, k) else -1
+
+
+@njit
+def led_by_disc(y, tables, out, k, which, standing, other, still):
+    """(drop across the disc `which` that leads column k, dx/dt), at p' beside it and a drop where nothing moves."""
+    valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
+    device, heavy = tables[I_DEVICES][valve["device"]], column["length"] / column["area"] * sqrt(valve["conductance"])
+    if valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]:
+        return disc_drop(y, tables, device, standing, still, 1.0, heavy)
+    return disc_drop(y, tables, device, other, still, 0.0 if device["kind"] == RELIEF_DISC else 1.0, heavy)
+
+
+@njit
+def led_from_rest(y, tables, out, k, end, which, solved):
+    """`led_flow` of a column that one disc holds."""
+    valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
+    side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
+    standing = standing_pressure(tables, out, k, end, solved)
+    other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    still = valve["drop"] + side * (standing - other)
+    drop, speed = led_by_disc(y, tables, out, k, which, standing, other, still)
+    root = side * (sqrt(drop) if drop >= 0.0 else -sqrt(-drop))
+    rate = speed * sqrt(valve["conductance"]) * root if drop > 0.0 else 0.0
+    return sqrt(conductance(tables, out, which)) * root, rate, standing + side * (drop - still)
+
+
+@njit
+def led_flow(t, y, tables, out, k, end, solved):
     """(flow out of column k through the valves that lead it, its rate, p' of that end), by damped iteration."""
     nodes, valves, column = tables[I_NODES], tables[I_VALVES], tables[I_COLUMNS][k]
     limit = tables[I_SETTINGS][0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
+    if lone_disc(tables, x) >= 0:
+        return led_from_rest(y, tables, out, k, end, lone_disc(tables, x), solved)
     early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate on this side of a kink
     standing = standing_pressure(tables, out, k, end, solved)
     p, flow, rate = standing, 0.0, 0.0
@@ -112,7 +184,7 @@ def column_inflows(t, y, dydt, out, handle):
         column, end = columns[k], led_end(tables, out, k)
         change = y[column["y"]]
         if end != 0:
-            change = end * led_flow(t, tables, out, k, end, False)[0] - column["flow"]
+            change = end * led_flow(t, y, tables, out, k, end, False)[0] - column["flow"]
         out[layout["column"] + k] = column["flow"] + change
         out[layout["net"] + column["from_node"]] -= change
         out[layout["net"] + column["to_node"]] += change
@@ -120,15 +192,18 @@ def column_inflows(t, y, dydt, out, handle):
 
 @njit
 def hold_columns(t, y, dydt, out, handle):
-    """Give the node at the shut end of a standing column the pressure that drives no flow through it."""
+    """Give the node at the shut end of a standing column the pressure that drives no flow through it.
+
+    That of one which a disc leads has what drives disc and column together.
+    """
     tables = open_tables(handle)
     pressure = tables[I_LAYOUT][0]["pressure"]
     for k in range(tables[I_COLUMNS].size):
         end = led_end(tables, out, k)
         if end != 0:
             x = tables[I_COLUMNS][k]["to_node"] if end == 1 else tables[I_COLUMNS][k]["from_node"]
-            if gate_area(tables, out, x)[0] == 0.0:
-                out[pressure + x] = led_flow(t, tables, out, k, end, True)[2]
+            if gate_area(tables, out, x)[0] == 0.0 or lone_disc(tables, x) >= 0:
+                out[pressure + x] = led_flow(t, y, tables, out, k, end, True)[2]
 
 
 @njit
@@ -139,15 +214,19 @@ def column_rates(t, y, dydt, out, handle):
     for k in range(columns.size):
         column = columns[k]
         change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]]
-        dydt[column["y"]] = column_rate(t, tables, out, k, change)
+        dydt[column["y"]] = column_rate(t, y, tables, out, k, change)
 
 
 @njit
-def column_rate(t, tables, out, k, change):
-    """d/dt of one column's flow, (A / L) (change of what drives it) - drag'; a led one follows its valves."""
+def column_rate(t, y, tables, out, k, change):
+    """d/dt of one column's flow, (A / L) (change of what drives it) - drag'; one that stands or is led, by its valves.
+
+    Where a disc leads it, the pressure beside that tells.
+    """
     column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
-    if end != 0:
-        return end * led_flow(t, tables, out, k, end, True)[1]
+    x = column["to_node"] if end == 1 else column["from_node"]
+    if end != 0 and (lone_disc(tables, x) < 0 or gate_area(tables, out, x)[0] == 0.0):
+        return end * led_flow(t, y, tables, out, k, end, True)[1]
     pull = column_drag(column, out[tables[I_LAYOUT][0]["column"] + k])
     return column["area"] / column["length"] * (change + column["offset"]) - (pull - column["drag"])
 

@@ -59,6 +59,7 @@ SETTINGS = np.dtype(
         ("rate", "f8"),  # greatest wave rate that does not change, speed / dx [1/s]
         ("stop_below", "i8"),  # 1: a pressure below vapour pressure ends the run
         ("limit", "f8"),  # end of the segment: schedules take their left limit from here on [s]
+        ("step", "f8"),  # that is given; 0 where steps follow what they meet [s]
         ("law", "i8"),
         ("beta", "f8"),  # bulk modulus of the fluid [Pa]
         ("reference", "f8"),  # pressure at which rho holds [Pa]

@@ -70,6 +70,8 @@ class Loop:
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
             self.orders[told.CONTROL] = told.FIXED_STEP
             self.orders[told.SIZE] = numerics.courant / model.wave_rate
+        given = self.orders[told.CONTROL] == told.FIXED_STEP
+        model.tables[rec.I_SETTINGS][0]["step"] = self.orders[told.SIZE] if given else 0.0
 
     @property
     def now(self) -> np.ndarray:
@@ -117,7 +119,7 @@ class Loop:
         """List the events that have happened since the flags were `before`, and do what they do at once."""
         first, many = limits.EVENTS * self.tanks.size, len(self.model.events)
         now = self.armed[first : first + many] > before[first : first + many]
-        self.switched += [(self.t, int(k)) for k in np.flatnonzero(now)]
+        self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
         self.settle()
 
     def settle(self) -> None:

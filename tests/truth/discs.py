@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12, "dense_output": True}
 
@@ -103,3 +104,36 @@ def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
             if held:
                 y = [float(max(held, 0))]
     return np.array(times), np.array(rows).T, events
+
+
+def leaves_with_column(source, kink, g, beyond, span, disc, inertia, friction, felt, at):
+    """(time at which, [lift, mass flow] at times `at`) of a disc that leaves its seat with the rigid column it holds.
+
+    inertia dM/dt = source(t) - M |M| / (G x^2) - friction M |M|, and what lifts the disc `beyond` its first opening is
+    that drop or, with felt == "source", the source. disc : {"time_constant"} or {"natural_frequency", "damping_ratio"}.
+    Both start as powers of the time s since it leaves: x = a s^n, M = a s^n sqrt(G beyond), at s = 1e-4 here.
+    """
+    start, s = brentq(lambda t: source(t) - beyond, kink - 1.0, kink, xtol=1e-15), 1e-4
+    rise, root = (source(start + 1e-3) - source(start)) / 1e-3, math.sqrt(g * beyond)
+    lag, w, zeta = (disc.get(k, 0.0) for k in ("time_constant", "natural_frequency", "damping_ratio"))
+    w *= 2.0 * math.pi
+
+    def rates(t, y):
+        x, flow, speed = y
+        drop = flow * abs(flow) / (g * x * x)
+        drive = ((source(t) if felt == "source" else drop) - beyond) / span - x
+        braked = (source(t) - drop - friction * flow * abs(flow)) / inertia
+        return [drive / lag, braked, 0.0] if lag else [speed, braked, w * (w * drive - 2.0 * zeta * speed)]
+
+    if lag:
+        x = 0.5 * rise * s**2 / (span * lag + (0.0 if felt == "source" else inertia * root))
+        y = [x, x * root, 0.0]
+    else:
+        x = w * w * rise * s**3 / (6.0 * span)
+        y = [x, x * root, 3.0 * x / s]
+    found, now = [], start + s
+    for end in (kink, at[-1]):
+        wanted = [t for t in at if now < t <= end]
+        step = solve_ivp(rates, (now, end), y, method="Radau", t_eval=wanted, rtol=1e-9, atol=1e-14)
+        found, now, y = [*found, *step.y[:2].T], end, step.y[:, -1]
+    return start, np.array(found).T

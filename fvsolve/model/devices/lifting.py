@@ -16,7 +16,7 @@ from fvsolve.steady import Edge
 LIFTING, OPEN = "lifting", "open"  # in `start.shut`, shut
 SEATED = 1e-12  # lift below its seat of a disc that has slammed, so that rounding does not open it
 SMALL_LIFT = 1e-9  # of a lift, what is rounding
-STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat")
+STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "", "")  # leads its column: not told
 
 
 class Lifting(Device, kind=""):
@@ -188,11 +188,13 @@ class CheckDisc(Lifting, kind=""):
         return newton
 
     def tell(self, start, name, x):
-        """A column and a disc that leave rest together start as powers of time, which steps do not resolve."""
-        valve = start.valves[start.scene.valve_names.index(name)]
-        if any(start.nodes["gates"][valve[end]] >= 0 for end in ("from_node", "to_node")):
-            text = (f"{name}: its disc alone holds a rigid column: its lift and flow are not to be trusted from "
-                    "where it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
+        """A disc beside other valves does not lead the column that they hold together."""
+        valve, nodes = start.valves[start.scene.valve_names.index(name)], start.nodes
+        if any(
+            nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
+        ):
+            text = (f"{name}: its disc and other valves hold a rigid column: its lift and flow are not to be trusted "
+                    "from where it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
             start.scene.warnings.append(Notice("range", f"links.{name}", text))
 
     def next(self, x, back, now):
