@@ -270,6 +270,19 @@ def test_so_do_a_disc_behind_its_column_and_a_relief_valve(kind, after, felt, di
     assert_leaves(*held_column(kind, after, disc, METHODS["auto"]), disc, felt)
 
 
+def test_advance_stops_a_column_dead_as_a_run_does():
+    """What a slam leaves of its flow is gone when the disc leaves its seat again."""
+    case, name = held_column("check-valve", False, LAG, METHODS["sharp"])
+    case["nodes"]["up"]["pressure"] = {"time": [0.5, 2.0, 4.0, 9.0], "value": [3.1e5, 1.9e5, 1.9e5, 3.1e5]}
+    model = fvsolve.build(fvsolve.load(case))
+    state, result = fvsolve.initial_state(model), fvsolve.run(case)
+    assert [mark["what"] for mark in result.summary["marks"]] == ["stopped dead"]
+    for until in (3.0, 9.0, 10.0):
+        state = fvsolve.advance(model, state, until)
+    read = model.evaluate(state.t, state.y)[1][model.layout["column"]]
+    assert read == pytest.approx(result[f"{name}.flow"][-1] * RHO, rel=1e-5)
+
+
 @pytest.mark.parametrize("after", [False, True])
 def test_so_they_do_in_a_fluid_that_is_all_but_stiff(after):
     """Under `log`, 1000 times stiffer than water."""

@@ -43,11 +43,13 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop.memory[told.T] = state.t
     known = state.memory.size == 2 + loop.armed.size
     loop.armed[:] = state.memory[2:] if known else 0.0
+    loop.on_switch = lambda: loop.stop_columns(loop.orders[told.END])
     adaptive = loop.orders[told.CONTROL] == told.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
         first = loop.t == state.t
+        loop.stop_columns(end)
         loop.begin(end, NO_LIMIT)
         if first and adaptive and known:
             loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory[:2]

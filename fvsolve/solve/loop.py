@@ -142,6 +142,23 @@ class Loop:
         crowded = len(self.crowd) == self.crowd.maxlen and self.t - self.crowd[0] <= max(self.span, step)
         return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size and not crowded
 
+    def evaluate(self, limit: float) -> np.ndarray:
+        """`out` now, with schedules' left limit from `limit` on; events that a jump has brought are listed."""
+        before = self.armed.copy()
+        out = self.model.evaluate(self.t, self.now, limit)[1]
+        self.note(before)
+        return out
+
+    def stop_columns(self, limit: float) -> list[tuple[int, float]]:
+        """Take the flow out of rigid columns that stand from now on; (number, flow [kg/s]) of those that had some."""
+        found, out = [], self.evaluate(limit)
+        for k, row in enumerate(self.model.tables[rec.I_COLUMNS]):
+            flow = float(row["flow"] + self.now[row["y"]])
+            if flow != 0.0 and out[self.model.layout["column"] + k] == 0.0:
+                self.now[row["y"]] = -row["flow"]
+                found.append((k, flow))
+        return found
+
     def take_rows(self) -> np.ndarray:
         """Rows written since the last call, as a copy."""
         count = int(self.flags[told.ROWS])

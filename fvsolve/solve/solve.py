@@ -129,16 +129,9 @@ class Run:
 
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
-        out = self.evaluate(limit)
+        out = self.loop.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, :].copy())
-        return out
-
-    def evaluate(self, limit: float) -> np.ndarray:
-        """`out` now, with schedules' left limit from `limit` on; events that a jump has brought are listed."""
-        before = self.loop.armed.copy()
-        out = self.model.evaluate(self.loop.t, self.loop.now, limit)[1]
-        self.loop.note(before)
         return out
 
     def flush(self) -> None:
@@ -197,14 +190,13 @@ class Run:
     def stop_columns(self) -> None:
         """Take the flow out of rigid columns that stand from now on; a mark where there was some."""
         model, t = self.model, self.loop.t
-        out = self.evaluate(self.bounds[self.segment][0])
-        for k, row in enumerate(model.tables[rec.I_COLUMNS]):
-            flow = row["flow"] + self.loop.now[row["y"]]
-            if flow != 0.0 and out[model.layout["column"] + k] == 0.0:
-                self.loop.now[row["y"]] = -row["flow"]
-                at = len(model.pipes) + 3 * len(model.node_names) + k
-                if abs(flow) > 1e-3 * model.scale[row["y"]] and np.isnan(model.tables[rec.I_MARKS][at]):
-                    model.tables[rec.I_MARKS][at] = t
+        for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
+            at, scale = (
+                len(model.pipes) + 3 * len(model.node_names) + k,
+                model.scale[model.tables[rec.I_COLUMNS][k]["y"]],
+            )
+            if abs(flow) > 1e-3 * scale and np.isnan(model.tables[rec.I_MARKS][at]):
+                model.tables[rec.I_MARKS][at] = t
 
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
