@@ -255,6 +255,7 @@ def test_a_probe_that_is_not_there_is_named(folder):
 def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
     names = dict.fromkeys(name for ends in links.values() for name in ends)
     return SimpleNamespace(
+        places=dict.fromkeys(names),
         nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
         links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
     )

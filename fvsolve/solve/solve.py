@@ -235,7 +235,8 @@ class Run:
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
-            if grown := self.soundness.look(self.loop.t, self.loop.now):
+            grown = self.soundness.look(self.loop.t, self.loop.now)
+            if grown and code != told.CHATTERS:  # which names the parts
                 return grown
             if code == told.FIELD:
                 count = self.loop.memory[told.NEXT_FIELD] - 1
