@@ -111,12 +111,13 @@ def _shade(axes, t, marks, first: bool) -> None:
     axes.axvspan(begun, t[-1], color=style.DOUBT, alpha=0.08, linewidth=0)
     axes.axvline(begun, color=style.DOUBT, linewidth=0.8)
     late = begun > 0.5 * (t[0] + t[-1])
+    beside = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4  # the power of ten that the axis stands for
     if first:
         axes.annotate(
             f"not to be trusted from here: {cause}",
             (begun, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(-4 if late else 4, 2),
+            xytext=(-4 if late else beside, 2),
             textcoords="offset points",
             ha="right" if late else "left",
             va="bottom",
