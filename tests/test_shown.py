@@ -63,7 +63,9 @@ def test_names_in_a_notebook_are_text_and_no_markup():
 
 def test_a_shipped_case_goes_by_its_name_as_on_the_command_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / CASE).mkdir()  # a folder is no case
     assert run(CASE).summary["case"] == CASE
+    (tmp_path / CASE).rmdir()
     with pytest.raises(FvsolveError):
         load("no-such-case")
     (tmp_path / CASE).write_text("schema = 2\n")  # a file of that name is the file

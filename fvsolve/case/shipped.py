@@ -29,10 +29,10 @@ def find(name: str) -> Path:
     path = Path(name)
     if path.is_file():
         return path
+    if name in names():  # whatever folder of that name may stand here
+        return folder() / f"{name}.toml"
     if path.is_dir():
         raise FvsolveError(f"{name} is a folder; wanted a case file or one of: {listing(names())}")
-    if name in names():
-        return folder() / f"{name}.toml"
     raise FvsolveError(f"no file and no shipped case {name}{did_you_mean(name, names())}; see `fvsolve list`")
 
 
