@@ -73,7 +73,7 @@ def load(source: str | Path | Mapping[str, Any] | Case, set: Mapping[str, Any] |
 
 def named(source: Any) -> Any:
     """A source; where it is text that names no file but a shipped case, that case's file."""
-    if isinstance(source, str) and not Path(source).exists() and source in shipped.names():
+    if isinstance(source, str) and not Path(source).is_file() and source in shipped.names():
         return shipped.find(source)
     return source
 
