@@ -65,6 +65,8 @@ class Loop:
         for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
+        if numerics.rtol is None:  # else steps are long, and rows between them as accurate
+            stepper.seen = model.tables[rec.I_EXTREMES]
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest

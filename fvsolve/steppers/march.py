@@ -80,7 +80,8 @@ def may_leap(orders, memory, times, h):
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
     coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
-    values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
+    values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, seen, work, vectors, store,
+    store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -90,8 +91,8 @@ def march(
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
-    within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
-    implicit step keeps.
+    within_at, within_by, seen : what rows are held to, see `rows.keep_within`, `rows.keep_seen`; work, vectors, store,
+    store_complex : what an implicit step keeps.
     """
     s, reuse = k.shape[0], False
     b = weights_of(coefficients, s)
@@ -134,6 +135,7 @@ def march(
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
                     y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
+                    seen,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -238,7 +240,7 @@ def compiled():
     i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
     march.compile(
         (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, ints,
-         w, v, w, v, types.complex128[::1])
+         w, w, v, w, v, types.complex128[::1])
     )  # fmt: skip
     march.disable_compile()
     return march

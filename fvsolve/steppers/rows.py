@@ -74,9 +74,23 @@ def keep_within(at, by, y_old, y, out):
 
 
 @njit
+def keep_seen(seen, row):
+    """Hold what a row reads to what accepted steps have read so far, so that these alone tell least and greatest.
+
+    seen : float64[4, q]  of every probe the least, its time, the greatest, its time; float64[4, 0] to hold nothing
+    """
+    for q in range(seen.shape[1]):
+        if seen[0, q] <= seen[2, q]:  # where there was a number
+            if row[q] < seen[0, q]:
+                row[q] = seen[0, q]
+            elif row[q] > seen[2, q]:
+                row[q] = seen[2, q]
+
+
+@njit
 def emit(
     rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
-    within_at, within_by,
+    within_at, within_by, seen,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
@@ -94,6 +108,7 @@ def emit(
         if row <= due:
             rows[flags[ROWS], 0] = due
             observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
+            keep_seen(seen, rows[flags[ROWS], 1:])
             flags[ROWS] += 1
             memory[NEXT_OUTPUT] += 1.0
         if field <= due:

@@ -1,0 +1,115 @@
+"""Rows between steps change no printed number: least and greatest are those of steps, and no row lies beyond them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
+
+import fvsolve
+
+EVERY = [10e-3, 3e-3, 1e-3, 0.7e-3]
+NO_ROWS = 50.0  # beyond the end of every scene here
+FRICTION = {"model": "quasi-steady", "factor": 0.02}
+FIXED = {
+    "courant": {"courant": 0.9},
+    "courant at its limit, leaping": dict(SHARP),
+    "fixed rk4": {"method": "rk4", "step": 2e-3},
+    "fixed euler": {"scheme": "upwind", "method": "euler", "step": 3.3e-3},
+    "fixed implicit-euler": {"method": "implicit-euler", "step": 11e-3},
+    "courant of implicit-midpoint": {"method": "implicit-midpoint", "courant": 4.0},
+}
+BY_ERROR = {name: {"method": name, "rtol": 1e-4} for name in ("dormand-prince", "rodas-5p", "radau-iia-5", "auto")}
+
+
+def slam(numerics: dict) -> dict:
+    """A check valve slams in a main whose source fails; beside it a tank swings through a rigid column."""
+    nodes = {
+        "source": reservoir(step(0.2, 8e5, 3e5)), "in": junction(), "out": junction(), "gate": junction(),
+        "lake": lake(45.0), "shaft": tank(0.02, 44.0),
+    }  # fmt: skip
+    links = {
+        "feed": pipe("source", "in", 60.0, 0.3, 1000.0, 6),
+        "check": {"type": "check-valve", "from": "in", "to": "out", "area": 0.05, "discharge_coefficient": 0.6},
+        "main": pipe("out", "gate", 300.0, 0.3, 1000.0, 24, friction={"model": "steady", "factor": 0.02}),
+        "valve": valve("gate", "lake", 0.01, ramp(0.5, 0.3, 1.0, 0.3)),
+        "column": {"type": "rigid-column", "from": "lake", "to": "shaft", "length": 5.0, "diameter": 0.1,
+                   "friction": FRICTION},
+    }  # fmt: skip
+    probes = ["in.pressure", "out.pressure", "check.flow", "gate.head", "valve.flow", "main.pressure@0.37",
+              "main.velocity@1.0", "shaft.level", "column.flow"]  # fmt: skip
+    return scene(nodes, links, 1.2, numerics, probes)
+
+
+def surging(numerics: dict) -> dict:
+    """Two pipes alone, which the leap takes; a valve shuts."""
+    nodes = {"lake": lake(60.0), "fork": junction(ramp(0.3, 0.1, 0.0, 0.02)), "gate": junction(),
+             "out": reservoir(AMBIENT)}  # fmt: skip
+    links = {
+        "main": pipe("lake", "fork", 1200.0, 0.5, 1000.0, 60, friction={"model": "steady", "factor": 0.018}),
+        "down": pipe("fork", "gate", 350.0, 0.4, 1100.0, 20),
+        "valve": valve("gate", "out", 0.02, ramp(0.5, 0.2, 1.0, 0.0)),
+    }
+    return scene(nodes, links, 4.0, numerics, ["gate.pressure", "main.pressure@0.37", "valve.flow", "down.flow@0.5"])
+
+
+SCENES = {"slam": slam, "surging": surging}
+
+
+def with_rows(case: dict, every: float):
+    return fvsolve.run({**case, "output": {**case["output"], "every": every}})
+
+
+def excess(result) -> float:
+    """By how much the worst row leaves the printed extremes."""
+    found = [(result[p].max() - e.greatest, e.least - result[p].min()) for p, e in result.extremes.items()]
+    return float(np.max(found))
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("how", FIXED)
+def test_extremes_are_those_of_steps_however_often_rows_are_written(how, scene_name):
+    case = SCENES[scene_name](FIXED[how])
+    alone = with_rows(case, NO_ROWS)
+    assert alone.reason == "finished" and len(alone.t) <= 12  # start, jumps and the end alone
+    for every in EVERY:
+        result = with_rows(case, every)
+        assert dict(result.extremes) == dict(alone.extremes), every
+        assert excess(result) <= 0.0
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("how", BY_ERROR)
+def test_no_row_lies_beyond_the_extremes_under_error_control(how, scene_name):
+    result = with_rows(SCENES[scene_name](BY_ERROR[how]), 1e-3)
+    assert result.reason == "finished"
+    assert excess(result) <= 0.0
+
+
+def test_the_main_is_told_one_greatest_pressure():
+    """Rows every 3 ms read 1075388.9 Pa off a cubic past a front that no step puts above 1075151.7."""
+    found = {
+        fvsolve.run("valve-closure", set={"output.every": every, "output.fields": 0}).extremes["gate.pressure"]
+        for every in ("10 ms", "3 ms")
+    }
+    assert len(found) == 1
+
+
+def test_rows_between_steps_keep_their_order_at_peaks_that_are_not_the_greatest():
+    """A mass on a spring with a damper, x = e^(-z w t) (cos w' t + z w / w' sin w' t), by rk4 at a fixed step."""
+    nodes = {"wall": {"type": "frame"}, "body": {"type": "mass", "mass": 4.0, "initial_position": 1.0}}
+    links = {
+        "spring": {"type": "spring", "from": "wall", "to": "body", "stiffness": 400.0, "free_length": 0.0},
+        "oil": {"type": "damper", "from": "wall", "to": "body", "damping": 8.0},
+    }
+    far, decay, swing = [], 1.0, math.sqrt(99.0)
+    for size in (0.02, 0.01):
+        case = scene(nodes, links, 3.0, {"method": "rk4", "step": size}, ["body.position"], every=0.0013)
+        result = fvsolve.run(case)
+        t = np.asarray(result.t)
+        x = np.exp(-decay * t) * (np.cos(swing * t) + decay / swing * np.sin(swing * t))
+        far.append(np.abs(result["body.position"] - x)[t > 0.7].max())
+        assert excess(result) <= 0.0
+    assert far[0] / far[1] == pytest.approx(16.0, rel=0.2)
