@@ -9,6 +9,10 @@ import pytest
 from truth.scenes import NO_FRICTION, junction, lake, pipe, scene
 
 import fvsolve
+from fvsolve.limits.ends import pipe_limit
+from fvsolve.limits.grid import advection_limit
+from fvsolve.limits.step import step_limits
+from fvsolve.limits.symbol import WEIGHTS
 from fvsolve.model.schemes import QUICKER, quicker
 
 STAGES = {"ssp-rk3": 3, "rk4": 4}
@@ -29,6 +33,20 @@ def spectrum(scheme: str, cells: int, end: dict) -> np.ndarray:
     return np.linalg.eigvals(np.array(columns).T) * LENGTH / cells / SPEED
 
 
+def stepping(scheme: str, cells: int, end: dict, courant: float):
+    """(h J of a pipe at a Courant number, its model)."""
+    nodes, links = {"lake": lake(50.0), "end": end}, {"main": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)}
+    numerics = {"scheme": scheme, "method": "ssp-rk3", "step": courant * LENGTH / cells / SPEED}
+    model = fvsolve.build(fvsolve.load(scene(nodes, links, 10.0, numerics, ["lake.pressure"], 0.1)))
+    return numerics["step"] * np.array([model.rhs(0.0, unit) for unit in np.eye(model.y_size)]).T, model
+
+
+def powered(z: np.ndarray) -> float:
+    """The norm of a thousand steps of ssp-rk3."""
+    one = np.eye(len(z))
+    return np.linalg.norm(np.linalg.matrix_power(one + z @ (one + z / 2.0 @ (one + z / 3.0)), 1000), 2)
+
+
 def courant_limit(scheme: str, cells: int, method: str) -> float:
     """Least Courant number at which some mode of an open or shut pipe grows."""
     found = np.concatenate([spectrum(scheme, cells, end) for end in (lake(50.0), junction())])
@@ -37,12 +55,63 @@ def courant_limit(scheme: str, cells: int, method: str) -> float:
     return grows[0] - 0.01 if grows else 2.0
 
 
-@pytest.mark.parametrize("scheme", ["fromm", "upwind3", "upwind5"])
+@pytest.mark.parametrize("scheme", ["linear-upwind", "fromm", "central", "upwind3", "upwind5"])
 def test_the_factor_is_what_the_ends_ask_for_and_no_more(scheme):
+    inside = 0.9 * min(1.0, advection_limit(scheme, "ssp-rk3").limit)
     for cells in range(1, 13):
-        asked = max(1.0, 0.9 / courant_limit(scheme, cells, "ssp-rk3"))
+        asked = max(1.0, inside / courant_limit(scheme, cells, "ssp-rk3"))
         assert asked <= quicker(scheme, cells) <= asked * 1.06, cells
-        assert 0.9 / quicker(scheme, cells) <= courant_limit(scheme, cells, "rk4")
+        assert inside / quicker(scheme, cells) <= courant_limit(scheme, cells, "rk4")
+
+
+@pytest.mark.parametrize("scheme", WEIGHTS)
+def test_a_short_pipe_decays_below_its_limit_and_grows_beyond_it_and_is_told_so(scheme):
+    """By powers of the step as the compiled rates have it, between a lake and what reflects: a lake, an inflow."""
+    for cells in range(1, 9):
+        for end, returned in ((lake(50.0), 1.0), ({"type": "inflow", "flow": 0.0}, -1.0)):
+            limit = pipe_limit(scheme, "ssp-rk3", cells, (returned,))
+            z, model = stepping(scheme, cells, end, 1.05 * limit)
+            assert powered(z * 0.99 / 1.05) < 10.0 and powered(z) > 1e6, cells
+            (one,) = step_limits(model)
+            assert not one.ok and one.limit <= limit * (1 + 1e-9) and "links.main" in one.text
+
+
+@pytest.mark.parametrize("limiter", ["minmod", "van-leer", "monotonized-central"])
+def test_a_limiter_bears_a_little_more_than_what_it_is_where_all_is_smooth(limiter):
+    """What `limits.step.LIMITED` says: below the estimate nothing grows, half as much again beyond it noise does."""
+    rng = np.random.default_rng(5)
+    for cells in (2, 3, 4, 5, 8):
+        limit = pipe_limit("fromm", "ssp-rk3", cells)
+        for factor, grows in ((0.99, False), (1.5, True)):
+            h = factor * limit * LENGTH / cells / SPEED
+            nodes, links = (
+                {"lake": lake(50.0), "end": junction()},
+                {"p": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)},
+            )
+            numerics = {"scheme": "muscl", "limiter": limiter, "method": "ssp-rk3", "step": h}
+            model = fvsolve.build(fvsolve.load(scene(nodes, links, 150 * h, numerics, ["lake.pressure"], 0.1)))
+            state = fvsolve.initial_state(model)
+            state.y[:] = rng.normal(size=len(state.y))
+            after = fvsolve.advance(model, state, 150 * h)
+            assert bool(np.abs(after.y).max() > 100.0 * np.abs(state.y).max()) is grows, cells
+            assert [one.ok for one in step_limits(model)] == ([False] if grows else [])
+
+
+def test_a_short_pipe_whose_waves_do_not_come_back_is_but_doubtful():
+    """Four cells between two long pipes of its own kind, at Courant 0.55, which grows between two lakes."""
+    found = []
+    for far in (False, True):
+        nodes = {"a": lake(50.0), "b": junction() if far else lake(50.0)}
+        links = {"main": pipe("b" if far else "a", "c" if far else "b", LENGTH, 0.3, SPEED, 4)}
+        if far:
+            nodes |= {"c": junction(), "d": junction()}
+            links |= {"one": pipe("a", "b", 1500.0, 0.3, SPEED, 45), "two": pipe("c", "d", 1500.0, 0.3, SPEED, 45)}
+        numerics = {"scheme": "linear-upwind", "method": "ssp-rk3", "step": 0.55 * LENGTH / 4 / SPEED}
+        case = scene(nodes, links, 20.0, numerics, ["main.flow"], 0.1)
+        case["nodes"]["a"]["head"] = {"time": [0.0, 1.0], "value": [50.0, 40.0], "kind": "step"}
+        result = fvsolve.run(case)
+        found.append((result.ok, [one.place for one in result.warnings if one.kind == "step-limit"]))
+    assert found == [(False, ["links.main"]), (True, ["links.main"])]
 
 
 def test_upwind_keeps_its_step_so_that_courant_one_stays_exact():

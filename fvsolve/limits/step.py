@@ -1,7 +1,8 @@
 """A model's step against the limits of its scheme and method: a notice for each room beyond. Knows no run.
 
 Proved, for linear schemes where waves do not depend on the state: von Neumann's limit. Limited schemes count as what
-they are where all is smooth, and waves that depend on the state by the quickest one: these are estimates.
+they are where all is smooth, and waves that depend on the state by the quickest one: these are estimates. So is the
+limit of a pipe of few cells, whose ends bring it down; there growth in the run decides, by what its own ends reflect.
 """
 
 from __future__ import annotations
@@ -13,18 +14,18 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
+from fvsolve.limits.ends import FIFTH, LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.symbol import weights_of
-from fvsolve.model.schemes import FROZEN_AS, QUICKER
+from fvsolve.model.schemes import FROZEN_AS
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
 SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
 SHARE = 0.05  # of an estimate: up to here beyond it a step is doubtful, from there on wrong
 GROWS = 10.0  # times that the worst wave grows in a run: less is not seen, where no step is without growth
-SHORTEST = 5  # cells from which on a pipe has the scheme between its ends
-END_TESTED = "ssp-rk3"  # method by which `QUICKER` was measured, at Courant 0.9
+LIMITED = 0.3  # the same where limiters stand between few cells: they hold by up to so much more (tests/test_ends.py)
 
 
 class Room(NamedTuple):
@@ -36,6 +37,8 @@ class Room(NamedTuple):
     scheme: str  # that the limit is of
     proved: bool
     where: str
+    share: float = SHARE  # of an estimate, beyond which it is wrong
+    grows: float = math.inf  # times in the run, where that is what makes it wrong
 
 
 def step_limits(model, rates: dict[str, float] | None = None) -> list[Notice]:
@@ -52,7 +55,7 @@ def step_limits(model, rates: dict[str, float] | None = None) -> list[Notice]:
     except FvsolveError:  # a method whose stability function is not to be had
         return []
     beyond = [room for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
-    return [found for room in beyond if (found := notice(model, room, method.name)) is not None]
+    return [notice(model, room, method.name) for room in beyond]
 
 
 def pipe_rooms(model, method: str) -> list[Room]:
@@ -60,29 +63,57 @@ def pipe_rooms(model, method: str) -> list[Room]:
     if not model.cells:
         return []
     numerics, waves = model.case.numerics, model.wave_rates
-    scheme, limited = frozen(numerics.scheme)
-    fixed = numerics.step is not None
-    quicker = model.tables[rec.I_PIPES]["quicker"]
-    fastest = float(numerics.step * waves.max() if fixed else numerics.courant)
-    if not (fixed and quicker.max() > 1.0) and holds_well(scheme, method, fastest):
+    if numerics.step is not None:
+        courant = numerics.step * waves
+    else:
+        courant = numerics.courant * waves / (waves * model.tables[rec.I_PIPES]["quicker"]).max()
+    cells = np.array([pipe.cells for pipe in model.pipes])
+    long = cells >= (FIFTH if numerics.scheme == "weno5" else LONG)  # at whose ends it is of a lower order where rough
+    rooms = [room for k in np.flatnonzero(~long) if (room := short_pipe(model, method, int(k), float(courant[k])))]
+    if long.any():
+        k = int(np.argmax(np.where(long, courant, -1.0)))
+        rooms += long_pipe(model, method, k, float(courant[k]))
+    return sorted(rooms, key=lambda room: (not sound(room), room.courant / max(room.limit, 1e-300)))[-1:]
+
+
+def long_pipe(model, method: str, k: int, courant: float) -> list[Room]:
+    """Pipe k of many cells, if a wave grows on a grid without ends."""
+    scheme, limited = frozen(model.case.numerics.scheme)
+    if holds_well(scheme, method, courant):
         return []
     one = advection_limit(scheme, method)
-    cells = np.array([pipe.cells for pipe in model.pipes])
-    if not fixed:
-        courant = numerics.courant * waves / (waves * quicker).max()
-        short = np.full(waves.size, math.inf)  # the step minds their ends
-    else:
-        courant, share = numerics.step * waves, 1.0
-        if scheme in QUICKER:
-            share = one.limit / advection_limit(scheme, END_TESTED).limit
-        short = np.where(quicker > 1.0, 0.9 * share / quicker, math.inf)
-    limits = np.minimum(one.limit, short)
-    worst = int(np.argmax(courant / np.maximum(limits, 1e-300)))
-    proved = one.proved and not limited and model.case.fluid.law == "linear" and cells[worst] >= SHORTEST
-    proved = proved and courant[worst] > one.limit
-    where = "on a long pipe" if short[worst] >= one.limit else f"between the ends of {cells[worst]} cells"
-    name = model.pipes[worst].name
-    return [Room(f"links.{name}", float(courant[worst]), float(limits[worst]), scheme, bool(proved), where)]
+    grows = math.inf if one.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
+    proved = one.proved and not limited and model.case.fluid.law == "linear"
+    found = Room(f"links.{model.pipes[k].name}", courant, one.limit, scheme, proved, "on a long pipe", grows=grows)
+    return [found] if grows >= GROWS else []
+
+
+def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
+    """Pipe k of few cells, where its ends make its waves grow within the run: surely by what its own ends reflect."""
+    cells, (scheme, limited) = model.pipes[k].cells, frozen(model.case.numerics.scheme)
+    if model.case.numerics.scheme == "weno5":
+        scheme = FROZEN_AS["muscl"]  # which it is below five cells
+    steps = span(model) * model.wave_rates[k] / courant
+    grows = times(pipe_growth(scheme, method, cells, courant), steps)
+    if grows < GROWS:
+        return None
+    if not limited:
+        grows = times(pipe_growth(scheme, method, cells, courant, returned(model, k)), steps)
+    where = f"between the ends of {cells} cell{'s' if cells > 1 else ''}"
+    limit, share = pipe_limit(scheme, method, cells), LIMITED if limited else 0.0
+    return Room(f"links.{model.pipes[k].name}", courant, limit, scheme, False, where, share, grows)
+
+
+def returned(model, k: int) -> tuple[float, ...]:
+    """Products of what both ends of pipe k reflect of a pressure; with what else joins them unknown, two for each."""
+    row, nodes, valves = model.tables[rec.I_PIPES][k], model.tables[rec.I_NODES], model.tables[rec.I_VALVES]
+    ends = []
+    for i in (row["from_node"], row["to_node"]):
+        plain = nodes[i]["kind"] == rec.JUNCTION
+        alone = plain and not np.any((valves["from_node"] == i) | (valves["to_node"] == i))
+        of_pipes = 2.0 * row["admittance"] / nodes[i]["admittance"] - 1.0 if plain else -1.0
+        ends.append({round(float(of_pipes), 3)} | (set() if alone else {-1.0}))
+    return tuple(sorted({p * q for p in ends[0] for q in ends[1]}))
 
 
 def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
@@ -105,9 +136,16 @@ def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
         else:
             limit = advection_limit(scheme, method).limit
         fixed = basin.is_grid and basin.part.physics == "liquid" and model.case.fluid.law == "linear"
-        rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
-                          "in a wide basin"))  # fmt: skip
+        grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
+        if grows >= GROWS:
+            rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
+                              "in a wide basin", grows=grows))  # fmt: skip
     return rooms
+
+
+def span(model) -> float:
+    """How long the run is [s]."""
+    return model.case.numerics.end - model.case.numerics.start
 
 
 def frozen(scheme: str) -> tuple[str, bool]:
@@ -115,8 +153,13 @@ def frozen(scheme: str) -> tuple[str, bool]:
     return FROZEN_AS.get(scheme, scheme), scheme in FROZEN_AS
 
 
-def notice(model, room: Room, method: str) -> Notice | None:
-    """What is to be said of a room beyond its limit; None where what grows is too slow to be seen in the run."""
+def sound(room: Room) -> bool:
+    """Whether a room beyond its limit is but doubtful: an estimate, hardly passed, or growth that is hardly seen."""
+    return not room.proved and (room.courant <= room.limit * (1.0 + room.share) or room.grows < GROWS**2)
+
+
+def notice(model, room: Room, method: str) -> Notice:
+    """What is to be said of a room beyond its limit."""
     numerics = model.case.numerics
     scheme = model.case.numerics.scheme
     about = f", where it is {room.scheme}," if room.scheme != scheme else ""
@@ -124,32 +167,24 @@ def notice(model, room: Room, method: str) -> Notice | None:
     size = numerics.step if numerics.step is not None else numerics.courant
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
     if room.limit > 0.0:
-        sound = not room.proved and room.courant <= room.limit * (1.0 + SHARE)
         limit = f"{room.limit:.6g} is the limit {room.where} ({known})"
         remedy = f"give numerics.{key} = {rounded_down(size * room.limit / room.courant):.4g}{unit} or less"
     else:
-        grows = growth(room, method, steps_of(model, room.courant))
-        if grows < GROWS:
-            return None
-        sound = not room.proved and grows < GROWS**2
         limit = f"there is none that does not grow {room.where} ({known})"
         remedy = f"{room.scheme} wants another method, ssp-rk3 for example"
     text = (f"{room.place}: Courant number {room.courant:.6g}: with {scheme}{about} and {method} {limit}; "
-            f"{'it may be wrong' if sound else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
-    return Notice("step-limit", room.place, text, key, room.courant, room.limit, sound)
+            f"{'it may be wrong' if sound(room) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
+    return Notice("step-limit", room.place, text, key, room.courant, room.limit, sound(room))
 
 
-def growth(room: Room, method: str, steps: float) -> float:
-    """By how much the fastest wave grows in so many steps."""
-    most = growth_of(weights_of(room.scheme), method, room.courant)[0]
-    return math.exp(min(700.0, steps * math.log1p(max(most, 0.0))))
+def growth(scheme: str, method: str, courant: float, crossed: float) -> float:
+    """By how much the fastest wave of a uniform grid grows while waves cross so many cells."""
+    return times(growth_of(weights_of(scheme), method, courant)[0], crossed / courant)
 
 
-def steps_of(model, courant: float) -> float:
-    """Number of steps of the run, by the waves of its pipes or basins."""
-    numerics = model.case.numerics
-    span = numerics.end - numerics.start
-    return span / numerics.step if numerics.step is not None else span * model.wave_rate / courant
+def times(excess: float, steps: float) -> float:
+    """What a factor of 1 + excess makes of one in so many steps."""
+    return math.exp(min(700.0, steps * math.log1p(max(excess, 0.0))))
 
 
 def rounded_down(x: float) -> float:
