@@ -12,6 +12,8 @@ from truth.scenes import AMBIENT, RHO, WATER, area, lake, reservoir, scene
 
 import fvsolve
 from fvsolve.model.sparsity import sparsity
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
 from fvsolve.studies.energy.energy import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -241,7 +243,7 @@ def test_a_check_valve_beside_an_empty_bladder_opens_once(precharge, switches, l
     np.testing.assert_allclose(result["p.flow"][late], result["g.flow"][late], rtol=1e-3)
 
 
-def test_events_that_crowd_within_one_step_are_bounded_and_named():
+def crowding() -> dict:
     """Euler steps of 1 s over bladders that empty every millisecond: each step would be cut for ever."""
     nodes = {
         name: {"type": "accumulator", "volume": volume, "precharge": 487697.8989862603, "initial_pressure": pressure}
@@ -253,8 +255,28 @@ def test_events_that_crowd_within_one_step_are_bounded_and_named():
     way = {"type": "rigid-column", "from": "a", "to": "b", "length": 31.862243811623756, "diameter": 0.02}
     way["friction"] = {"model": "quasi-steady", "factor": 0.02}
     numerics = {"method": "euler", "step": 1.0, "initial": "rest"}
-    result = fvsolve.run(scene(nodes, {"way": way}, 3.0, numerics, ["way.flow"], 0.1))
+    return scene(nodes, {"way": way}, 3.0, numerics, ["way.flow"], 0.1)
+
+
+def test_events_that_crowd_within_one_step_are_bounded_and_named():
+    result = fvsolve.run(crowding())
     ended = [said in result.reason for said in ("a opens and shuts without end", "way.flow has grown to")]
     assert not result.ok and any(ended)  # whichever is seen first: the step is also far beyond what Euler holds
     events = [event["time"] for event in result.summary["events"]]
     assert len(events) < 5000 and 1.0 < events[-1] < 3.0
+
+
+def test_events_that_crowd_are_counted_on_in_a_run_that_is_resumed():
+    model = fvsolve.build(fvsolve.load(crowding()))
+
+    def late(t, seconds, steps):
+        run.budget = 2.0  # steps until it is called again
+        if len(run.loop.crowd) > 10:
+            raise KeyboardInterrupt
+
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
+    run.left = 2.0
+    assert run.go().reason.startswith("interrupted")
+    again = Run(model, run.state(), MemorySink(model), None)
+    for name in ("crowd", "last_switch", "at_once", "switched"):
+        assert getattr(again.loop, name) == getattr(run.loop, name)

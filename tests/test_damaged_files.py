@@ -129,6 +129,26 @@ HARM = {
 }  # fmt: skip
 
 
+def shorter(key: str):
+    """An array cut by one."""
+    return lambda kept: {key: np.atleast_1d(kept[key])[:-1]}
+
+
+@pytest.mark.parametrize("key", ["t", "y", "memory", "counts", "identity"])
+def test_the_array_that_is_cut_by_one_or_gone_is_named_with_its_file(key, stopped, tmp_path):
+    case, out = copied(stopped, tmp_path)
+    with np.load(out / "restart.npz") as file:
+        kept = {key: file[key] for key in file.files}
+    name = "states" if key == "y" else key
+    for harmed in ({**kept, **shorter(key)(kept)}, {one: array for one, array in kept.items() if one != key}):
+        np.savez(out / "restart.npz", **harmed)
+        with pytest.raises(RunError) as error:
+            fvsolve.run(case, out=out, resume=True)
+        said = str(error.value)
+        assert said.startswith(str(out / "restart.npz")) and (name in said or key in said) and "--force" in said
+        assert "only 0-dim" not in said and "unpack" not in said
+
+
 @pytest.mark.parametrize("name", HARM)
 def test_a_checkpoint_that_no_run_wrote_is_refused(name, stopped, tmp_path):
     case, out = copied(stopped, tmp_path)

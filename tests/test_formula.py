@@ -77,8 +77,10 @@ REFUSED = {
     "x.real*2": "wanted numbers",
     "[x][0]*2": "wanted numbers",
     "(lambda: x)()": "is unknown; known are",
-    "+".join(["x"] * 100_000): "is no formula",
+    "+".join(["x"] * 100_000): "is no formula of x and y: it has 199999 characters; wanted 4000 at most",
+    "+".join(["0.1*x"] * 3000): "it has 17999 characters; wanted 4000 at most",
     "(" * 500 + "x" + ")" * 500: "is no formula",
+    "x**" * 1300 + "1": "it has too many brackets or powers in one another",
 }
 
 
@@ -86,6 +88,15 @@ REFUSED = {
 def test_what_formulas_do_not_have_is_refused_with_the_nearest_form(text):
     with pytest.raises(ValueError, match=REFUSED[text]):
         values(text)
+
+
+@pytest.mark.parametrize("text, rule", [
+    ("+".join(["x"] * 2000), lambda x: 2000.0 * x), ("-".join(["x"] * 2000), lambda x: -1998.0 * x),
+    ("1" + "*x/x" * 999, lambda x: np.ones_like(x)),
+], ids=["sum", "difference", "product"])  # fmt: skip
+def test_a_formula_of_many_terms_is_read(text, rule):
+    x = np.array([1.0, 2.0, 0.5])
+    assert Shaped("length").read(text, Setting()).at(x, x) == approx(rule(x), rel=1e-13)
 
 
 NOWHERE = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from test_output import branched
@@ -125,3 +127,17 @@ def test_what_progress_raises_reaches_the_caller(error, tmp_path):
 
         with pytest.raises(error, match="mine"):
             sweep(still(), {"nodes.pond.level": [-1.0, -2.0]}, progress=late)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_state_that_is_not_finite_is_refused_with_the_name_of_the_first(value, model):
+    y = model.start.copy()
+    y[[5, 9]] = value
+    state = State(0.0, y)
+    doors = [partial(door, 0.0, y) for door in (model.rhs, model.evaluate, model.jacobian, model.observe)]
+    doors += [lambda: model.observe(state), lambda: advance(model, state, 0.1)]
+    doors += [lambda: fvsolve.solve(model, state, object())]
+    for door in doors:
+        with pytest.raises(FvsolveError) as error:
+            door()
+        assert f"y[5] = {value}, {model.state_names[5]};" in str(error.value)

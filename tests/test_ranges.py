@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fvsolve import run
@@ -194,6 +195,26 @@ def test_loops_without_friction_are_named_once(law):
     case["links"]["stub"] = scenes.pipe("b", "out", 100.0, 0.3, 1200.0, 5)
     (note,) = [one for one in model_of(load(case)).warnings if "loops" in one.text]
     assert note.place == "links.left" and note.text.startswith("left, right: loops without friction")
+
+
+@pytest.mark.parametrize("other, equal", [("tank", False), ("chamber", False), ("lake", False), ("tank", True)])
+def test_a_column_without_friction_between_two_vessels_is_no_loop(other, equal):
+    """It is a swing, from rest where heads differ: a 50 m column between a lake and a tank by w^2 = g A / (L F)."""
+    height, head = 0.0 if equal else 1.0, 101325.0 + 1000.0 * 9.80665 * (31.0 if not equal else 30.0)
+    end = {"tank": scenes.tank(0.2, 30.0 + height), "chamber": scenes.chamber(1.0, head), "lake": scenes.lake(31.0)}
+    column = {"type": "rigid-column", "from": "lake", "to": "end", "length": 50.0, "diameter": 0.3,
+              "friction": {"model": "none"}}  # fmt: skip
+    nodes = {"lake": scenes.lake(30.0), "end": end[other]}
+    case = scenes.scene(nodes, {"way": column}, 20.0, {"method": "dormand-prince", "rtol": 1e-9}, ["way.flow"], 0.5)
+    result = run(case)
+    said = [one for one in result.warnings if one.kind == "start"]
+    assert result.ok and [one.place for one in said] == ([] if equal else ["links.way"])
+    for one in said:
+        assert "starts from rest and swings" in one.text and "loop" not in one.text
+    assert result["way.flow"][0] == 0.0
+    if other == "tank":
+        omega = math.sqrt(9.80665 * math.pi / 4 * 0.09 / (50.0 * 0.2))
+        assert result["way.flow"] == pytest.approx(-height * 0.2 * omega * np.sin(omega * result.t), abs=1e-6)
 
 
 def test_check_summary_and_resolved_case_hold_the_fluid():

@@ -11,15 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_basin import alone, basin
 from test_output import branched
 
 import fvsolve
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
 
 KILLS = 2
 OFTEN = """
 import sys
 from importlib import import_module
 import fvsolve
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
 import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.02
 print(fvsolve.run(sys.argv[1], out=sys.argv[2], resume=True).reason)
 """
@@ -172,3 +177,22 @@ def test_a_history_that_lost_rows_is_refused_with_a_remedy(tmp_path):
     history.write_bytes(history.read_bytes()[:10])
     with pytest.raises(fvsolve.RunError, match="shorter.*--force"):
         fvsolve.run(branched(), out=tmp_path / "run", resume=True)
+
+
+def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
+    """The quickest pace and the shortest waves so far: what warns of them is made at the end."""
+    case = alone(basin((40.0, 20.0), (16, 8), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 6.0, step=0.05)
+    case["numerics"].pop("courant", None)
+    case["output"] |= {"fields": 12}
+    model = fvsolve.build(fvsolve.load(case))
+
+    def late(t, seconds, steps):
+        run.budget = 5.0  # steps until it is called again
+        if t > 3.0:
+            raise KeyboardInterrupt
+
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
+    run.left = 5.0
+    assert run.go().reason.startswith("interrupted") and run.soundness.rates and run.waves.found
+    again = Run(model, run.state(), MemorySink(model), None)
+    assert again.soundness.rates == run.soundness.rates and again.waves.found == run.waves.found

@@ -205,12 +205,20 @@ class Model(Shown):
         return np.zeros(int(self.layout["size"]))
 
     def given(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
-        """A time and a state as kernels take them; FvsolveError where they are none of this model."""
+        """A time and a state as kernels take them; FvsolveError where they are none of this model, or not finite."""
+        found = self.sized(y)
+        if not np.isfinite(found).all():
+            k = int(np.argmax(~np.isfinite(found)))
+            raise FvsolveError(f"y[{k}] = {found[k]}, {self.state_names[k]}; wanted a finite number for every state")
+        return given_time(t), found
+
+    def sized(self, y: Any) -> np.ndarray:
+        """A state as float64[n]; FvsolveError where it is none of this model."""
         found = given_numbers("y", y)
         if found.shape != (self.y_size,):
             raise FvsolveError(f"y has shape {found.shape}; wanted a number for each of the {self.y_size} states that "
                                "Model.state_names lists")  # fmt: skip
-        return given_time(t), found
+        return found
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
         """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there."""
@@ -316,7 +324,7 @@ class Model(Shown):
 
     def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it."""
-        _, y = self.given(0.0, y)
+        y = self.sized(y)
         if np.shape(out) != (int(self.layout["size"]),):
             raise FvsolveError(f"out has shape {np.shape(out)}; wanted what Model.evaluate gives beside the rates")
         found, rho = {}, self.case.properties.density
@@ -350,7 +358,7 @@ class Model(Shown):
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
         """Mass stored in the profile and by how much the state deviates from it [kg]."""
-        _, y = self.given(0.0, y)
+        y = self.sized(y)
         fluid, initial, change = self.case.properties, 0.0, 0.0
         for k, pipe in enumerate(self.pipes):
             row = self.tables[rec.I_PIPES][k]

@@ -297,17 +297,22 @@ class Start:
         self.scene.check()
 
     def report_split(self) -> None:
-        """The loops in which no friction says how the flow divides."""
+        """Columns that no flow holds still, and the loops in which no friction says how the flow divides."""
         held = {i: -1 for i, given in enumerate(self.held) if not np.isnan(given)}  # all of them one: ways between them
         rows = [*zip(self.scene.pipe_names, self.pipes, strict=True),
                 *zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
         ends = {name: [held.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")] for name, row in rows
                 if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
-        loops, before = ends, None
+        swing = [name for name, row in rows if name in ends and self.case.links[name].initial_flow is None
+                 and abs(self.held[int(row["from_node"])] - self.held[int(row["to_node"])]) > 1e-6 * PRESSURE_SCALE]
+        for name in swing:
+            text = f"{name}: without friction between unequal heads no flow is steady; it starts from rest and swings"
+            self.scene.warnings.append(Notice("start", f"links.{name}", text))
+        loops, before = {name: pair for name, pair in ends.items() if name not in swing}, None
         while self.answer.split and loops != before:  # what ends in a place that no other touches is in none
             before, touched = loops, Counter(end for pair in loops.values() for end in pair)
             loops = {name: pair for name, pair in loops.items() if min(touched[end] for end in pair) > 1}
-        if self.answer.split:
+        if self.answer.split and (loops or not swing):
             text = f"{listing(loops) or 'ways'}: loops without friction, in which flow is the least-norm split"
             self.scene.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 

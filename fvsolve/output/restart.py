@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.errors import RunError
+from fvsolve.errors import RunError, listing
 
 # Keys of the resolved case that change what is said about a run, not the run.
 SILENT = ("title", "expect", "compare")
@@ -77,16 +77,20 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
         with np.load(path) as file:
             arrays = {name: file[name] for name in file.files}
         found = json.loads(str(arrays.pop("identity")))
-        rows, history_bytes, frames = (int(count) for count in arrays.pop("counts"))
-        t, y, memory = float(arrays.pop("t")), arrays.pop("y"), arrays.pop("memory")
-        whole = y.dtype == memory.dtype == np.float64 and y.ndim == memory.ndim == 1 and np.isfinite(t + y).all()
-        if not whole or min(rows, history_bytes, frames) < 0 or not isinstance(found, dict):
-            raise ValueError("it holds what no run writes")
+        t, y, memory, counts = (arrays.pop(name) for name in ("t", "y", "memory", "counts"))
     except Exception as error:  # whatever zip, numpy and json make of a damaged file
-        raise RunError(f"{path} cannot be read ({error}); start the run again with --force") from None
+        said = f"{error} is not there" if isinstance(error, KeyError) else error
+        raise RunError(f"{path} cannot be read ({said}); start the run again with --force") from None
+    harmed = [name for name, array, axes in (("t", t, 0), ("y", y, 1), ("memory", memory, 1))
+              if array.dtype != np.float64 or array.ndim != axes]  # fmt: skip
+    harmed = harmed or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
+    harmed += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
+    harmed += ["identity"] if not isinstance(found, dict) else []
+    if harmed:
+        raise RunError(f"{path}: {listing(harmed)} is not what a run writes; start the run again with --force")
     _check(path, found, who)
     extra = {name.removeprefix("extra."): value for name, value in arrays.items()}
-    return Restart(t, y, memory, extra, rows, history_bytes, frames)
+    return Restart(float(t), y, memory, extra, *counts.tolist())
 
 
 def _check(path: Path, found: dict[str, str], wanted: dict[str, str]) -> None:

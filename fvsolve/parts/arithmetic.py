@@ -32,6 +32,8 @@ REFUSED = {  # operators of other languages: how they are written, and what says
     ast.Or: ("or", "max(a, b)"), ast.IfExp: ("if", "where(condition, a, b)"),
 }  # fmt: skip
 NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+LONGEST = 4000  # characters
+NESTED = "it has too many brackets or powers in one another"
 WRONG = ("divides by zero", "is the logarithm of zero", "is no number", "overflows")
 
 
@@ -53,16 +55,22 @@ class Arithmetic:
         """otherwise : what is said of a text that is no arithmetic at all."""
         self.text, self.source = text, text.replace("^", "**").strip()
         about = f"{show(text)} is no formula of x and y"
+        if len(text) > LONGEST:
+            raise ValueError(
+                f'{about}: it has {len(text)} characters; wanted {LONGEST} at most, or {{ file = "NAME.csv" }}'
+            )
         try:
             tree = ast.parse(self.source, mode="eval").body
-        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        except (MemoryError, RecursionError):
+            raise ValueError(f"{about}: {NESTED}") from None
+        except (SyntaxError, ValueError) as error:
             if any(sign in text for sign in "*+()"):  # no quantity
                 raise ValueError(f"{about}: {open_bracket(text) or getattr(error, 'msg', error)}") from None
             raise ValueError(otherwise or about) from None
         try:
             self.steps = list(self.read(tree))
         except RecursionError:
-            raise ValueError(f"{about}: it has too many brackets in brackets") from None
+            raise ValueError(f"{about}: {NESTED}") from None
         except ValueError as error:
             raise ValueError(f"{about}: {error}") from None
 
@@ -81,9 +89,14 @@ class Arithmetic:
             yield from self.read(node.operand)
             yield Step(operator(node.op), 1, part)
         elif isinstance(node, ast.BinOp):
-            yield from self.read(node.left)
-            yield from self.read(node.right)
-            yield Step(operator(node.op), 2, part)
+            chain = []  # x + y + z is (x + y) + z: as long as a text may be, and no deeper for that
+            while isinstance(node, ast.BinOp):
+                chain.append(node)
+                node = node.left
+            yield from self.read(node)
+            for one in reversed(chain):
+                yield from self.read(one.right)
+                yield Step(operator(one.op), 2, self.written(one))
         elif isinstance(node, ast.Compare):  # 0 < x < 1 where both hold
             sides = [node.left, *node.comparators]
             for one, sign, other in zip(sides, node.ops, sides[1:], strict=False):

@@ -80,11 +80,15 @@ def model_of(case, set: Mapping | None = None):
 def _solve(model, sink, progress):
     from fvsolve.model import State
     from fvsolve.solve import initial_state, solve
+    from fvsolve.solve.solve import MemoryMisfit
 
     kept = sink.restart
     state = initial_state(model) if kept is None else State(kept.t, kept.y, kept.memory)
     sink.begin(model, state)
-    return solve(model, state, sink, progress)
+    try:
+        return solve(model, state, sink, progress)
+    except MemoryMisfit as error:
+        raise RunError(f"{sink.folder / 'restart.npz'}: {error}") from None
 
 
 def _result(model, summary, sink, begun: float) -> Result:

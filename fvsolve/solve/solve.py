@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
-from fvsolve.model.basins.dispersion import Watch
+from fvsolve.model.basins.dispersion import Watch, Waves
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.soundness import Soundness
@@ -31,6 +31,15 @@ CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 FEW = 16.0  # steps at a time where they are beyond a limit, so that growth is seen early
 PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS, rec.I_ARMED)
+
+
+def flat(found: tuple[float, Waves] | None) -> list[float]:
+    """When the shortest waves of a basin were seen, and what they were; nan where none were."""
+    return [np.nan] * 4 if found is None else [found[0], *found[1]]
+
+
+class MemoryMisfit(RunError):
+    """What a state remembers is not what such a run would."""
 
 
 def initial_state(model: Model) -> State:
@@ -88,8 +97,8 @@ class Run:
             try:
                 self.remember(state.memory)
             except (ValueError, IndexError, OverflowError):  # of a damaged checkpoint, or of another solver's
-                raise RunError(f"a memory of {state.memory.size} numbers is not of such a run; start it again with "
-                               "--force, or with a State without memory") from None  # fmt: skip
+                raise MemoryMisfit(f"a memory of {state.memory.size} numbers is not of such a run; start it again with "
+                                   "--force, or with a State without memory") from None  # fmt: skip
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
@@ -100,7 +109,10 @@ class Run:
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
-        own += [float(len(switched)), *switched]
+        crowd = self.loop.crowd
+        own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
+        own += [x for one in self.waves.basins for x in flat(self.waves.found.get(one.name))]
+        own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
         return np.concatenate([own, *(view.ravel() for view in self.loop.stepper.memories()), *kept])
 
     def remember(self, memory: np.ndarray) -> None:
@@ -113,6 +125,15 @@ class Run:
         memory = memory[4 + 3 * changes :]
         events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
+        crowd, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
+        self.loop.crowd.extend(crowd.tolist())
+        self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
+        for basin in self.waves.basins:
+            (t, *one), memory = memory[:4].tolist(), memory[4:]
+            if t == t:
+                self.waves.found[basin.name] = t, Waves(*one)
+        for basin in self.soundness.moving:
+            self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
         known = [self.model.tables[at] for at in PERSISTENT] + self.loop.stepper.memories()
         if memory.size != sum(array.size for array in known):
             raise ValueError("as many numbers as there is nothing for")
