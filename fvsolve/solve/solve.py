@@ -101,7 +101,8 @@ class Run:
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
         own += [float(len(switched)), *switched]
-        return np.concatenate([own, *(view.ravel() for view in self.loop.stepper.memories()), *kept])
+        views = (view.ravel() for view in self.loop.stepper.memories())
+        return np.concatenate([own, *views, *kept, self.soundness.halves.kept])
 
     def remember(self, memory: np.ndarray) -> None:
         self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
@@ -113,7 +114,8 @@ class Run:
         memory = memory[4 + 3 * changes :]
         events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
-        known = [self.model.tables[at] for at in PERSISTENT] + self.loop.stepper.memories()
+        seen = self.soundness.halves.kept
+        known = [self.model.tables[at] for at in PERSISTENT] + [*self.loop.stepper.memories(), seen]
         if memory.size != sum(array.size for array in known):
             raise ValueError("as many numbers as there is nothing for")
         memory = self.loop.stepper.remember(memory)
@@ -121,6 +123,7 @@ class Run:
             array = self.model.tables[at].ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
+        seen[:] = memory
 
     def state(self) -> State:
         return State(self.loop.t, self.loop.now.copy(), self.memory())
@@ -229,12 +232,13 @@ class Run:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         while True:
             before, steps, busy = time.perf_counter(), self.loop.memory[told.STEPS], time.thread_time()
-            code = self.loop.run(self.left)
+            code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
             self.processor += time.thread_time() - busy
             self.left = max(1.0, self.left - (self.loop.memory[told.STEPS] - steps))
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
+            self.soundness.halves.look(self.loop)
             grown = self.soundness.look(self.loop.t, self.loop.now)
             if grown and code != told.CHATTERS:  # which names the parts
                 return grown
@@ -244,12 +248,12 @@ class Run:
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
             elif code == told.CHUNK and automatic.wants_change(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
-            elif code == told.CHUNK:
+            elif code == told.CHUNK and self.left <= 1.0:
                 self.pause(self.spent)
                 self.left, self.spent = self.budget, 0.0
             elif code == told.DONE:
                 return ""
-            elif code != told.ROWS_FULL:
+            elif code not in (told.CHUNK, told.ROWS_FULL):
                 return self.failure(code)
 
     def pause(self, spent: float) -> None:
