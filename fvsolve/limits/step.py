@@ -16,6 +16,7 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.limits.ends import FIFTH, LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
+from fvsolve.limits.lumped import Mode, lumped_mode, times
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.symbol import weights_of
 from fvsolve.model.schemes import FROZEN_AS
@@ -25,6 +26,7 @@ from fvsolve.steppers.tableau import method_named
 SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
 SHARE = 0.05  # of an estimate: up to here beyond it a step is doubtful, from there on wrong
 GROWS = 10.0  # times that the worst wave grows in a run: less is not seen, where no step is without growth
+STILL, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05  # of its range by which a step leaves what is no wave astray, on average
 LIMITED = 0.3  # the same where limiters stand between few cells: they hold by up to so much more (tests/test_ends.py)
 
 
@@ -41,10 +43,12 @@ class Room(NamedTuple):
     grows: float = math.inf  # times in the run, where that is what makes it wrong
 
 
-def step_limits(model, rates: dict[str, float] | None = None) -> list[Notice]:
-    """A notice for the pipe and for every basin whose step is beyond its limit; nothing under error control.
+def step_limits(model, rates: dict[str, float] | None = None, astray: float | None = None) -> list[Notice]:
+    """A notice for the pipe, for every basin, and for what is no wave, whose step is beyond its limit.
 
-    rates : of basins by name, the greatest in a run so far [1/s]; those of the start by default.
+    rates : of basins by name, the greatest in a run so far [1/s]; those of the start by default. astray : share of
+    its range by which steps of a run went astray where they did most (`solve.halves`); None before a run. Nothing
+    under error control.
     """
     numerics = model.case.numerics
     method = method_named(automatic.first_method(numerics.method))
@@ -52,10 +56,23 @@ def step_limits(model, rates: dict[str, float] | None = None) -> list[Notice]:
         return []
     try:
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
+        mode = lumped_mode(model, method.name) if numerics.step is not None else None
     except FvsolveError:  # a method whose stability function is not to be had
         return []
-    beyond = [room for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
-    return [notice(model, room, method.name) for room in beyond]
+    found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
+    return found + ([] if mode is None else [of_mode(numerics.step, mode, method.name, astray)])
+
+
+def of_mode(step: float, mode: Mode, method: str, astray: float | None) -> Notice:
+    """What is to be said of what is no wave: before a run that it grows, after it whether that was seen."""
+    seen = astray is None or astray >= WRONG or (mode.sure and astray > STILL)
+    wrong = seen and mode.grows >= GROWS**2
+    doubt = "it may be wrong" if seen or astray >= DOUBTFUL else "this run shows none"
+    ends = "the numbers are not to be trusted" if wrong else doubt
+    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of {step:.6g} s, "
+            f"as the start has it; {mode.limit:.6g} s is the limit (an estimate); {ends}; "
+            f"give numerics.step = {rounded_down(mode.limit):.4g} s or less")  # fmt: skip
+    return Notice("step-limit", mode.place, text, "step", step, mode.limit, not wrong)
 
 
 def pipe_rooms(model, method: str) -> list[Room]:
@@ -180,11 +197,6 @@ def notice(model, room: Room, method: str) -> Notice:
 def growth(scheme: str, method: str, courant: float, crossed: float) -> float:
     """By how much the fastest wave of a uniform grid grows while waves cross so many cells."""
     return times(growth_of(weights_of(scheme), method, courant)[0], crossed / courant)
-
-
-def times(excess: float, steps: float) -> float:
-    """What a factor of 1 + excess makes of one in so many steps."""
-    return math.exp(min(700.0, steps * math.log1p(max(excess, 0.0))))
 
 
 def rounded_down(x: float) -> float:

@@ -81,6 +81,11 @@ class Loop:
         return self.stepper.y[self.flags[told.NOW]]
 
     @property
+    def before(self) -> np.ndarray:
+        """The state before the last step (a view)."""
+        return self.stepper.y[self.flags[told.OLD]]
+
+    @property
     def t(self) -> float:
         """The present time [s]."""
         return float(self.memory[told.T])

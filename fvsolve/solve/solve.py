@@ -113,7 +113,8 @@ class Run:
         own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
         own += [x for one in self.waves.basins for x in flat(self.waves.found.get(one.name))]
         own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
-        return np.concatenate([own, *(view.ravel() for view in self.loop.stepper.memories()), *kept])
+        views = (view.ravel() for view in self.loop.stepper.memories())
+        return np.concatenate([own, *views, *kept, self.soundness.halves.kept])
 
     def remember(self, memory: np.ndarray) -> None:
         self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
@@ -134,7 +135,8 @@ class Run:
                 self.waves.found[basin.name] = t, Waves(*one)
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
-        known = [self.model.tables[at] for at in PERSISTENT] + self.loop.stepper.memories()
+        seen = self.soundness.halves.kept
+        known = [self.model.tables[at] for at in PERSISTENT] + [*self.loop.stepper.memories(), seen]
         if memory.size != sum(array.size for array in known):
             raise ValueError("as many numbers as there is nothing for")
         memory = self.loop.stepper.remember(memory)
@@ -142,6 +144,7 @@ class Run:
             array = self.model.tables[at].ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
+        seen[:] = memory
 
     def state(self) -> State:
         return State(self.loop.t, self.loop.now.copy(), self.memory())
@@ -251,12 +254,13 @@ class Run:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         while True:
             before, steps, busy = time.perf_counter(), self.loop.memory[told.STEPS], time.thread_time()
-            code = self.loop.run(self.left)
+            code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
             self.processor += time.thread_time() - busy
             self.left = max(1.0, self.left - (self.loop.memory[told.STEPS] - steps))
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
+            self.soundness.halves.look(self.loop)
             grown = self.soundness.look(self.loop.t, self.loop.now)
             if grown and code != told.CHATTERS:  # which names the parts
                 return grown
@@ -266,12 +270,12 @@ class Run:
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
             elif code == told.CHUNK and automatic.wants_change(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
-            elif code == told.CHUNK:
+            elif code == told.CHUNK and self.left <= 1.0:
                 self.pause(self.spent)
                 self.left, self.spent = self.budget, 0.0
             elif code == told.DONE:
                 return ""
-            elif code != told.ROWS_FULL:
+            elif code not in (told.CHUNK, told.ROWS_FULL):
                 return self.failure(code)
 
     def pause(self, spent: float) -> None:

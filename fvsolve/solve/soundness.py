@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
+from fvsolve.limits.drives import drives
 from fvsolve.limits.step import step_limits
+from fvsolve.solve.halves import Halves
 
-FAR = 1e3  # times as much again for states that are driven by more than waves: contents, bodies, what is carried
 MOST = 1e6  # times what drives a scene: what is beyond has grown by itself
 OPEN = 1e-8  # of the largest term of a ledger: what does not close to that is wrong
-DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # keys of nodes that are schedules
 
 
 class Soundness:
@@ -26,6 +25,7 @@ class Soundness:
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
         self.predicted = step_limits(model)
+        self.halves = Halves(model)
         self.largest = MOST * drives(model)
         self.grown: Notice | None = None
 
@@ -47,7 +47,11 @@ class Soundness:
 
     def warnings(self, ledgers: dict) -> list[Notice]:
         """All notices of a run that ended."""
-        found = step_limits(self.model, self.rates) if self.moving else list(self.predicted)
+        found = list(self.predicted)
+        if self.model.case.numerics.step is not None:  # now with what the run has shown
+            found = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
+        astray = self.halves.notice()
+        found += [] if astray is None else [astray]
         found += [] if self.grown is None else [self.grown]
         return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]
 
@@ -61,41 +65,3 @@ def unclosed(name: str, ledger: dict) -> list[Notice]:
         f"{name} ledger: {ledger['remainder']:.6g} remain, {relative:.3g} of its largest term; wanted {OPEN:g} at most"
     )
     return [Notice("ledger", name, text, "remainder", float(relative), OPEN, False)]
-
-
-def drives(model) -> np.ndarray:
-    """The largest of what drives each state of pipes and basins; of others what is small, times FAR : float64[n]."""
-    found, linear = FAR * model.scale, model.case.properties
-    pressure, flow = given(model)
-    pipes = model.tables[rec.I_PIPES]
-    flow = max([flow, *np.abs(pipes["flow"])])
-    if len(pipes):
-        pressure = max(pressure, flow / float(pipes["admittance"].min()))
-    for mesh, row in zip(model.pipes, pipes, strict=True):
-        own = found[row["y"] : row["y"] + 2 * mesh.cells]
-        own[:] = np.maximum(
-            max(pressure * float(row["admittance"]), flow), model.scale[row["y"] : row["y"] + 2 * mesh.cells]
-        )
-    for basin in model.basins:
-        states, scales = basin.of(found), basin.of(model.scale)
-        ratio = 1.0 + pressure / (linear.density * model.case.gravity)
-        for own, scale, start in zip(states, scales, basin.of(model.start), strict=True):
-            own[:] = np.maximum(ratio * scale, np.ptp(start))
-    return found
-
-
-def given(model) -> tuple[float, float]:
-    """Range of pressures [Pa] and greatest mass flow [kg/s] that the start and schedules of nodes bring."""
-    rho, gravity = model.case.properties.density, model.case.gravity
-    at_start = model.tables[rec.I_NODES]["pressure"]
-    pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
-    for node in model.case.nodes.values():
-        for key, kind in DRIVES.items():
-            values = getattr(getattr(node, key, None), "value", None)
-            if not isinstance(values, np.ndarray) or not values.size:
-                continue
-            if kind == "flow":
-                flow = max(flow, rho * float(np.abs(values).max()))
-            else:
-                pressures.append(float(np.ptp(values)) * (rho * gravity if kind == "head" else 1.0))
-    return max(pressures), flow

@@ -1,0 +1,62 @@
+"""What drives a scene: ranges of pressures, flows, and by them the size that states may have. Knows no run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+FAR = 1e3  # times as much again for states that are driven by more than waves: contents, bodies, what is carried
+DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # keys of nodes that are schedules
+
+
+def drives(model) -> np.ndarray:
+    """The largest of what drives each state of pipes and basins; of others what is small, times FAR : float64[n]."""
+    found, linear = FAR * model.scale, model.case.properties
+    pressure, flow = given(model)
+    pipes = model.tables[rec.I_PIPES]
+    flow = max([flow, *np.abs(pipes["flow"])])
+    if len(pipes):
+        pressure = max(pressure, flow / float(pipes["admittance"].min()))
+    for mesh, row in zip(model.pipes, pipes, strict=True):
+        own = found[row["y"] : row["y"] + 2 * mesh.cells]
+        own[:] = np.maximum(
+            max(pressure * float(row["admittance"]), flow), model.scale[row["y"] : row["y"] + 2 * mesh.cells]
+        )
+    for basin in model.basins:
+        states, scales = basin.of(found), basin.of(model.scale)
+        ratio = 1.0 + pressure / (linear.density * model.case.gravity)
+        for own, scale, start in zip(states, scales, basin.of(model.start), strict=True):
+            own[:] = np.maximum(ratio * scale, np.ptp(start))
+    return found
+
+
+def given(model) -> tuple[float, float]:
+    """Range of pressures [Pa] and greatest mass flow [kg/s] that the start and schedules of nodes bring."""
+    rho, gravity = model.case.properties.density, model.case.gravity
+    at_start = model.tables[rec.I_NODES]["pressure"]
+    pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
+    for node in model.case.nodes.values():
+        for key, kind in DRIVES.items():
+            values = getattr(getattr(node, key, None), "value", None)
+            if not isinstance(values, np.ndarray) or not values.size:
+                continue
+            if kind == "flow":
+                flow = max(flow, rho * float(np.abs(values).max()))
+            else:
+                pressures.append(float(np.ptp(values)) * (rho * gravity if kind == "head" else 1.0))
+    return max(pressures), flow
+
+
+def lumped(model) -> np.ndarray:
+    """Numbers of the states that are no cell's: of vessels, columns, bodies and devices : int64[k]."""
+    return np.array([i for i, name in enumerate(model.state_names) if "[" not in name], dtype=np.int64)
+
+
+def spreads(model, share: float = 1.0) -> np.ndarray:
+    """What vessels hold more or less over the range of pressures; a share of what is small elsewhere : float64[n]."""
+    found, spread = share * model.scale, given(model)[0]
+    for row in model.tables[rec.I_NODES]:
+        if row["y"] >= 0 and row["stiffness"] > 0.0 and spread > 0.0:
+            found[row["y"]] = spread / row["stiffness"]
+    return found

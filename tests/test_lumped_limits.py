@@ -1,0 +1,212 @@
+"""Fixed explicit steps too long for what is no wave: predicted at the start, seen in the run; right runs left alone.
+
+Truth is the closed form of a swing, the exact end of a method's stability interval, or the scene under error control.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from truth.scenes import AMBIENT, chamber, junction, lake, pipe, ramp, reservoir, scene, step, tank
+
+import fvsolve
+from fvsolve.limits.lumped import lumped_mode
+from fvsolve.limits.step import step_limits
+from fvsolve.run import model_of
+from fvsolve.steppers.analysis.stability_function import stability_function
+from fvsolve.steppers.tableau import method_named
+
+EXACT = {"method": "rodas-5p", "rtol": 1e-8, "scheme": "upwind"}
+
+
+def hole(start: str, end: str, diameter: float, opening=1.0) -> dict:
+    return {"type": "orifice", "from": start, "to": end, "diameter": diameter, "opening": opening}
+
+
+def said(notices, kind: str) -> list:
+    return [one for one in notices if one.kind == kind]
+
+
+def swinging(mass: float, stiffness: float, damping: float, end: float, **numerics) -> dict:
+    """A mass that is let go on a spring with a damper."""
+    nodes = {"wall": {"type": "frame"}, "load": {"type": "mass", "mass": mass, "initial_position": 0.01}}
+    links = {
+        "spring": {"type": "spring", "from": "wall", "to": "load", "stiffness": stiffness},
+        "damper": {"type": "damper", "from": "wall", "to": "load", "damping": damping},
+    }
+    return scene(nodes, links, end, numerics, ["load.position"], end / 50)
+
+
+@pytest.mark.parametrize("method", ["euler", "ssp-rk3", "rk4", "dormand-prince"])
+def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
+    """s = -60 +- 308.2i 1/s: |R(h s)| = 1 at the limit; 2 % below it swings decay, 6 % above they grow and are told."""
+    s, r = complex(-60.0, math.sqrt(1e5 - 60.0**2)), stability_function(method_named(method))
+    tried = np.linspace(1e-6, 0.03, 3000)
+    first = int(np.argmax(np.abs(r(tried * s)) > 1.0))
+    limit = brentq(lambda h: abs(complex(r(h * s))) - 1.0, tried[first - 1], tried[first])
+    for factor, grows in ((0.98, False), (1.06, True)):
+        case = swinging(10.0, 1e6, 1200.0, 3000.0 * limit, method=method, step=factor * limit)
+        before = step_limits(model_of(case))
+        assert [one.ok for one in before] == ([False] if grows else [])
+        result = fvsolve.run(case)
+        assert result.ok is not grows
+        assert grows or np.abs(result["load.position"]).max() == 0.01
+        if grows and result.reason == "finished":
+            assert np.abs(result["load.position"]).max() > 100.0
+        if grows:
+            assert before[0].limit == pytest.approx(limit, rel=2e-2) and before[0].place.startswith("load.")
+
+
+@pytest.mark.parametrize("given, rate", [({"decay": 400.0}, 400.0), ({"diffusivity": 1e4}, 4e4 / 100.0)])
+def test_what_a_pipe_carries_has_the_limit_of_the_real_axis(given, rate):
+    """rk4 holds to h s = -2.7853: 6.963 ms, where decay takes 400 1/s, and the shortest wave of 1e4 m2/s too."""
+    nodes = {"lake": lake(50.0, scalars={"dye": 1.0}), "gate": junction(0.01)}
+    links, limit = {"main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 10)}, 2.785293563 / rate
+    for factor, grows in ((0.99, False), (1.06, True)):
+        case = scene(
+            nodes, links, 4.0, {"scheme": "upwind", "method": "rk4", "step": factor * limit}, ["main.dye@0.5"], 0.1
+        )
+        case["scalars"] = {"dye": given}
+        before = step_limits(model_of(case))
+        assert [one.ok for one in before] == ([False] if grows else []) and fvsolve.run(case).ok is not grows
+        if grows:
+            assert before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "main.dye"
+
+
+def vessel(end: float, first=1.0, second=1.0, pressure=None, volume=0.01, **numerics) -> dict:
+    """A chamber between two orifices of 20 mm."""
+    nodes = {"high": reservoir(5e5), "c": chamber(volume, pressure), "low": reservoir(2e5)}
+    links = {"in": hole("high", "c", 0.02, first), "out": hole("c", "low", 0.02, second)}
+    return scene(nodes, links, end, numerics, ["c.pressure"], end / 100)
+
+
+def beside_a_pipe(end: float, **numerics) -> dict:
+    """A litre behind an orifice at the end of a main."""
+    nodes = {"lake": lake(50.0), "t": junction(), "c": chamber(0.001), "low": reservoir(2e5)}
+    links = {
+        "main": pipe("lake", "t", 300.0, 0.1, 1000.0, 20),
+        "in": hole("t", "c", 0.02),
+        "out": hole("c", "low", 0.02, ramp(0.2 * end, 0.2 * end, 1.0, 0.5)),
+    }
+    return scene(nodes, links, end, {"scheme": "upwind", **numerics}, ["c.pressure"], end / 100)
+
+
+SWINGS = {
+    "moved at the start": lambda **n: vessel(2.0, pressure=5e5, **n),
+    "narrowed slowly": lambda **n: vessel(2.0, second=ramp(0.5, 1.0, 1.0, 0.8), **n),
+    "opened at once": lambda **n: vessel(2.0, first=step(1.0, 0.0, 1.0), **n),
+    "behind a pipe": lambda **n: beside_a_pipe(1.5, **n),
+}
+
+
+@pytest.mark.parametrize("how", SWINGS)
+@pytest.mark.parametrize("method", ["euler", "rk4"])
+def test_a_vessel_that_swings_between_wrong_pressures_is_not_ok(how, method):
+    """Orifices bend what swings, so that it is as large as the step is long, and never grows: 3.5e8 Pa was ok."""
+    result = fvsolve.run(SWINGS[how](method=method, step=7.5e-3))
+    assert result.reason == "finished" and np.ptp(result["c.pressure"]) > 1e7 and not result.ok
+    assert [one.ok for one in said(result.warnings, "step-error")] == [False]
+    (before,) = step_limits(model_of(SWINGS[how](method=method, step=7.5e-3)))
+    assert not before.ok and before.place == "c.mass" and "or less" in before.text
+
+
+@pytest.mark.parametrize("how", ["narrowed slowly", "opened at once"])
+def test_at_a_step_that_holds_the_same_vessel_is_right_and_nothing_is_said(how):
+    result = fvsolve.run(SWINGS[how](method="rk4", step=2e-5))
+    assert result.ok and not said(result.warnings, "step-error") and not said(result.warnings, "step-limit")
+    right = fvsolve.run(SWINGS[how](**{k: v for k, v in EXACT.items() if k != "scheme"}))
+    at = np.searchsorted(result.t, right.t[-1])
+    assert result["c.pressure"][at] == pytest.approx(right["c.pressure"][-1], rel=1e-6)
+
+
+def test_what_never_moves_is_ok_and_told_of_the_limit_all_the_same():
+    result = fvsolve.run(vessel(1.0, method="euler", step=0.01))
+    (one,) = said(result.warnings, "step-limit")
+    assert result.ok and one.ok and "this run shows none" in one.text and np.ptp(result["c.pressure"]) < 1.0
+
+
+def test_chatter_about_a_drop_of_zero_that_is_too_small_to_matter_is_left_in_peace():
+    """Two tanks come to a level in finite time: then steps of euler go to and fro by some 1e-7 m, without end."""
+    nodes = {"one": tank(1.0, 3.0), "two": tank(1.0, 2.0)}
+    result = fvsolve.run(
+        scene(nodes, {"way": hole("one", "two", 0.03)}, 4000.0, {"method": "euler", "step": 1.0}, ["one.level"], 40.0)
+    )
+    assert result.ok and not said(result.warnings, "step-error") and not said(result.warnings, "step-limit")
+    assert result["one.level"][-1] == pytest.approx(2.5, abs=1e-5)
+
+
+def test_two_bladders_and_a_column_are_told_by_check_that_euler_never_holds():
+    nodes = {
+        name: {"type": "accumulator", "volume": volume, "precharge": 4.877e5, "initial_pressure": pressure}
+        for name, volume, pressure in (("a", 0.00499, 1.2e6), ("b", 0.9755, 2.57e5))
+    }
+    way = {"type": "rigid-column", "from": "a", "to": "b", "length": 31.86, "diameter": 0.02}
+    way["friction"] = {"model": "quasi-steady", "factor": 0.02}
+    numerics = {"method": "euler", "step": 1.0, "initial": "rest"}
+    (one,) = step_limits(model_of(scene(nodes, {"way": way}, 3.0, numerics, ["way.flow"], 0.1)))
+    assert not one.ok and one.value == 1.0 and one.limit < 1e-3
+
+
+def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
+    """Euler steps multiply an undamped swing by 1 + (h w)^2 / 2 each, h w = 0.01: by 1.005 in a hundred of them."""
+    case = swinging(10.0, 1e5, 1e-9, 100 * 1e-4, method="euler", step=1e-4)
+    assert lumped_mode(model_of(case), "euler") is None and fvsolve.run(case).ok
+    case["numerics"]["end"] = 1e6 * 1e-4
+    mode = lumped_mode(model_of(case), "euler")
+    assert math.log(mode.grows) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.sure
+
+
+@pytest.mark.parametrize("seeds", [range(0, 12), range(12, 24), range(24, 36)])
+def test_the_verdict_is_that_of_the_truth_in_scenes_at_random(seeds):
+    """Chains of chambers, and tanks: what errs by a hundredth of its range is ok, what errs by half of it is not."""
+    for seed in seeds:
+        case, spread = drawn(np.random.default_rng(seed))
+        result, right = fvsolve.run(case), fvsolve.run(case | {"numerics": {"end": case["numerics"]["end"], **EXACT}})
+        wrong = 0.0
+        for name, range_ in spread.items():
+            found = np.interp(right.t, result.t, result[name])
+            wrong = max(wrong, float(np.mean(np.abs(found - right[name]))) / max(range_, np.ptp(right[name])))
+        assert result.ok or wrong > 0.01, (seed, wrong, result.warnings)
+        assert not result.ok or wrong < 0.5, (seed, wrong)
+
+
+def drawn(rng) -> tuple[dict, dict[str, float]]:
+    """(a case at a step of about what it bears, the range of pressures or levels that drives each of its probes)."""
+    h, steps = float(np.exp(rng.uniform(np.log(1e-6), np.log(3e-3)))), 300
+    late = {"start": 50 * h, "duration": 100 * h, "value": [1.0, 0.3]}
+    numerics = {"method": str(rng.choice(["euler", "improved-euler", "ssp-rk3", "rk4"]))}
+    if rng.random() < 0.3:
+        h *= 1e4
+        nodes = {"a": tank(float(rng.uniform(0.01, 0.3)), 4.0), "b": tank(float(rng.uniform(0.01, 0.3)), 2.0)}
+        links, spread = {"way": hole("a", "b", 0.05)}, {"a.level": 2.0, "b.level": 2.0}
+    else:
+        names = ["a", "b", "c"][: rng.integers(1, 4)]
+        nodes = {"high": reservoir(6e5), "low": reservoir(2 * AMBIENT)}
+        nodes |= {name: chamber(float(np.exp(rng.uniform(-8.0, -3.0)))) for name in names}
+        ends = ["high", *names, "low"]
+        links = {
+            f"{i}": hole(*pair, float(rng.uniform(0.004, 0.03)))
+            for i, pair in enumerate(zip(ends[:-1], ends[1:], strict=True))
+        }
+        links[f"{len(names)}"]["opening"] = late
+        spread = {f"{name}.pressure": 6e5 - 2 * AMBIENT for name in names}
+    return scene(nodes, links, steps * h, numerics | {"step": h}, list(spread), 3 * h), spread
+
+
+def test_a_resumed_run_remembers_what_was_seen(tmp_path, monkeypatch):
+    case = SWINGS["moved at the start"](method="rk4", step=2.0 / 20000, volume=0.002)
+    unbroken = fvsolve.run(case)
+    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+
+    def enough(t, seconds, steps):
+        if steps > 1000:  # after the first checkpoint
+            raise KeyboardInterrupt
+
+    assert fvsolve.run(case, out=tmp_path / "run", progress=enough).reason.startswith("interrupted")
+    resumed = fvsolve.run(case, out=tmp_path / "run", resume=True)
+    assert resumed.reason == "finished" and resumed.warnings == unbroken.warnings
+    assert said(resumed.warnings, "step-error")
