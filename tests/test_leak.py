@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.kernels.emitters import LEAST_DROP, emitter_flow, emitter_slope
+from fvsolve.kernels.emitters import FREE, LEAST_DROP, emitter_flow, emitter_slope
 from fvsolve.studies.energy.energy import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -70,8 +70,9 @@ def test_nothing_comes_back_through_a_leak(law):
 def test_its_slope_is_bounded_without_a_jump_and_that_of_its_flow(n):
     law = np.array([n, 0.0, 1e5, np.inf])
     drops = np.concatenate([np.linspace(-5.0, 3 * LEAST_DROP, 1001), np.geomspace(50.0, 1e6, 50)])
-    slope = np.array([emitter_slope(law, 0, 1e-4, d) for d in drops])
-    rise = [(emitter_flow(law, 0, 1e-4, d + 1e-4) - emitter_flow(law, 0, 1e-4, d - 1e-4)) / 2e-4 for d in drops]
+    slope = np.array([emitter_slope(law, 0, 1e-4, d, FREE) for d in drops])
+    ends = ((d - 1e-4, d + 1e-4) for d in drops)
+    rise = [(emitter_flow(law, 0, 1e-4, b, FREE) - emitter_flow(law, 0, 1e-4, a, FREE)) / 2e-4 for a, b in ends]
     assert slope == pytest.approx(rise, rel=1e-4, abs=1e-3 * slope.max())
     assert (slope >= 0.0).all() and slope[drops <= 0.0].max() == 0.0
     assert np.abs(np.diff(slope[:1001])).max() < 0.02 * slope.max()

@@ -32,7 +32,7 @@ from fvsolve.kernels.density import (
     pressure_of_mass,
     velocity_change,
 )
-from fvsolve.kernels.emitters import emitter_flow, emitter_step
+from fvsolve.kernels.emitters import emitter_flow, emitter_step, rule_of
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.isolated import find_held, inner_row
 from fvsolve.kernels.pipes import family_of
@@ -203,7 +203,7 @@ def valve_target(tables, out, k, g):
     dense = g * denser
     if valve["law"] == POWER:
         dense *= denser  # it is its volume that follows the drop
-        return emitter_flow(tables[I_FLOATS], valve["data"], dense, drop), dense
+        return emitter_flow(tables[I_FLOATS], valve["data"], dense, drop, rule_of(tables, k)), dense
     if valve["law"] == TWO_WAY and drop < 0.0:
         dense *= valve["back"]
     if valve["transition"] > 0.0:
@@ -221,7 +221,7 @@ def valve_move(tables, out, k, g, m, wide):
     transition = valve["transition"]
     if valve["law"] == POWER:
         drop, denser = valve_drive(tables, out, k)
-        return emitter_step(tables[I_FLOATS], valve["data"], g * denser * denser, m, drop)
+        return emitter_step(tables[I_FLOATS], valve["data"], g * denser * denser, m, drop, rule_of(tables, k))
     target, slope = valve_target(tables, out, k, g)
     if valve["law"] == LIFT and is_lifting(tables, k):
         return lifting_step(tables, out, k, full_flow(target, transition), slope, m, wide)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_CALLS, I_DEVICES, I_SPARE
+from fvsolve.kernels.records import I_CALLS, I_SPARE
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE is what event functions want to have run before them; within the
 # right-hand side, CLUSTERS closes nodes that several valves join, and the others see to rigid columns.
@@ -125,12 +125,16 @@ def record_in_turn(t, y, out, handle, values):
 
 
 @njit
+def close_in_turn(t, y, out, handle, g):
+    """Close the nodes for the event functions that follow."""
+    run(CLOSE, t, y, y[:0], out, handle)
+
+
+@njit
 def events_in_turn(t, y, handle, g):
     """Every piece of the event functions."""
     tables, k = open_tables(handle), 0
     calls, out = tables[I_CALLS], tables[I_SPARE]
-    if tables[I_DEVICES].size > 0:  # whose events are read off closed nodes
-        run(CLOSE, t, y, y[:0], out, handle)
     while calls[EVENTS, k] != 0:
         call_reader(calls[EVENTS, k], t, y, out, handle, g)
         k += 1

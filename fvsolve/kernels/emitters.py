@@ -1,21 +1,60 @@
 """Outflow as a power of the drop, none backwards: leaks, and demands that follow the pressure. Knows one outlet.
 
 M = sqrt(G span) min(most, x^n), x = (drop - least) / span. Below LEAST_DROP a cubic leads from no flow with no slope
-to the power, so that the slope is bounded and has no jump; n, least, span and most are four numbers in `floats`.
+to the power, so that the slope is bounded and has no jump; n, least, span and most are four numbers in `floats`, the
+fifth says where its flags stand. These change on accepted states alone, so that no step meets a bend: shut, it lets
+nothing out; short of all that is asked it goes on beyond it; with all of it, it falls short at half of x alone.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_VALVES
 
 LEAST_DROP = 10.0  # drop above `least` below which the cubic holds [Pa]
+EVENTS = 4  # of an outlet: it shuts, it opens; it gives all that is asked, or less
+FREE, SHUT, PART, FULL = 0, 1, 2, 3  # rules; FREE as the drop says
+SLIGHT = 1e-3  # drop by which it must pass `least` before it opens or shuts: rounding must not [Pa]
+NEAR = 1e-9  # the same of what gives all, of span
+NO_END = 1e300  # as the most that is asked
+
+
+@njit(forceinline=True)
+def rule_of(tables, k):
+    """The rule that restriction k follows until its next event."""
+    armed, at = tables[I_ARMED], tables[I_VALVES][k]["event"]
+    if armed[at] > 0.0:
+        return SHUT
+    return FULL if armed[at + 2] > 0.0 else PART if armed[at + 3] > 0.0 else FREE
+
+
+@njit(forceinline=True)
+def bent(floats, at, drop, rule):
+    """(drop above `least` as the power sees it, most) under a rule."""
+    above, most = drop - floats[at + 1], floats[at + 3]
+    if rule == PART:
+        return above, NO_END
+    return (0.0 if rule == SHUT else 2.0 * above if rule == FULL else above), most
 
 
 @njit
-def emitter_flow(floats, at, g, drop):
+def emitter_events(tables, k, drop, g):
+    """g: until restriction k shuts, or opens; until it gives all that is asked, or less [Pa]."""
+    valve, floats, armed = tables[I_VALVES][k], tables[I_FLOATS], tables[I_ARMED]
+    at, event = valve["data"], valve["event"]
+    above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
+    if most < NO_END:
+        missing = span * (most ** (1.0 / floats[at]) + (-NEAR if armed[event + 2] > 0.0 else NEAR)) - above
+    either(tables, g, event, above - SLIGHT if armed[event] > 0.0 else above + SLIGHT)
+    either(tables, g, event + 2, missing)
+
+
+@njit
+def emitter_flow(floats, at, g, drop, rule):
     """Mass flow [kg/s] at a drop [Pa]; g : conductance now, (flow at x = 1)^2 / span [kg2/s2/Pa]."""
-    n, span, most = floats[at], floats[at + 2], floats[at + 3]
-    above = drop - floats[at + 1]
+    n, span = floats[at], floats[at + 2]
+    above, most = bent(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
         return 0.0
     full = sqrt(g * span)
@@ -26,37 +65,43 @@ def emitter_flow(floats, at, g, drop):
 
 
 @njit
-def emitter_slope(floats, at, g, drop):
+def emitter_slope(floats, at, g, drop, rule):
     """d flow / d drop [kg/s/Pa]."""
-    n, span, most = floats[at], floats[at + 2], floats[at + 3]
-    above = drop - floats[at + 1]
+    n, span = floats[at], floats[at + 2]
+    above, most = bent(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
         return 0.0
     full = sqrt(g * span)
     if above < LEAST_DROP:
         s = above / LEAST_DROP
-        return full * (LEAST_DROP / span) ** n * s * (2.0 * (3.0 - n) + 3.0 * (n - 2.0) * s) / LEAST_DROP
-    share = (above / span) ** n
-    return full * n * share / above if share < most else 0.0
+        slope = full * (LEAST_DROP / span) ** n * s * (2.0 * (3.0 - n) + 3.0 * (n - 2.0) * s) / LEAST_DROP
+    else:
+        share = (above / span) ** n
+        slope = full * n * share / above if share < most else 0.0
+    return 2.0 * slope if rule == FULL else slope
 
 
 @njit
-def emitter_drop(floats, at, g, flow):
+def emitter_drop(floats, at, g, flow, rule):
     """Drop [Pa] at which it carries a flow [kg/s] by the power alone; that from which on it is none for none."""
     n, span = floats[at], floats[at + 2]
     if flow <= 0.0 or g <= 0.0:
         return floats[at + 1]
-    return floats[at + 1] + span * min(floats[at + 3], flow / sqrt(g * span)) ** (1.0 / n)
+    most = NO_END if rule == PART else floats[at + 3]
+    above = span * min(most, flow / sqrt(g * span)) ** (1.0 / n)
+    return floats[at + 1] + (0.5 * above if rule == FULL else above)
 
 
 @njit
-def emitter_step(floats, at, g, m, drop):
+def emitter_step(floats, at, g, m, drop, rule):
     """a, s with dM = a + s d(drop) for the next Newton step of an emitter that carries m [kg/s] at a drop [Pa].
 
     s is the chord between what it carries and what the drop asks for: for n = 1/2 Newton's own slope in M^2.
     """
-    target, asked = emitter_flow(floats, at, g, drop), emitter_drop(floats, at, g, m)
+    target, asked = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
+    if rule == SHUT:
+        return -m, 0.0
     near = abs(drop - asked) <= 1e-6 * abs(drop - floats[at + 1])
     if near or (drop - floats[at + 1] < LEAST_DROP and asked - floats[at + 1] < LEAST_DROP):
-        return target - m, emitter_slope(floats, at, g, drop)
+        return target - m, emitter_slope(floats, at, g, drop, rule)
     return target - m, max(0.0, (target - m) / (drop - asked))

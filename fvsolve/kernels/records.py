@@ -160,6 +160,7 @@ VALVE = np.dtype(
         ("law", "i8"),
         ("device", "i8"),  # which device sets its conductance; -1: its schedule does
         ("data", "i8"),  # offset of a law's own numbers in `floats`
+        ("event", "i8"),  # POWER: place of its flags in `armed`
         ("back", "f8"),  # TWO_WAY: share of the conductance that holds for flow from `to` to `from`
         ("drive", "f8"),  # CURVE: relative speed of the profile
         ("open", "f8"),  # conductance of the profile; 0 where its flow does not obey it

@@ -5,7 +5,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.curves import curve_step
 from fvsolve.kernels.density import density, enthalpy
-from fvsolve.kernels.emitters import emitter_slope, emitter_step
+from fvsolve.kernels.emitters import emitter_slope, emitter_step, rule_of
 from fvsolve.kernels.records import (
     CURVE,
     I_ARMED,
@@ -52,7 +52,7 @@ def restriction_step(tables, out, k, g, m, drop, wide):
     """
     valve = tables[I_VALVES][k]
     if valve["law"] == POWER:
-        return emitter_step(tables[I_FLOATS], valve["data"], g, m, drop)
+        return emitter_step(tables[I_FLOATS], valve["data"], g, m, drop, rule_of(tables, k))
     if valve["law"] == CURVE:
         rho = tables[I_SETTINGS][0]["rho"]
         return pump_step(tables, out, k, rho, g, m, drop)
@@ -90,7 +90,7 @@ def restriction_slope(tables, out, k, drop):
     """d flow / d drop of restriction k at a drop [kg/s/Pa]."""
     valve, g = tables[I_VALVES][k], conductance(tables, out, k)
     if valve["law"] == POWER:
-        return emitter_slope(tables[I_FLOATS], valve["data"], g, drop)
+        return emitter_slope(tables[I_FLOATS], valve["data"], g, drop, rule_of(tables, k))
     if valve["law"] == CURVE:
         m = out[tables[I_LAYOUT][0]["valve"] + k]
         return pump_step(tables, out, k, tables[I_SETTINGS][0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0

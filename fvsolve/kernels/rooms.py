@@ -69,6 +69,8 @@ COLUMNS = {"inflows": "columns: column_inflows", "brake": "columns: quickest_col
 ROOMS = {
     "pipes": Room(record="observer: record_pipes"),
     "valves": Room(brake="network: quickest_valve"),
+    "outlets": Room(events="outlets: outlet_events"),
+    "closed": Room(events="calls: close_in_turn"),
     "clusters": Room(clusters="clusters: close_clusters"),
     "columns": Room(hold="columns: hold_columns", move="columns: column_rates", **COLUMNS),
     "columns, barotropic": Room(
@@ -126,7 +128,7 @@ class Scene:
 
     law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are
     fifth : order of what carries scalars on grids; spread : whether any scalar does
-    alone : whether there is nothing but basins, and no link
+    alone : whether there is nothing but basins, and no link; outlets : whether leaks, or demands that follow pressure
     """
 
     law: str
@@ -143,6 +145,7 @@ class Scene:
     spread: bool = False
     valves: bool = False
     alone: bool = False
+    outlets: bool = False
 
     def rooms(self) -> Iterator[Room]:
         """Its rooms, in order."""
@@ -151,6 +154,9 @@ class Scene:
         yield ALONE[family] if self.alone else FLUIDS[family, self.pipes]
         if self.valves:
             yield ROOMS["valves"]
+        if self.kinds or self.outlets:  # whose events are read off closed nodes
+            yield ROOMS["closed"]
+        yield ROOMS["outlets"] if self.outlets else Room()
         if self.clusters and linear:
             yield ROOMS["clusters"]
         if self.columns:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.errors import CaseError, Fault, Notice
-from fvsolve.kernels import limits
+from fvsolve.kernels import emitters, limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
@@ -63,6 +63,7 @@ class Scene:
         self.faults: list[Fault] = []
         self.warnings: list[Notice] = [*case.notes]
         self.size = self.tanks = self.cells = 0
+        self.events: list[tuple[str, str]] = []  # (what, what it means); of those that mean nothing to a reader ""
         self.state_names: list[str] = []
         self.scale: list[float] = []
 
@@ -274,6 +275,8 @@ class Scene:
         span = 1e5 if link.upper is None else link.upper - self.case.ambient_pressure - least
         row["conductance"] = (self.fluid.density * link.flow) ** 2 / span
         self.floats += [link.exponent, least, span, link.most]
+        row["event"] = limits.EVENTS * self.tanks + len(self.events)
+        self.events += emitters.EVENTS * [(name, "")]
 
     def spool(self, name, link, rows) -> None:
         """Four valves; those of one side of zero share a schedule of their opening."""

@@ -176,8 +176,9 @@ class Model(Shown):
         spread, valves = bool(self.tables[rec.I_SCALARS]["diffusivity"].any()), many[rec.I_VALVES]
         patches = (self.tables[rec.I_NODES]["kind"] == rec.PATCH).all()
         alone = bool(basins and patches) and not (self.cells or valves or kinds or any(there))
+        outlets = bool((self.tables[rec.I_VALVES]["law"] == rec.POWER).any())
         scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many[rec.I_SCALARS],
-                      self.case.numerics.scheme in FIFTH, spread, valves, alone)  # fmt: skip
+                      self.case.numerics.scheme in FIFTH, spread, valves, alone, outlets)  # fmt: skip
         return functions(scene)
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.emitters import LEAST_DROP, emitter_drop, emitter_flow, emitter_step
+from fvsolve.kernels.emitters import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_step
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
@@ -246,7 +246,7 @@ class Start:
         g, per = g * denser**2, math.sqrt(PRESSURE_SCALE / g)
 
         def newton(flow, present):
-            a, s = emitter_step(floats, at, g, flow, present * wider)
+            a, s = emitter_step(floats, at, g, flow, present * wider, FREE)
             return per, per * s * wider, per * a
 
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
@@ -408,13 +408,13 @@ class Start:
     def fill_outlet(self, row, flow: float) -> None:
         """The drop at which a way out carries its flow exactly; none where its flow does not obey its law."""
         floats, at, g = self.scene.tables[rec.I_FLOATS], int(row["data"]), float(row["open"])
-        asked = emitter_flow(floats, at, g, float(row["drop"]))
+        asked = emitter_flow(floats, at, g, float(row["drop"]), FREE)
         if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
             row["open"] = 0.0
             return
         bends = g > 0.0 and asked < math.sqrt(g * floats[at + 2]) * floats[at + 3]  # not yet all that is asked
         if bends and row["drop"] - floats[at + 1] >= LEAST_DROP:
-            row["drop"] = emitter_drop(floats, at, g, flow)
+            row["drop"] = emitter_drop(floats, at, g, flow, FREE)
 
     def begin_devices(self) -> None:
         """Let every device fill in what depends on the profile."""

@@ -314,7 +314,9 @@ class Run:
             first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
             found = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
-            return f"stopped: {listing(names)} opens and shuts without end at {when}; {', or '.join(found)}"
+            who = listing(names) if names else "a leak, or a demand that follows the pressure,"
+            remedy = ", or ".join(found) or "give its place the volume of a chamber"
+            return f"stopped: {who} opens and shuts without end at {when}; {remedy}"
         if code == told.STOPPED:
             what = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
             return f"stopped: {what} at {when}, as below_vapor asks"

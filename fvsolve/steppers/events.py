@@ -47,11 +47,12 @@ def nearness(g, g_new):
 @njit
 def locate(
     attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y, now, new, k,
-    supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
+    supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new, e,
 ):  # fmt: skip
-    """The step that ends just past the first event, by the Illinois rule on its length; y[new] belongs to it.
+    """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] belongs to it.
 
-    NEWTON_FAILED in its place where a stage on the way could not be solved."""
+    h, e : those of the step that passes it; the error is NEWTON_FAILED where a stage on the way could not be solved.
+    """
     t, low, high, at_low, at_high = memory[T], 0.0, h, 1.0, nearness(g, g_new)
     guess = h
     for turn in range(101):
@@ -69,7 +70,7 @@ def locate(
             supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
         )  # fmt: skip
         if e == NEWTON_FAILED:
-            return NEWTON_FAILED
+            break
         events(t + guess, y[new], handle, g_new)
         if done:
             break
@@ -78,4 +79,4 @@ def locate(
             high, at_high, at_low = guess, here, 0.5 * at_low
         else:
             low, at_low, at_high = guess, here, 0.5 * at_high
-    return high
+    return high, e

@@ -11,6 +11,7 @@ from fvsolve.steppers.step import add_up
 
 SUMS = 5
 NOISE = 1e-12  # of all that a rate has brought: what a step has less of on one side is rounding
+STRAY = 1e-6  # the same of a step at neither end of which there is any: a negative weight, or what Newton left
 NEAR = 1e-5  # share of a step within which its turn is found; the amount feels the square of that
 TURNS = 40
 LEAST = 1e-3  # amount that counts as none [kg]
@@ -99,16 +100,20 @@ def book(h, b, supply, dense, steep, known, end, ledger):
         whole = 0.0
         for i in range(b.size):
             whole += b[i] * supply[i, m]
-        r0, r1, part = supply[0, m], end[m], 0.0
+        r0, r1, part, gross = supply[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
+        side, trace, toward = 0 if whole > 0.0 else 1, NOISE, r0 + r1
+        if toward == 0.0:
+            toward = ledger[m] + ledger[count + m]
+        if r0 * r1 >= 0.0 and toward != 0.0:
+            side, trace = 0 if toward > 0.0 else 1, STRAY
         if steep:
             r0, r1 = ledger[4 * count + m] if known else r0, supply[s - 1, m]
         ledger[4 * count + m] = supply[s - 1, m]
         if r0 * r1 < 0.0:
             part = lesser(whole, r0, r1, m, supply, dense)
-            if h * part <= NOISE * (ledger[m] - ledger[count + m]):
-                part = 0.0
         up, down = part + max(whole, 0.0), part - min(whole, 0.0)
-        if up > 0.0:
+        if h * (down if side == 0 else up) <= trace * gross:
+            add(ledger, m, side, h * whole)
+        else:
             add(ledger, m, 0, h * up)
-        if down > 0.0:
             add(ledger, m, 1, -h * down)

@@ -76,6 +76,20 @@ def may_leap(orders, memory, times, h):
     return next_due(orders, memory, times) > memory[T_MARK] + (memory[N_MARK] + 1.0) * h
 
 
+@njit(forceinline=True)
+def judged(h, e, coefficients, supply, orders, ledger, scale):
+    """The error of a step in units of the tolerance: of a scene without states that of its amounts."""
+    if scale.size > 0 or orders[CONTROL] != TOLERANCE:
+        return e
+    return book_error(h, error_of(coefficients, supply.shape[0]), supply, orders[SIZE], ledger)
+
+
+@njit(forceinline=True)
+def bearable(e, passing):
+    """Whether a step of error e is taken; `passing` on to a kink, before which round-off rules, any but no number."""
+    return e <= 1.0 or (e == e and passing)
+
+
 @njit
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
@@ -182,11 +196,23 @@ def march(
                 h *= 0.25
                 memory[STEP] = h if orders[CONTROL] == TOLERANCE else 0.0
                 continue
-            if orders[CONTROL] != TOLERANCE:
-                break
-            if scale.size == 0:
-                e = book_error(h, error_of(coefficients, s), supply, orders[SIZE], ledger)
-            if e <= 1.0 or (e == e and rest <= 1e3 * shortest(orders, memory)):  # round-off rules before a kink
+            e = judged(h, e, coefficients, supply, orders, ledger, scale)
+            passing = rest <= 1e3 * shortest(orders, memory)
+            if bearable(e, passing):
+                events(memory[T] + h, y[new], handle, g_new)
+                if fallen(g, g_new):
+                    h, e = locate(
+                        attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients,
+                        shape, h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store,
+                        store_complex, g, g_new, e,
+                    )  # fmt: skip
+                    if e == NEWTON_FAILED:
+                        return NEWTON_STUCK
+                    last, memory[STEP] = last and memory[T] + h >= orders[END], 0.0
+                    e = judged(h, e, coefficients, supply, orders, ledger, scale)
+            if bearable(e, passing):
+                if orders[CONTROL] != TOLERANCE:
+                    break
                 grow = grown(orders, memory, h, e)
                 if failed == NEWTON_STUCK:
                     grow = min(grow, 1.0)
@@ -199,17 +225,6 @@ def march(
             memory[REJECTIONS] += 1.0
             h *= reduced(orders, e)
             memory[STEP] = h
-        events(memory[T] + h, y[new], handle, g_new)
-        if fallen(g, g_new):
-            h = locate(
-                attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y,
-                now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new,
-            )  # fmt: skip
-            if h == NEWTON_FAILED:
-                return NEWTON_STUCK
-            last = last and memory[T] + h >= orders[END]
-            if orders[CONTROL] != TOLERANCE:
-                memory[STEP] = 0.0
         rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
         memory[UNBOOKED] = h
         t_old = memory[T]

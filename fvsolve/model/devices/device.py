@@ -97,7 +97,6 @@ def lower_devices(scene) -> None:
     scene.devices = [(name, part, Device.kinds[part.kind].of(part)) for name, part in parts_of(scene.case)]
     table = scene.device_table = np.zeros(len(scene.devices), rec.DEVICE)
     table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
-    scene.events = []
     for k, ((name, part, device), row) in enumerate(zip(scene.devices, table, strict=True)):
         states = device.states_of(scene, name, part)
         row["kind"], row["states"] = device.code, len(states)
