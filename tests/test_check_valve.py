@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from truth import discs
 from truth.scenes import (
     GRAVITY,
@@ -289,6 +291,56 @@ def test_so_they_do_in_a_fluid_that_is_all_but_stiff(after):
     case, name = held_column("check-valve", after, LAG, METHODS["explicit"])
     case["fluid"] = {**case["fluid"], "law": "log", "bulk_modulus": 2.2e12}
     assert_leaves(case, name, LAG, "drop")
+
+
+def slamming(disc) -> float:
+    """When the disc of `held_column` meets its seat, by SciPy under the linear law, as the far end rises past it."""
+    far, k = (lambda t: np.interp(t, [1.0, 4.0, 9.0], [3e5, 4.4e5, 3.2e5])), area(0.1) / 50.0
+    g, friction = 2.0 * RHO * (0.61 * 0.01) ** 2, 0.02 * 50.0 / (0.1 * 2.0 * RHO * area(0.1) ** 2)
+    lag, w, zeta = (disc.get(key, 0.0) for key in ("time_constant", "natural_frequency", "damping_ratio"))
+    w *= 2.0 * math.pi
+    drop = lambda x, m: m * abs(m) / (g * x * x)  # noqa: E731
+    lift = lambda x, m: (drop(x, m) - 2e3) / 1e4 - x  # noqa: E731
+
+    def rates(t, y):
+        x, m, v = y
+        drive, braked = lift(x, m), k * (3.3e5 - far(t) - drop(x, m) - friction * m * abs(m))
+        held = x >= 1.0 and (drive if lag else max(v, drive)) >= 0.0
+        return [
+            0.0 if held else drive / lag if lag else v,
+            braked,
+            0.0 if lag or held else w * (w * drive - 2 * zeta * v),
+        ]
+
+    seat = lambda t, y: y[0] - 1e-5  # noqa: E731
+    seat.terminal = True
+    x = brentq(lambda x: lift(x, math.sqrt(3e4 / (friction + 1.0 / (g * x * x)))), 1e-3, 2.0)
+    x = min(x, 1.0)
+    y = [x, math.sqrt(3e4 / (friction + 1.0 / (g * x * x))), 0.0]
+    found = solve_ivp(rates, (0.0, 4.0), y, method="Radau", rtol=1e-9, atol=1e-12, events=seat, max_step=0.01)
+    return found.t_events[0][0] + 1e-5 / abs(rates(found.t[-1], found.y[:, -1])[0])
+
+
+@pytest.mark.parametrize("law", ["log", "table"])
+@pytest.mark.parametrize("disc", [LAG, SWING])
+@pytest.mark.parametrize("numerics", [METHODS["auto"], METHODS["radau"], METHODS["explicit"],
+                                      {"method": "rk4", "step": 2e-4}])  # fmt: skip
+def test_a_column_that_slams_its_disc_shut_is_followed_under_every_law(numerics, disc, law):
+    """Drops of a thousand bar, where density is an exponential of pressure; linear and it differ by p / K before."""
+    case, name = held_column("check-valve", False, disc, numerics)
+    case["nodes"] |= {
+        "up": reservoir(3.3e5),
+        "down": reservoir({"time": [1.0, 4.0, 9.0], "value": [3e5, 4.4e5, 3.2e5]}),
+    }
+    water = {"name": "Water", "temperature": 293.15, "pressure": 101325.0, "law": "table"}
+    case["fluid"] = {**case["fluid"], "law": "log"} if law == "log" else water
+    result = fvsolve.run(case)
+    shuts, leaves = result.summary["events"]
+    start, (_, flow) = leaving(disc, "drop")
+    assert result.reason == "finished" and (shuts["what"], leaves["what"]) == ("is shut", "leaves its seat")
+    assert shuts["time"] == pytest.approx(slamming(disc), abs=2e-3)
+    assert leaves["time"] == pytest.approx(start, abs=1e-6)
+    assert result[f"{name}.flow"][-1] * RHO == pytest.approx(flow[-1], rel=5e-3)
 
 
 @pytest.mark.parametrize("disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}])

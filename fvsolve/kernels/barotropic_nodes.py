@@ -229,6 +229,9 @@ def valve_move(tables, out, k, g, m, wide):
         steepest = 45.0 / 32.0 * slope / transition
         return target - m, min(steepest, slope / max(abs(target) + abs(m), 1e-300))
     chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(slope))
+    upstream = valve["from_node"] if target >= 0.0 else valve["to_node"]
+    if inner_row(tables[I_NODES], upstream) >= 0:  # whose density grows with its pressure
+        slope += abs(target) / tables[I_SETTINGS][0]["beta"]
     return (target - abs(m) * m) / chord, slope / chord
 
 
@@ -287,7 +290,21 @@ def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
     if side == 0.0:
         out[STATUS], out[WHERE] = NO_SOLUTION, tables[I_INTEGERS][cluster["first_node"]]
         return 0.0
+    shorten(tables[I_SETTINGS][0]["beta"], a, right)
     return move(cluster, tables, out, m, a, s, lift, right)
+
+
+@njit
+def shorten(most, a, right):
+    """Make a Newton step no longer than `most` [Pa], over which density grows by e: far beyond, it is infinite."""
+    longest = 0.0
+    for r in range(right.size):
+        longest = max(longest, abs(right[r]))
+    if longest > most:
+        for r in range(right.size):
+            right[r] *= most / longest
+        for e in range(a.size):
+            a[e] *= most / longest
 
 
 @njit
