@@ -7,40 +7,16 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from truth.bores import HEAT, SMALL, bores
 from truth.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.energy.energy import energy
 
-HEAT = 287.05 * 293.15
 LENGTH, DIAMETER = 200.0, 0.3
 INERTIA = RHO * LENGTH / area(DIAMETER)
 TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
-
-
-SMALL = (
-    1e-3  # of the pressure upstream: below it the root of a difference is the odd quintic that joins it twice smooth
-)
-QUINTIC = np.linalg.solve([[1, 1, 1], [1, 3, 5], [0, 6, 20]], [1.0, 0.5, -0.25])
-
-
-def softened(x: float) -> float:
-    """sqrt(x), or the quintic, over sqrt(x)."""
-    s = x / SMALL
-    return 1.0 if s >= 1.0 else float(QUINTIC @ [s, s**3, s**5]) / math.sqrt(s) if s > 0.0 else 0.0
-
-
-def bores(p: float, inlet: float, outlet: float, soft=softened) -> float:
-    """Mass flow of air into a chamber at p: subsonic and choked, in and out (Wylie and Streeter 1993, 7-4) [kg/s]."""
-    root = math.sqrt(HEAT)
-    if p <= AMBIENT:
-        size, r, sign = 0.6 * area(inlet) * AMBIENT / root, p / AMBIENT, 1.0
-    else:
-        size, r, sign = 0.6 * area(outlet) * p / root, AMBIENT / p, -1.0
-    if r < 0.528281787717174:
-        return sign * size * math.sqrt(1.4) * (2 / 2.4) ** (2.4 / 0.8)
-    return sign * size * math.sqrt(7 * max(0.0, r ** (2 / 1.4) - r ** (2.4 / 1.4))) * soft(1.0 - r)
 
 
 def drained(inlet=0.05, outlet=0.05, low=AMBIENT - 0.6e5, end=6.0, numerics=TIGHT, law="linear", flow=0.05, **more):
@@ -259,13 +235,3 @@ def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}))
     assert said in str(error.value)
-
-
-def test_where_rigid_columns_alone_join_it_it_is_refused_by_name():
-    """Shut, nothing would set its pressure."""
-    column = {"type": "rigid-column", "length": 50.0, "diameter": 0.2}
-    nodes = {"a": reservoir(3.2e5), "v": {"type": "air-valve", "volume": 0.02, "inlet": 0.05, "outlet": 0.01}}
-    nodes["b"] = reservoir(3e5)
-    links = {"one": {**column, "from": "a", "to": "v"}, "two": {**column, "from": "v", "to": "b"}}
-    with pytest.raises(fvsolve.CaseError, match="nodes.v: only rigid columns join this air valve"):
-        fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}, ["one.flow"])))

@@ -2,31 +2,101 @@
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import drive
-from fvsolve.kernels.columns import column_rate, gate_area, led_by_disc, led_end, lone_disc
+from fvsolve.kernels.clusters import settled
+from fvsolve.kernels.columns import add_led, column_rate
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_COLUMNS, I_FLOATS, I_LAYOUT, I_NODES, I_SETTINGS, I_VALVES
+from fvsolve.kernels.led import led_by_disc, led_end, led_flow, lone_disc
+from fvsolve.kernels.records import (
+    I_COLUMNS,
+    I_FLOATS,
+    I_LAYOUT,
+    I_NODES,
+    I_SETTINGS,
+    I_VALVES,
+    NOT_CONVERGED,
+    STATUS,
+)
 from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.rigid import gate_area, join_given, number_rigid, rigid_space, settle_rigid
+
+
+@njit
+def drive_change(tables, out, k):
+    """What drives column k more than in the profile [Pa]."""
+    st, nodes, column = tables[I_SETTINGS][0], tables[I_NODES], tables[I_COLUMNS][k]
+    i, j, at = column["from_node"], column["to_node"], tables[I_LAYOUT][0]["pressure"]
+    p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
+    now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+    return now - column["base"]
+
+
+@njit
+def add_rates(t, y, tables, out, n):
+    """Add to the right side d/dt of what columns that nothing leads bring into each of n rigid nodes [kg/s2]."""
+    rows, _, _, right, pinned, _ = rigid_space(tables, n)
+    for k in range(tables[I_COLUMNS].size):
+        a, b = int(rows[tables[I_COLUMNS][k]["from_node"]]), int(rows[tables[I_COLUMNS][k]["to_node"]])
+        if led_end(tables, out, k) == 0 and (a >= 0 or b >= 0):
+            rate = column_rate(t, y, tables, out, k, drive_change(tables, out, k))
+            if a >= 0:
+                right[a] -= rate
+            if b >= 0:
+                right[b] += rate
+    for r in range(n):
+        right[r] *= 1.0 - pinned[r]
+
+
+@njit
+def hold_rigid_barotropic(t, y, tables, out):
+    """`hold_rigid` by iteration: what drives a column is all but linear in the pressures at its ends."""
+    n = number_rigid(tables, out)
+    if n == 0:
+        return
+    pressure, moved = tables[I_LAYOUT][0]["pressure"], 1e300
+    add_led(t, y, tables, out, n)
+    join_given(tables, out, n)
+    rows, _, _, right, pinned, _ = rigid_space(tables, n)
+    for i in range(rows.size):
+        if rows[i] >= 0.0 and pinned[int(rows[i])] == 0.0:
+            out[pressure + i] = 0.0
+    for _ in range(100):
+        join_given(tables, out, n)
+        add_rates(t, y, tables, out, n)
+        settle_rigid(tables, out, n)
+        before, moved = moved, 0.0
+        for i in range(rows.size):
+            if rows[i] >= 0.0:
+                step = right[int(rows[i])]
+                out[pressure + i] += step
+                moved = max(moved, abs(step) / (1e5 + abs(out[pressure + i])))
+        if settled(moved, before):
+            return
+    out[STATUS] = NOT_CONVERGED
 
 
 @njit
 def hold_columns_barotropic(t, y, dydt, out, handle):
-    """Give the node at the shut end of a standing column the enthalpy of its other end, less the height."""
+    """Give rigid nodes their pressures, and the led end of a column its far end's enthalpy less height and inertia."""
     tables = open_tables(handle)
     st, nodes, floats = tables[I_SETTINGS][0], tables[I_NODES], tables[I_FLOATS]
     pressure = tables[I_LAYOUT][0]["pressure"]
+    hold_rigid_barotropic(t, y, tables, out)
     for k in range(tables[I_COLUMNS].size):
         column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
-        x = column["to_node"] if end == 1 else column["from_node"]
-        if end != 0 and (gate_area(tables, out, x)[0] == 0.0 or lone_disc(tables, x) >= 0):
-            i, j = column["from_node"], column["to_node"]
-            if end == -1:
-                i, j = j, i
-            rise = st["gravity"] * (nodes[j]["elevation"] - nodes[i]["elevation"])
-            h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
-            out[pressure + j] = pressure_of_enthalpy(st, floats, h - rise) - nodes[j]["pressure"]
-            if lone_disc(tables, x) >= 0:
-                drive_with_disc(y, tables, out, k, x, lone_disc(tables, x))
+        if end == 0:
+            continue
+        i, x = column["from_node"], column["to_node"]
+        if end == -1:
+            i, x = x, i
+        rise = st["gravity"] * (nodes[x]["elevation"] - nodes[i]["elevation"])
+        h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
+        out[pressure + x] = pressure_of_enthalpy(st, floats, h - rise) - nodes[x]["pressure"]
+        if lone_disc(tables, x) >= 0:
+            drive_with_disc(y, tables, out, k, x, lone_disc(tables, x))
+        elif gate_area(tables, out, x)[0] > 0.0:
+            rate = led_flow(t, y, tables, out, k, end, True)[1]
+            out[pressure + x] -= column["length"] / column["area"] * rate
 
 
 @njit
@@ -35,7 +105,8 @@ def drive_with_disc(y, tables, out, k, x, which):
     valve, pressure = tables[I_VALVES][which], tables[I_LAYOUT][0]["pressure"]
     still, ahead = head_drop(tables, out, which)[1], valve["from_node"] == x
     other = out[pressure + (valve["to_node"] if ahead else valve["from_node"])]
-    drop = led_by_disc(y, tables, out, k, which, out[pressure + x], other, still)[0]
+    inertia = tables[I_COLUMNS][k]["length"] / tables[I_COLUMNS][k]["area"]
+    drop = led_by_disc(y, tables, out, k, which, out[pressure + x], inertia, other, still)[0]
     out[pressure + x] += drop - still if ahead else still - drop
 
 
@@ -43,16 +114,6 @@ def drive_with_disc(y, tables, out, k, x, which):
 def column_rates_barotropic(t, y, dydt, out, handle):
     """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
     tables = open_tables(handle)
-    st, layout, nodes, columns = (
-        tables[I_SETTINGS][0],
-        tables[I_LAYOUT][0],
-        tables[I_NODES],
-        tables[I_COLUMNS],
-    )
-    for k in range(columns.size):
-        column = columns[k]
-        i, j = column["from_node"], column["to_node"]
-        p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
-        p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
-        now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
-        dydt[column["y"]] = column_rate(t, y, tables, out, k, now - column["base"])
+    for k in range(tables[I_COLUMNS].size):
+        at = tables[I_COLUMNS][k]["y"]
+        dydt[at] = column_rate(t, y, tables, out, k, drive_change(tables, out, k))

@@ -15,7 +15,6 @@ kinetic, elastic and height; column; body; brace; stop.
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.kernels.columns import column_drag
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanics import between, contact, motion
@@ -40,6 +39,7 @@ from fvsolve.kernels.records import (
     UPWIND,
     WENO5,
 )
+from fvsolve.kernels.rigid import column_drag
 from fvsolve.kernels.tanks import tank_level
 
 NODE, PIPE, VALVE, COLUMN, BODY, BRACE, STOP, PISTON = 2, 4, 1, 3, 1, 1, 2, 3  # rows of `power` a part

@@ -6,7 +6,6 @@ V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses 
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.columns import column_drag
 from fvsolve.kernels.density import enthalpy, pressure_of_mass, thrust
 from fvsolve.kernels.energy import (
     BODY,
@@ -48,6 +47,7 @@ from fvsolve.kernels.records import (
     LAW_LINEAR,
     TANK,
 )
+from fvsolve.kernels.rigid import column_drag
 
 EMPTY = 1e-6  # of what a pipe holds: the least that counts as a mass
 

@@ -138,8 +138,9 @@ NODE = np.dtype(
         ("shapes", "i8"),  # rows of that table
         ("volume", "f8"),  # chamber [m3]; of a moving one, at the start
         ("row", "i8"),  # row in its cluster; of a tank or moving chamber, its number
-        ("gates", "i8"),  # where only valves hold one rigid column: offset of these in `integers`, else -1
+        ("gates", "i8"),  # where rigid columns and valves alone meet: offset of the valves in `integers`, else -1
         ("gate_count", "i8"),
+        ("columns", "i8"),  # how many columns these are
         ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
         ("density", "f8"),  # of what a tank holds [kg/m3]
     ],
@@ -278,6 +279,7 @@ LAYOUT = np.dtype(
         ("ends", "i8"),
         ("valve", "i8"),
         ("column", "i8"),
+        ("led", "i8"),  # of columns, 1 or -1 where valves lead it at its `to` or `from` end
         ("stiffness", "i8"),  # of moving chambers, pressure per mass [Pa/kg]
         ("had", "i8"),  # of patches, share of the outflow asked for that there is water for
         ("swept", "i8"),  # mass flow that the piston and its leak take from moving chambers [kg/s]

@@ -331,6 +331,8 @@ class Scene:
         schedules, pieces = self.schedules.tables()
         most, cells = max(pipes["cells"], default=0), self.cells
         system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in self.cluster_table), default=0)
+        rigid = int(np.sum(self.node_table["columns"] > 1))
+        system = max(system, rigid * (rigid + 3))
         system += 7 * len(self.node_table) + 2 * len(self.valve_table)
         many = len(self.scalar_table)
         carried = many * len(self.node_table)
@@ -341,6 +343,7 @@ class Scene:
             ("loss", sum(self.scalar_table["losses"])),
             ("net", len(self.node_table)),
             ("ends", 4 * len(pipes)), ("valve", len(self.valve_table)), ("column", len(self.column_table)),
+            ("led", len(self.column_table)),
             ("stiffness", self.moving), ("had", self.moving), ("swept", self.moving),
             ("net_force", len(self.body_table)), ("push", len(self.push_names)),
             ("conductance", len(self.valve_table)), ("drive", len(self.valve_table)),

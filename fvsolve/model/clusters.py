@@ -50,8 +50,8 @@ def sort_nodes(scene) -> None:
             nodes["row"][i] = 0
             clusters.append((len(integers), 1, len(integers) + 1, 0))
             integers.append(int(i))
-    refuse_columns_at_air_valves(scene)
     gates(scene)
+    refuse_loose_air_valves(scene, members)
     soften(scene, np.flatnonzero(known))
     scene.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
@@ -61,34 +61,38 @@ def sort_nodes(scene) -> None:
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
 
 
-def refuse_columns_at_air_valves(scene) -> None:
-    """A place where rigid columns alone meet an air valve: nothing sets its pressure while that is shut."""
-    nodes, valves, columns = scene.node_table, scene.valve_table, scene.column_table
-    names = list(scene.case.places)
-    for k in np.flatnonzero(valves["device"] >= 0):
-        if not scene.devices[valves["device"][k]][2].vessel:
-            continue
-        i = int(valves["from_node"][k])
-        joined = sum(i in (v["from_node"], v["to_node"]) for v in valves)
-        met = sum(i in (c["from_node"], c["to_node"]) for c in columns)
-        if nodes["kind"][i] == rec.JUNCTION and nodes["admittance"][i] == 0.0 and joined == 1 and met > 0:
-            name = names[i].removesuffix(".connection")
-            scene.fault(f"nodes.{name}", "only rigid columns join this air valve, so nothing sets its pressure while "
-                        "it is shut; make one of them a pipe, or join it by a valve")  # fmt: skip
-
-
 def gates(scene) -> None:
-    """Note the valves of every node that they and one rigid column join, and nothing else."""
+    """Note the valves of every node that they and rigid columns join, and nothing else, and how many columns."""
     nodes, valves, columns = scene.node_table, scene.valve_table, scene.column_table
     nodes["gates"] = -1
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
     for i in np.flatnonzero(bare):
         held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
-        if any(valves["device"][k] >= 0 and scene.device_table["node"][valves["device"][k]] >= 0 for k in held):
-            continue  # a vessel opens before the column can be stopped
-        if sum(i in (c["from_node"], c["to_node"]) for c in columns) == 1 and held and asks_nothing(scene, i):
-            nodes["gates"][i], nodes["gate_count"][i] = len(scene.integers), len(held)
+        if any(senses(scene, int(valves["device"][k])) for k in held):
+            continue
+        met = sum(i in (c["from_node"], c["to_node"]) for c in columns)
+        if met > 0 and held and asks_nothing(scene, i):
+            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = len(scene.integers), len(held), met
             scene.integers += held
+
+
+def refuse_loose_air_valves(scene, members) -> None:
+    """Places that valves join to one another and to nothing else: rigid columns alone lead to an air valve there."""
+    nodes, valves, names = scene.node_table, scene.valve_table, list(scene.case.places)
+    for group in members.values():
+        ways = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
+        air = [v for v in ways if v["device"] >= 0 and scene.devices[v["device"]][2].vessel]
+        known = [v for v in ways if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
+        if len(group) > 1 and air and len(known) == len(air) and not np.any(nodes["admittance"][group] > 0.0):
+            place, other = (names[i] for i in sorted(group, key=lambda i: i != air[0]["from_node"])[:2])
+            scene.fault(f"nodes.{place}", f"a valve joins this air valve to {other}, and only rigid columns lead on, "
+                        f"so nothing sets their pressure while it is shut; give {other} a chamber volume, or make one "
+                        "of the columns a pipe")  # fmt: skip
+
+
+def senses(scene, device: int) -> bool:
+    """Whether a device goes by the pressure of a place, and is no vessel."""
+    return device >= 0 and scene.device_table["node"][device] >= 0 and not scene.devices[device][2].vessel
 
 
 def asks_nothing(scene, i: int) -> bool:

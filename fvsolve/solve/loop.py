@@ -13,6 +13,7 @@ from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
+from fvsolve.solve.meeting import parted, shut_places
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.ledger import SUMS
@@ -157,13 +158,23 @@ class Loop:
         return out
 
     def stop_columns(self, limit: float) -> list[tuple[int, float]]:
-        """Take the flow out of rigid columns that stand from now on; (number, flow [kg/s]) of those that had some."""
-        found, out = [], self.evaluate(limit)
+        """Give rigid columns that stand, or meet where nothing else flows, the flows that they have from now on.
+
+        Returns (number, flow [kg/s] that it has lost) of those that had another.
+        """
+        found, out, layout = [], self.evaluate(limit), self.model.layout
+        while (event := parted(self.model, self.t, self.now, out)) is not None:
+            before = self.armed.copy()
+            self.armed[event], self.armed[event + 1] = 1.0, 0.0
+            self.note(before)
+            out = self.evaluate(limit)
+        places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables[rec.I_COLUMNS]):
-            flow = float(row["flow"] + self.now[row["y"]])
-            if flow != 0.0 and out[self.model.layout["column"] + k] == 0.0:
-                self.now[row["y"]] = -row["flow"]
-                found.append((k, flow))
+            flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
+            meets = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
+            if flow != new and (meets or new == 0.0):
+                self.now[row["y"]] = new - row["flow"]
+                found.append((k, flow - new))
         return found
 
     def take_rows(self) -> np.ndarray:

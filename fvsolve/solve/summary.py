@@ -91,7 +91,9 @@ def find_marks(model: Model) -> list[Mark]:
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
     keys = "" if model.case.fluid.law == "mixture" else 'law = "mixture", air_fraction = 1e-7 and '
     texts = {
-        "stopped dead": "its last way out shut while it flowed; a rigid column has no surge, a pipe would",
+        "stopped dead": (
+            "its last way out shut while it flowed, or it met another; a rigid column has no surge, a pipe would"
+        ),
         "outside its curve": (
             "the pump works backwards or beyond its curve's last flow; in place of curve, suter = { rated_flow, "
             'rated_head, table } says how, with table = "radial-35" or head and torque (WH and WB) of its own'

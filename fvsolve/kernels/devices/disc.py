@@ -94,8 +94,8 @@ def led_until(out, tables, device):
     valve, columns, most = tables[I_VALVES][device["valve"]], tables[I_COLUMNS], 0.0
     for k in range(columns.size):
         for i in (columns[k]["from_node"], columns[k]["to_node"]):
-            joined = i == valve["from_node"] or i == valve["to_node"]
-            if joined and tables[I_NODES][i]["gates"] >= 0 and tables[I_NODES][i]["gate_count"] == 1:
+            joined, node = i == valve["from_node"] or i == valve["to_node"], tables[I_NODES][i]
+            if joined and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
                 most = max(most, led_beside(out, tables, device, columns[k]["area"] / columns[k]["length"]))
     return most
 

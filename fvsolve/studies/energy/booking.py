@@ -166,12 +166,13 @@ class EnergyRun(Run):
         self.losses.append(self.lost.copy())
 
     def stop_columns(self) -> None:
-        """What a column that stops dead had in it is dissipated."""
-        columns = self.model.tables[rec.I_COLUMNS]
-        before = [self.kinetic(row) for row in columns]
+        """What a column that stops dead had is dissipated; where columns meet, what the lost flows had (Carnot)."""
+        before = self.flows()
         super().stop_columns()
-        self.lost += [was - self.kinetic(row) for was, row in zip(before, columns, strict=True)]
+        columns, rho = self.model.tables[rec.I_COLUMNS], self.model.case.properties.density
+        self.lost += 0.5 * (before - self.flows()) ** 2 * columns["length"] / (rho * columns["area"])
 
-    def kinetic(self, row) -> float:
-        flow, rho = row["flow"] + self.loop.now[row["y"]], self.model.case.properties.density
-        return float(0.5 * flow * flow * row["length"] / (rho * row["area"]))
+    def flows(self) -> np.ndarray:
+        """Of rigid columns [kg/s]."""
+        columns = self.model.tables[rec.I_COLUMNS]
+        return columns["flow"] + self.loop.now[columns["y"]]

@@ -1,0 +1,269 @@
+"""Rigid columns that valves lead: what flows where these are all but shut. Knows a column and the valves at its end.
+
+A column that leads to a node without storage is held by that node's valves alone. Where these are all but shut
+(below a thousandth of their full area), its time constant goes to zero with their area F, and its flow follows them:
+I = sum of F sqrt(dP), with (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP) the pressure that slows it down. When the
+last of them shuts, nothing can flow: the column stands, and the node has the pressure of its other end.
+
+A column follows a disc that leaves its seat and alone holds it, too: lift x and flow start as powers of time, and
+dP = M^2 / (G x^2), of 0 / 0 there, would relax at an infinite rate. Until x has grown, dP is what drives both,
+(L / A) sqrt(G dP) dx/dt(dP) + dP = that at rest; the column's momentum is kept.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.devices.codes import RELIEF_DISC
+from fvsolve.kernels.devices.disc import disc_speed, leads
+from fvsolve.kernels.records import (
+    I_COLUMNS,
+    I_DEVICES,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_SCRATCH,
+    I_SETTINGS,
+    I_VALVES,
+)
+from fvsolve.kernels.restrictions import conductance, conductance_at
+from fvsolve.kernels.rigid import far_side, gate_area, grounded, is_rigid, is_vessel, pressure_at
+
+NEARLY = 1e-3  # share of their full area below which valves lead their column
+LOST = 0.05  # share of the flow at which valves take the lead, beyond what they then miss of it
+NEAR = 1e-13  # of a pressure, relative, at which it is found
+INSTANT = 1e-7  # over which the rate of an area is measured [s]
+
+
+@njit
+def led_at(tables, out, i):
+    """Whether node i is the end of one column whose every valve is all but shut, and asks for nothing."""
+    if tables[I_NODES][i]["gates"] < 0 or tables[I_NODES][i]["columns"] > 1:
+        return False
+    area, full = gate_area(tables, out, i)
+    return area == 0.0 or (area < NEARLY * full and foreseen(tables, out, i))
+
+
+@njit
+def foreseen(tables, out, i):
+    """Whether the rate of area of node i's valves is known: schedules alone move them, or it is one disc that leads."""
+    node = tables[I_NODES][i]
+    for e in range(node["gate_count"]):
+        k = tables[I_INTEGERS][node["gates"] + e]
+        shut = is_vessel(tables, k) and conductance(tables, out, k) == 0.0
+        if tables[I_VALVES][k]["device"] >= 0 and not leads(tables, k) and not shut:
+            return False
+    return True
+
+
+@njit
+def led_side(tables, out, k):
+    """1 or -1 where valves lead column k at its `to` or `from` end, else 0; something must hold a rigid far end."""
+    column, marks = tables[I_COLUMNS][k], tables[I_SCRATCH][: tables[I_NODES].size]
+    for side in (1, -1):
+        x, i = column["to_node"], column["from_node"]
+        if side < 0:
+            x, i = i, x
+        if led_at(tables, out, x) and (not is_rigid(tables, out, i) or grounded(tables, out, i, k, marks)):
+            return side
+    return 0
+
+
+@njit
+def lead_columns(tables, out):
+    """Which columns their valves lead, into out[led]."""
+    at, many = tables[I_LAYOUT][0]["led"], tables[I_COLUMNS].size
+    out[at : at + many] = 0.0
+    for k in range(many):
+        out[at + k] = led_side(tables, out, k)
+
+
+@njit
+def led_end(tables, out, k):
+    """1 or -1 where valves lead column k at its `to` or `from` end, else 0."""
+    return int(out[tables[I_LAYOUT][0]["led"] + k])
+
+
+@njit
+def standing_pressure(y, tables, out, k, end, solved):
+    """(p' of the led end of column k at which nothing drives it, fall of it per d/dt of its flow [Pa s2/kg])."""
+    column = tables[I_COLUMNS][k]
+    p, softness = far_side(y, tables, out, k, end, solved)
+    inertia = column["length"] / column["area"]
+    return p + end * (column["offset"] + column["drag"] * inertia), inertia + softness
+
+
+@njit
+def disc_drop(y, tables, device, before, drop, slack, heavy):
+    """(drop across a disc that leads its column, dx/dt), by Newton on its root r: r2 + heavy r dx/dt(r2) = drop.
+
+    drop : where nothing moves; slack : what it feels for a drop of 1 Pa more; heavy : (L / A) sqrt(G). From above: the
+    cubic is convex from its greatest root on.
+    """
+    still, slope = disc_speed(y, tables, device, before, drop)
+    if drop <= 0.0 or still == 0.0:
+        return drop, still
+    r, slope, speed = sqrt(drop), slope * slack, still
+    while r * r - drop + heavy * r * (still + slope * (r * r - drop)) < 0.0:
+        r *= 2.0
+    for _ in range(100):
+        speed = still + slope * (r * r - drop)
+        step = (r * r - drop + heavy * r * speed) / (2.0 * r + heavy * (speed + 2.0 * slope * r * r))
+        r -= step
+        if abs(step) <= 1e-14 * r:
+            break
+    return r * r, still + slope * (r * r - drop)
+
+
+@njit
+def lone_disc(tables, i):
+    """The disc that alone holds the column of node i and leads it; -1 for none."""
+    k = tables[I_INTEGERS][tables[I_NODES][i]["gates"]]
+    return k if leads(tables, k) else -1
+
+
+@njit
+def led_by_disc(y, tables, out, k, which, standing, inertia, other, still):
+    """(drop across the disc `which` that leads column k, dx/dt), at p' beside it and a drop where nothing moves."""
+    valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
+    device, heavy = tables[I_DEVICES][valve["device"]], inertia * sqrt(valve["conductance"])
+    if valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]:
+        return disc_drop(y, tables, device, standing, still, 1.0, heavy)
+    return disc_drop(y, tables, device, other, still, 0.0 if device["kind"] == RELIEF_DISC else 1.0, heavy)
+
+
+@njit
+def led_from_rest(y, tables, out, k, end, which, solved):
+    """`led_flow` of a column that one disc holds."""
+    valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
+    side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
+    standing, inertia = standing_pressure(y, tables, out, k, end, solved)
+    other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    still = valve["drop"] + side * (standing - other)
+    drop, speed = led_by_disc(y, tables, out, k, which, standing, inertia, other, still)
+    root = side * (sqrt(drop) if drop >= 0.0 else -sqrt(-drop))
+    rate = speed * sqrt(valve["conductance"]) * root if drop > 0.0 else 0.0
+    return sqrt(conductance(tables, out, which)) * root, rate, standing + side * (drop - still)
+
+
+@njit
+def gate_flow(t, tables, out, x, p, solved):
+    """(flow out of node x through its valves at p', its rate as their areas change, d rate / dp)."""
+    flow, rate, rise = 0.0, 0.0, 0.0
+    for e in range(tables[I_NODES][x]["gate_count"]):
+        which = tables[I_INTEGERS][tables[I_NODES][x]["gates"] + e]
+        drop = p - level_behind(tables, out, x, which, solved)
+        root = sqrt(drop) if drop >= 0.0 else -sqrt(-drop)
+        later = sqrt(conductance_at(t + INSTANT, tables, out, which))
+        widening = (later - sqrt(conductance_at(t, tables, out, which))) / INSTANT
+        flow += sqrt(conductance(tables, out, which)) * root
+        rate += widening * root
+        rise += 0.5 * widening / max(abs(root), 1e-300)
+    return flow, rate, rise
+
+
+@njit
+def level_behind(tables, out, x, which, solved):
+    """p' of node x at which nothing flows through its valve `which`."""
+    valve = tables[I_VALVES][which]
+    side = 1.0 if valve["from_node"] == x else -1.0
+    other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    return other - side * valve["drop"]
+
+
+@njit
+def levels_behind(tables, out, x, solved):
+    """(least, greatest) of `level_behind` of all valves of node x."""
+    least, most = 1e300, -1e300
+    for e in range(tables[I_NODES][x]["gate_count"]):
+        level = level_behind(tables, out, x, tables[I_INTEGERS][tables[I_NODES][x]["gates"] + e], solved)
+        least, most = min(least, level), max(most, level)
+    return least, most
+
+
+@njit
+def opening_pressure(t, tables, out, x, standing, inertia, solved):
+    """p' of node x whose valves open: the one root of p - standing + inertia rate(p), by Newton between bounds."""
+    low, high = levels_behind(tables, out, x, solved)
+    low, high, p = min(low, standing), max(high, standing), standing
+    for _ in range(200):
+        _, rate, rise = gate_flow(t, tables, out, x, p, solved)
+        left = p - standing + inertia * rate
+        low, high = (low, p) if left > 0.0 else (p, high)
+        new = p - left / (1.0 + inertia * rise)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - p) <= NEAR * (1e5 + abs(new)):
+            return new
+        p = new
+    return p
+
+
+@njit
+def braked_pressure(t, tables, out, x, way, start, standing, inertia, solved):
+    """(p' of node x whose valves shut on a flow that way, 1: out of it; whether there is one), by Newton from beyond.
+
+    p - standing + inertia rate(p) is convex there, and its outermost root is the one to which flows tend.
+    """
+    p = start
+    for _ in range(200):
+        flow, rate, rise = gate_flow(t, tables, out, x, p, solved)
+        slope = 1.0 + inertia * rise
+        if slope <= 0.0 or flow * way <= 0.0:
+            return p, False
+        step = (p - standing + inertia * rate) / slope
+        p -= step
+        if abs(step) <= NEAR * (1e5 + abs(p)):
+            break
+    return p, True
+
+
+@njit
+def led_pressure(t, tables, out, x, own, standing, inertia, solved):
+    """p' of node x whose valves lead a column that brings `own` [kg/s].
+
+    Shutting valves brake a flow either way: of two that they allow, it is the one that has been there. Where that is
+    no more than what was lost when they took the lead, it is the one that pressures drive, or none out of an air valve.
+    """
+    area, full = gate_area(tables, out, x)
+    flow, rate, _ = gate_flow(t, tables, out, x, standing, solved)
+    if flow == 0.0 and rate == 0.0:
+        return standing
+    if rate * flow >= 0.0:
+        return opening_pressure(t, tables, out, x, standing, inertia, solved)
+    brake = -inertia * rate / flow * area
+    if abs(own) <= LOST * NEARLY * full * brake:
+        own = 1.0 if has_air(tables, x) else flow
+    way = 1.0 if own > 0.0 else -1.0
+    least, most = levels_behind(tables, out, x, solved)
+    reach = brake + sqrt(max(abs(standing - least), abs(standing - most)))
+    for _ in range(2):
+        start = most + reach * reach if way > 0.0 else least - reach * reach
+        p, found = braked_pressure(t, tables, out, x, way, start, standing, inertia, solved)
+        if found:
+            return p
+        way = -way
+    return standing
+
+
+@njit
+def has_air(tables, x):
+    """Whether an air valve is at node x."""
+    for e in range(tables[I_NODES][x]["gate_count"]):
+        if is_vessel(tables, tables[I_INTEGERS][tables[I_NODES][x]["gates"] + e]):
+            return True
+    return False
+
+
+@njit
+def led_flow(t, y, tables, out, k, end, solved):
+    """(flow out of column k through the valves that lead it, its rate, p' of that end)."""
+    column, limit = tables[I_COLUMNS][k], tables[I_SETTINGS][0]["limit"]
+    x = column["to_node"] if end == 1 else column["from_node"]
+    if lone_disc(tables, x) >= 0:
+        return led_from_rest(y, tables, out, k, end, lone_disc(tables, x), solved)
+    early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate on this side of a kink
+    standing, inertia = standing_pressure(y, tables, out, k, end, solved)
+    own = end * (column["flow"] + y[column["y"]])
+    p = led_pressure(early, tables, out, x, own, standing, inertia, solved)
+    flow, rate, _ = gate_flow(early, tables, out, x, p, solved)
+    return flow, rate, p

@@ -1,0 +1,268 @@
+"""Places where rigid columns meet and every valve is shut: what flows is theirs alone. Solves no other node.
+
+Nothing flows out, so the flows into such a place add up to zero, and its pressure is the one that keeps them so:
+sum of (A / L) (P_far - P) = sum of what friction takes. Flows that do not add up meet at once by an impulse J [Pa s] of
+pressure, dM = (A / L) J away from it: momentum is kept (an inelastic impact). What
+rounding leaves of the sum is taken off alike. Columns that valves lead have a given flow here.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.clusters import solve_dense
+from fvsolve.kernels.friction import drag
+from fvsolve.kernels.records import (
+    I_COLUMNS,
+    I_DEVICES,
+    I_INTEGERS,
+    I_LAYOUT,
+    I_NODES,
+    I_SCRATCH,
+    I_VALVES,
+    JUNCTION,
+    NO_SOLUTION,
+    STATUS,
+    WHERE,
+)
+from fvsolve.kernels.restrictions import conductance
+
+
+@njit
+def is_vessel(tables, k):
+    """Whether valve k is the way into the chamber of an air valve."""
+    device = tables[I_VALVES][k]["device"]
+    return device >= 0 and tables[I_DEVICES][device]["row"] >= 0
+
+
+@njit
+def gate_area(tables, out, i):
+    """(sum of the roots of the conductances of a node's valves, the same at full opening of all but an air valve)."""
+    node, area, full = tables[I_NODES][i], 0.0, 0.0
+    for e in range(node["gate_count"]):
+        k = tables[I_INTEGERS][node["gates"] + e]
+        area += sqrt(conductance(tables, out, k))
+        if not is_vessel(tables, k):
+            full += sqrt(tables[I_VALVES][k]["conductance"])
+    return area, full
+
+
+@njit
+def is_rigid(tables, out, i):
+    """Whether columns meet at node i, two at least, and nothing else flows there."""
+    node = tables[I_NODES][i]
+    return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
+
+
+@njit
+def column_drag(column, flow):
+    """Friction of a column [kg/s2] at a flow [kg/s]."""
+    kind, loss, rough = column["friction"], column["loss"], column["rough"]
+    return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)
+
+
+@njit
+def pressure_at(tables, out, i, extra, solved):
+    """p' of node i; of a junction, until nodes are `solved`, a guess from what its pipes and `extra` [kg/s] bring."""
+    layout, node = tables[I_LAYOUT][0], tables[I_NODES][i]
+    if node["kind"] != JUNCTION or solved:
+        return out[layout["pressure"] + i]
+    return (out[layout["net"] + i] + extra) / node["admittance"] if node["admittance"] > 0.0 else 0.0
+
+
+@njit
+def grounded(tables, out, i, k, seen):
+    """Whether columns that nothing leads, but for k, join rigid node i to one that is not; seen[]: what they join."""
+    columns, led = tables[I_COLUMNS], tables[I_LAYOUT][0]["led"]
+    seen[:] = 0.0
+    seen[i], grown = 1.0, True
+    while grown:
+        grown = False
+        for j in range(columns.size):
+            a, b = columns[j]["from_node"], columns[j]["to_node"]
+            if j == k or out[led + j] != 0.0 or seen[a] == seen[b]:
+                continue
+            other = b if seen[a] > 0.0 else a
+            if not is_rigid(tables, out, other):
+                return True
+            seen[other], grown = 1.0, True
+    return False
+
+
+@njit
+def is_pinned(tables, out, i, seen):
+    """Whether nothing sets the level of pressure of what is joined to rigid node i, and it is the first of these."""
+    if grounded(tables, out, i, -1, seen):
+        return False
+    for j in range(i):
+        if seen[j] > 0.0:
+            return False
+    return True
+
+
+@njit
+def rigid_space(tables, n):
+    """Scratch : (row of each node, marks of nodes, matrix, right side, pinned, given)."""
+    many, work = tables[I_NODES].size, tables[I_SCRATCH]
+    at = 2 * many + n * n
+    right, pinned, given = work[at : at + n], work[at + n : at + 2 * n], work[at + 2 * n : at + 3 * n]
+    return work[:many], work[many : 2 * many], work[2 * many : at], right, pinned, given
+
+
+@njit
+def number_rigid(tables, out):
+    """Number the rigid nodes in scratch, -1 for others; returns how many there are."""
+    rows, n = tables[I_SCRATCH], 0
+    for i in range(tables[I_NODES].size):
+        rows[i] = -1.0
+        if is_rigid(tables, out, i):
+            rows[i] = n
+            n += 1
+    return n
+
+
+@njit
+def join(tables, out, n, k):
+    """Matrix of n numbered rigid nodes, sum of A / L of their columns [m] but for those that are led and k."""
+    rows, seen, matrix, right, pinned, _ = rigid_space(tables, n)
+    columns, led = tables[I_COLUMNS], tables[I_LAYOUT][0]["led"]
+    matrix[:], right[:] = 0.0, 0.0
+    for j in range(columns.size):
+        if j == k or out[led + j] != 0.0:
+            continue
+        a, b = int(rows[columns[j]["from_node"]]), int(rows[columns[j]["to_node"]])
+        yielding = columns[j]["area"] / columns[j]["length"]
+        if a >= 0:
+            matrix[n * a + a] += yielding
+        if b >= 0:
+            matrix[n * b + b] += yielding
+        if a >= 0 and b >= 0:
+            matrix[n * a + b] -= yielding
+            matrix[n * b + a] -= yielding
+    for i in range(rows.size):
+        if rows[i] >= 0.0:
+            pinned[int(rows[i])] = 1.0 if is_pinned(tables, out, i, seen) else 0.0
+
+
+@njit
+def join_given(tables, out, n):
+    """`join` with what is given on the right side."""
+    join(tables, out, n, -1)
+    _, _, _, right, _, given = rigid_space(tables, n)
+    for r in range(n):
+        right[r] = given[r]
+
+
+@njit
+def settle_rigid(tables, out, n):
+    """right <- matrix^-1 right; a pinned row keeps what it has on its right side."""
+    _, _, matrix, right, pinned, _ = rigid_space(tables, n)
+    for r in range(n):
+        if pinned[r] > 0.0:
+            matrix[n * r : n * r + n] = 0.0
+            matrix[n * r + r] = 1.0
+    if solve_dense(matrix, right, n) == 0.0:
+        out[STATUS], out[WHERE] = NO_SOLUTION, -1.0
+
+
+@njit
+def value_at(rows, right, i):
+    """What was solved for at node i, 0 where it is not rigid."""
+    return right[int(rows[i])] if rows[i] >= 0.0 else 0.0
+
+
+@njit
+def meet(tables, out):
+    """Let the flows into rigid nodes add up to zero: changes since the profile, in out[column] and out[net]."""
+    n = number_rigid(tables, out)
+    if n == 0:
+        return
+    join(tables, out, n, -1)
+    rows, _, _, right, pinned, _ = rigid_space(tables, n)
+    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
+    add_sums(tables, out, rows, right)
+    for r in range(n):
+        right[r] *= 1.0 - pinned[r]
+    settle_rigid(tables, out, n)
+    for k in range(columns.size):
+        a, b = columns[k]["from_node"], columns[k]["to_node"]
+        if out[layout["led"] + k] == 0.0:
+            impulse = value_at(rows, right, b) - value_at(rows, right, a)
+            change = columns[k]["area"] / columns[k]["length"] * impulse
+            out[layout["column"] + k] -= change
+            out[layout["net"] + a] += change
+            out[layout["net"] + b] -= change
+
+
+@njit
+def gate_inflow(tables, i):
+    """What the valves of a node bring into it in the profile [kg/s]."""
+    node, valves, total = tables[I_NODES][i], tables[I_VALVES], 0.0
+    for e in range(node["gate_count"]):
+        k = tables[I_INTEGERS][node["gates"] + e]
+        total += valves[k]["flow"] if valves[k]["to_node"] == i else -valves[k]["flow"]
+    return total
+
+
+@njit
+def add_sums(tables, out, rows, right):
+    """Add to right[] what columns bring into rigid nodes [kg/s]: to the bit nothing where all is as at the start."""
+    nodes, columns, at = tables[I_NODES], tables[I_COLUMNS], tables[I_LAYOUT][0]["column"]
+    for i in range(rows.size):
+        if rows[i] >= 0.0:
+            right[int(rows[i])] += nodes[i]["inflow"] - gate_inflow(tables, i)
+    for k in range(columns.size):
+        change = out[at + k] - columns[k]["flow"]
+        a, b = int(rows[columns[k]["from_node"]]), int(rows[columns[k]["to_node"]])
+        if a >= 0:
+            right[a] -= change
+        if b >= 0:
+            right[b] += change
+
+
+@njit
+def add_pushes(y, tables, out, n, skip, solved):
+    """Add to the right side d/dt of what columns would bring into rigid nodes at p' = 0 there [kg/s2].
+
+    But for those that are led and `skip`; until nodes are `solved`, by states and guesses.
+    """
+    rows, _, _, right, pinned, _ = rigid_space(tables, n)
+    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
+    for k in range(columns.size):
+        column = columns[k]
+        i, j = column["from_node"], column["to_node"]
+        if k == skip or out[layout["led"] + k] != 0.0 or (rows[i] < 0.0 and rows[j] < 0.0):
+            continue
+        flow = out[layout["column"] + k] if solved else column["flow"] + y[column["y"]]
+        p_i = 0.0 if rows[i] >= 0.0 else pressure_at(tables, out, i, -flow, solved)
+        p_j = 0.0 if rows[j] >= 0.0 else pressure_at(tables, out, j, flow, solved)
+        rate = column["area"] / column["length"] * (p_i - p_j + column["offset"])
+        rate -= column_drag(column, flow) - column["drag"]
+        if rows[i] >= 0.0:
+            right[int(rows[i])] -= rate
+        if rows[j] >= 0.0:
+            right[int(rows[j])] += rate
+    for i in range(rows.size):
+        if rows[i] >= 0.0 and pinned[int(rows[i])] > 0.0:
+            right[int(rows[i])] = out[layout["pressure"] + i]
+
+
+@njit
+def far_side(y, tables, out, k, end, solved):
+    """(p' of the other end of column k while its flow holds, its fall per d/dt of what it takes [Pa s2/kg]).
+
+    end : 1 or -1, its `to` or `from` end is the near one.
+    """
+    column = tables[I_COLUMNS][k]
+    i = column["from_node"] if end == 1 else column["to_node"]
+    if not is_rigid(tables, out, i):
+        return pressure_at(tables, out, i, end * column["flow"], solved), 0.0
+    n = number_rigid(tables, out)
+    join(tables, out, n, k)
+    rows, _, _, right, _, _ = rigid_space(tables, n)
+    add_pushes(y, tables, out, n, k, solved)
+    settle_rigid(tables, out, n)
+    p = right[int(rows[i])]
+    join(tables, out, n, k)
+    right[int(rows[i])] = 1.0
+    settle_rigid(tables, out, n)
+    return p, right[int(rows[i])]

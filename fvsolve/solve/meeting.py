@@ -1,0 +1,81 @@
+"""What happens at once where rigid columns alone meet: an impulse of pressure, or air. Knows flows; takes no step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.rigid import gate_inflow
+from fvsolve.model import Model
+
+NONE = 1e-9  # of a small flow: columns that part no quicker are rounding
+
+
+def shut_places(model: Model, out: np.ndarray) -> list[int]:
+    """Places where rigid columns, one or more, meet nothing but shut valves."""
+    found, nodes, at = [], model.tables[rec.I_NODES], model.layout["conductance"]
+    for i in np.flatnonzero(nodes["gates"] >= 0):
+        if not out[at + gates_of(model, i)].any():
+            found.append(int(i))
+    return found
+
+
+def gates_of(model: Model, i: int) -> np.ndarray:
+    """Valves at such a place."""
+    row = model.tables[rec.I_NODES][i]
+    return model.tables[rec.I_INTEGERS][row["gates"] : row["gates"] + row["gate_count"]]
+
+
+def air_valve_of(model: Model, i: int) -> int | None:
+    """The first event function of the air valve at a place: that it opens; None where there is none."""
+    valves, devices = model.tables[rec.I_VALVES], model.tables[rec.I_DEVICES]
+    for device in valves["device"][gates_of(model, i)]:
+        if device >= 0 and devices[device]["row"] >= 0:
+            return int(devices[device]["event"])
+    return None
+
+
+def brought(model: Model, t: float, y: np.ndarray) -> np.ndarray:
+    """What columns have carried up to t more than in the profile [kg/s]; at the start, their states."""
+    before, columns, settings = model.new_out(), model.tables[rec.I_COLUMNS], model.tables[rec.I_SETTINGS][0]
+    if t <= model.case.numerics.start:
+        return y[columns["y"]]
+    limit, settings["limit"] = float(settings["limit"]), t
+    model.functions.rhs(t, y, np.zeros(0), before, model.handle)
+    settings["limit"] = limit
+    return before[model.layout["column"] :][: len(columns)] - columns["flow"]
+
+
+def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]) -> np.ndarray:
+    """Flow [kg/s] that an impulse of pressure at each place stops there; below zero where columns part.
+
+    sum of A / L (J - J_far) = sum of the flows that columns bring: momentum is kept, and columns that their valves
+    still lead keep their flow. carried : as of `brought`.
+    """
+    sums = np.array([model.tables[rec.I_NODES]["inflow"][i] - gate_inflow(model.tables, i) for i in places])
+    matrix = np.zeros((len(places), len(places)))
+    row = {i: r for r, i in enumerate(places)}
+    for k, column in enumerate(model.tables[rec.I_COLUMNS]):
+        ends = [(row.get(int(column["from_node"]), -1), -1.0), (row.get(int(column["to_node"]), -1), 1.0)]
+        at = model.layout["column"] + k
+        kept = out[model.layout["led"] + k] != 0.0 and out[at] != 0.0
+        change = out[at] - column["flow"] if kept else carried[k]
+        for r, sign in ends:
+            if r >= 0:
+                sums[r] += sign * change
+            for other, turned in ends if r >= 0 and not kept else ():
+                if other >= 0:
+                    matrix[r, other] += sign * turned * column["area"] / column["length"]
+    return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
+
+
+def parted(model: Model, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+    """The event of the air valve where columns part the most, which air lets go on; None where none part."""
+    places = shut_places(model, out)
+    events = [air_valve_of(model, i) for i in places]
+    if all(event is None for event in events):
+        return None
+    small = NONE * model.scale[model.tables[rec.I_COLUMNS]["y"]].max()
+    pushes = impulses(model, brought(model, t, y), out, places)
+    apart = [(push, event) for push, event in zip(pushes, events, strict=True) if event is not None and push < -small]
+    return min(apart)[1] if apart else None
