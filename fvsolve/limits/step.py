@@ -56,23 +56,39 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
         return []
     try:
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
-        mode = lumped_mode(model, method.name) if numerics.step is not None else None
+        h = first_step(model)
+        mode = lumped_mode(model, method.name, h) if h > 0.0 else None
     except FvsolveError:  # a method whose stability function is not to be had
         return []
     found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
-    return found + ([] if mode is None else [of_mode(numerics.step, mode, method.name, astray)])
+    if mode is not None and not (found and not mode.own):  # which waves that grow bring with them
+        found.append(of_mode(numerics, h, mode, method.name, astray))
+    return found
 
 
-def of_mode(step: float, mode: Mode, method: str, astray: float | None) -> Notice:
-    """What is to be said of what is no wave: before a run that it grows, after it whether that was seen."""
-    seen = astray is None or astray >= WRONG or (mode.sure and astray > STILL)
+def first_step(model) -> float:
+    """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
+    numerics, armed = model.case.numerics, model.tables[rec.I_ARMED]
+    if numerics.step is not None:
+        return numerics.step
+    kept = armed.copy()
+    rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
+    armed[:] = kept
+    return numerics.courant / rate if rate > 0.0 else 0.0
+
+
+def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None) -> Notice:
+    """What is to be said of what is no wave alone: before a run that it grows, after it whether that was seen."""
+    seen = astray is None or not mode.own or astray >= WRONG or (mode.followed and astray > STILL)
     wrong = seen and mode.grows >= GROWS**2
     doubt = "it may be wrong" if seen or astray >= DOUBTFUL else "this run shows none"
     ends = "the numbers are not to be trusted" if wrong else doubt
-    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of {step:.6g} s, "
+    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
+    size = rounded_down(getattr(numerics, key) * mode.limit / h)
+    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of {h:.6g} s, "
             f"as the start has it; {mode.limit:.6g} s is the limit (an estimate); {ends}; "
-            f"give numerics.step = {rounded_down(mode.limit):.4g} s or less")  # fmt: skip
-    return Notice("step-limit", mode.place, text, "step", step, mode.limit, not wrong)
+            f"give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
+    return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
 
 
 def pipe_rooms(model, method: str) -> list[Room]:
