@@ -27,11 +27,12 @@ def cell_modes(model) -> Modes:
 
 def rubbed(model) -> Modes:
     """Waves of pipes against friction, at the flow of the start."""
-    scheme = model.case.numerics.scheme
-    z, found = symbol(weights_of(FROZEN_AS.get(scheme, scheme)), PHASES), []
+    scheme, found = model.case.numerics.scheme, []
+    weights = weights_of(FROZEN_AS.get(scheme, scheme))
     for mesh, row, q in zip(model.pipes, model.tables[rec.I_PIPES], model.wave_rates, strict=True):
         g = slope(row)
         if g > 0.0:
+            z = symbol(weights, PHASES * (1.0 - 0.5 / mesh.cells))  # between ends no wave is quite two cells long
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
             found.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
     return found

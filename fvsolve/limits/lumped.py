@@ -22,7 +22,7 @@ from fvsolve.steppers.tableau import method_named
 SHARE = 0.01  # of what drives the scene, over which slopes are taken
 MOST = 300  # states: of more, nothing is predicted
 GROWS = 10.0  # times in the run: less is not seen
-HALVES, FINE = 60, 40  # of the step, until one holds, and back from there
+LEAST, FINE = 1e-15, 40  # of the step, where one that holds is looked for; halvings back from there
 FOLLOWED = 1.0  # of |h s|: such a mode is followed step by step, and grows as the start says
 
 
@@ -40,33 +40,39 @@ class Mode(NamedTuple):
     followed: bool
 
 
-def lumped_mode(model, method: str, step: float) -> Mode | None:
-    """What a fixed step [s] makes grow, if anything. Raises FvsolveError for a method without a stability function."""
-    numerics, r = model.case.numerics, stability_function(method_named(method))
-    own = own_modes(model) if numerics.step is not None else []
-    found = (
-        [*own, *cell_modes(model)] if numerics.step is not None else rubbed(model)
-    )  # a Courant number minds the rest
-    if not found:
+def lumped_modes(model, method: str, step: float) -> list[Mode]:
+    """What a fixed step [s] makes grow: of what no cell holds, and of cells.
+
+    Raises FvsolveError for a method without a stability function.
+    """
+    r, numerics = stability_function(method_named(method)), model.case.numerics
+    span, fixed = numerics.end - numerics.start, numerics.step is not None
+    own = own_modes(model) if fixed else []
+    cells = cell_modes(model) if fixed else rubbed(model)  # a Courant number minds the rest
+    found = [quickest(r, modes, step, span, modes is own) for modes in (own, cells)]
+    return [mode for mode in found if mode is not None]
+
+
+def quickest(r, modes: Modes, step: float, span: float, own: bool) -> Mode | None:
+    """What grows most of some modes, if any does within the span [s]."""
+    if not modes:
         return None
-    span, s = numerics.end - numerics.start, np.concatenate([one for _, one in found])
-    excess = beyond(r, s, step)
-    worst = int(np.argmax(excess))
-    grows = times(float(excess[worst]), span / step)
-    if grows < GROWS:
+    s = np.concatenate([one for _, one in modes])
+
+    def grown(h: float) -> float:
+        return times(float(beyond(r, s, h).max()), span / h)
+
+    if grown(step) < GROWS:
         return None
-    high = step
-    for _ in range(HALVES):
-        low = 0.5 * high
-        if times(float(beyond(r, s, low).max()), span / low) < GROWS:
-            break
-        high = low
+    high, low = step, 0.5 * step
+    while grown(low) >= GROWS and low > LEAST * step:
+        high, low = low, 0.5 * low
     for _ in range(FINE):
         middle = 0.5 * (low + high)
-        holds = times(float(beyond(r, s, middle).max()), span / middle) < GROWS
-        low, high = (middle, high) if holds else (low, middle)
-    k = int(np.searchsorted(np.cumsum([one.size for _, one in found]), worst, side="right"))
-    return Mode(found[k][0], grows, low, k < len(own), bool(abs(step * s[worst]) <= FOLLOWED))
+        low, high = (middle, high) if grown(middle) < GROWS else (low, middle)
+    worst = int(np.argmax(beyond(r, s, step)))
+    at = int(np.searchsorted(np.cumsum([one.size for _, one in modes]), worst, side="right"))
+    return Mode(modes[at][0], grown(step), low, own, bool(abs(step * s[worst]) <= FOLLOWED))
 
 
 def beyond(r, s: np.ndarray, h: float) -> np.ndarray:
