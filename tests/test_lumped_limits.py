@@ -11,10 +11,10 @@ from importlib import import_module
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, chamber, junction, lake, pipe, ramp, reservoir, scene, step, tank
+from truth.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, ramp, reservoir, scene, step, tank
 
 import fvsolve
-from fvsolve.limits.lumped import lumped_mode
+from fvsolve.limits.lumped import lumped_modes
 from fvsolve.limits.step import step_limits
 from fvsolve.run import model_of
 from fvsolve.steppers.analysis.stability_function import stability_function
@@ -75,6 +75,64 @@ def test_what_a_pipe_carries_has_the_limit_of_the_real_axis(given, rate):
         assert [one.ok for one in before] == ([False] if grows else []) and fvsolve.run(case).ok is not grows
         if grows:
             assert before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "main.dye"
+
+
+def capillary(courant: float, scheme: str) -> dict:
+    """Ten metres of 1 mm bore with an oil of 300 cSt: laminar friction brakes by 32 nu / D^2 = 9600 1/s."""
+    nodes = {"a": reservoir(step(0.01, 1e6, 2e6)), "b": reservoir(5e5)}
+    rough = {"model": "quasi-steady", "roughness": 0.0}
+    links = {"line": pipe("a", "b", 10.0, 1e-3, 1000.0, 10, friction=rough)}
+    numerics = {"scheme": scheme, "method": "rk4", "courant": courant}
+    return scene(
+        nodes, links, 2.0, numerics, ["line.flow"], 0.02, fluid={**WATER, "viscosity": 0.3, "vapor_pressure": 0.0}
+    )
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
+def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme):
+    """With waves of 1000 1/s at their limit of 1.39 rk4 bore Courant 0.9 without a word, and grew."""
+    (one,) = step_limits(model_of(capillary(0.9, scheme)))
+    assert not one.ok and one.key == "courant" and one.place == "line" and one.limit < 2.785293563 / 9600.0
+    bears = 0.9 * one.limit / one.value
+    for factor, grows in ((0.98, False), (1.1, True)):
+        assert [x.ok for x in step_limits(model_of(capillary(factor * bears, scheme)))] == ([False] if grows else [])
+        result = fvsolve.run(capillary(factor * bears, scheme))
+        grown = bool(said(result.warnings, "growth")) or "not finite" in result.reason
+        assert result.ok is not grows and grown is grows
+
+
+def test_friction_that_remembers_has_a_limit_of_its_own():
+    """Zielke's terms by a step of their own: met to 3 %."""
+    nodes, links = {"a": reservoir(step(0.01, 1e6, 2e6)), "b": reservoir(5e5)}, {}
+    links["line"] = pipe("a", "b", 100.0, 0.01, 1000.0, 10, friction={"model": "unsteady", "roughness": 0.0})
+    fluid = {**WATER, "viscosity": 0.03, "vapor_pressure": 0.0}
+    found = []
+    for h in (9e-3, 3.9e-3, 4.1e-3):
+        case = scene(
+            nodes, links, 6.0, {"scheme": "upwind", "method": "rk4", "step": h}, ["line.flow"], 0.1, fluid=fluid
+        )
+        before, result = step_limits(model_of(case)), fvsolve.run(case)
+        found.append(([(x.place, x.ok) for x in before], result.ok, bool(said(result.warnings, "growth"))))
+    beyond = ([("line.memory", False)], False, True)
+    assert found == [beyond, ([], True, False), beyond]
+
+
+def test_what_spreads_in_a_basin_has_the_limit_of_its_shortest_wave():
+    """8 x 8 cells of 1/8 m between walls: 4 D cos^2(pi / 16) (64 + 64) 1/s under rk4."""
+    spreads, limit = 0.01, 2.785293563 / (4 * 0.01 * 128 * math.cos(math.pi / 16) ** 2)
+    dye = "exp(-100*((x-0.3)^2+(y-0.5)^2))"
+    pool = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [8, 8], "scalars": {"dye": dye}}
+    pool["velocity"] = {"u": "0*x", "v": "0*y"}
+    for factor, grows in ((0.99, False), (1.06, True)):
+        h = factor * limit
+        numerics = {"scheme": "upwind", "method": "rk4", "step": h}
+        case = scene({"pool": pool}, {}, 2000 * h, numerics, ["pool.dye@0.3,0.5"], 20 * h)
+        case["scalars"] = {"dye": {"diffusivity": spreads}}
+        before, result = step_limits(model_of(case)), fvsolve.run(case)
+        assert [one.ok for one in before] == ([False] if grows else []) and result.ok is not grows
+        assert bool(said(result.warnings, "growth")) is grows
+        if grows:
+            assert before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "pool.dye"
 
 
 def vessel(end: float, first=1.0, second=1.0, pressure=None, volume=0.01, **numerics) -> dict:
@@ -154,10 +212,10 @@ def test_two_bladders_and_a_column_are_told_by_check_that_euler_never_holds():
 def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
     """Euler steps multiply an undamped swing by 1 + (h w)^2 / 2 each, h w = 0.01: by 1.005 in a hundred of them."""
     case = swinging(10.0, 1e5, 1e-9, 100 * 1e-4, method="euler", step=1e-4)
-    assert lumped_mode(model_of(case), "euler") is None and fvsolve.run(case).ok
+    assert not lumped_modes(model_of(case), "euler", 1e-4) and fvsolve.run(case).ok
     case["numerics"]["end"] = 1e6 * 1e-4
-    mode = lumped_mode(model_of(case), "euler")
-    assert math.log(mode.grows) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.sure
+    (mode,) = lumped_modes(model_of(case), "euler", 1e-4)
+    assert math.log(mode.grows) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.own and mode.followed
 
 
 @pytest.mark.parametrize("seeds", [range(0, 12), range(12, 24), range(24, 36)])

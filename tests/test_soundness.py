@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 import fvsolve
+from fvsolve.kernels import records as rec
 from fvsolve.limits.grid import advection_limit
 from fvsolve.limits.plane import plane_limit
 from fvsolve.limits.step import step_limits
 from fvsolve.run import model_of
+from fvsolve.solve.loop import MOST_IN_A_SPAN, SPAN, Loop
 from fvsolve.solve.soundness import OPEN, Soundness, unclosed
+from fvsolve.steppers import orders as told
 from fvsolve.studies import sweep
 from tests.truth.scenes import scene
 
@@ -229,3 +232,39 @@ def test_what_grows_without_pipes_is_stopped_too():
     for case in (swings, squeezed):
         result = fvsolve.run(case)
         assert not result.ok and (said(result, "growth") or "not finite" in result.reason), result.summary["warnings"]
+
+
+def chattering(step: float) -> dict:
+    """A check valve before a wide tank, that 1500 swings a second of the pressure before it open and shut."""
+    swings = 1500
+    pressure = {"time": [i / (2 * swings) for i in range(2 * swings + 1)], "value": [1.2e5, 3e5] * swings + [1.2e5]}
+    nodes = {
+        "source": {"type": "reservoir", "pressure": pressure},
+        "wide": {"type": "tank", "area": 100.0, "level": 10.0},
+    }
+    link = {"type": "check-valve", "from": "source", "to": "wide", "diameter": 0.1}
+    return scene(nodes, {"check": link}, 3.0, {"method": "rk4", "step": step}, ["check.flow"], 0.1)
+
+
+def test_events_that_crowd_within_one_step_are_bounded_where_nothing_grows():
+    """A step of 1 s would be cut 3000 times: the run ends at the 2000th or so, by name; of 0.1 s it goes on."""
+    result = fvsolve.run(chattering(1.0))
+    model = model_of(chattering(1.0))
+    assert "check opens and shuts without end" in result.reason and not result.ok and not said(result, "growth")
+    times = [event["time"] for event in result.summary["events"]]
+    assert len(times) == MOST_IN_A_SPAN + 4 * model.tables[rec.I_ARMED].size and times[-1] - times[0] < 1.0
+    finer = fvsolve.run(chattering(0.1))
+    assert finer.ok and len(finer.summary["events"]) == 3000
+
+
+def test_events_that_crowd_within_a_millionth_of_a_run_are_bounded_under_error_control_too():
+    case = chattering(1.0)
+    case["numerics"] = {"end": 3.0, "method": "rodas-5p", "rtol": 1e-4}
+    for apart, crowds in ((0.9, True), (1.1, False)):
+        loop = Loop(model_of(case))
+        count = loop.crowd.maxlen
+        for k in range(count):
+            loop.memory[told.T] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
+            goes_on = loop.switch(loop.armed.copy())
+            assert goes_on or k == count - 1
+        assert goes_on is not crowds

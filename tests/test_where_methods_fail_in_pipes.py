@@ -27,6 +27,7 @@ from truth.scenes import (
 import fvsolve
 from fvsolve.case import load
 from fvsolve.kernels import limiters
+from fvsolve.limits.step import step_limits
 from fvsolve.model.energy import energy_weights
 from fvsolve.steppers import analyse, method_named, stability_function
 from fvsolve.studies.outcome import outcome, prepared
@@ -401,3 +402,19 @@ def test_below_vapour_the_run_can_be_told_to_stop_and_a_slow_closure_needs_no_ma
     back = 0.1 + 2 * 400.0 / SPEED
     assert not stopped.ok and "vapour" in stopped.reason and stopped.t[-1] == pytest.approx(back, abs=0.03)
     assert not fvsolve.run(falling(1.001 * LIMIT, closure=4 * 2 * 400.0 / SPEED)).marks
+
+
+def test_upwind_with_euler_at_courant_one_grows_wherever_there_is_friction_and_shorter_steps_do_not():
+    """Waves of nearly two cells: |R|^2 = 1 - 4 C (1 - C) + h g, so the limit is about 1 - g / 4 q, q = c / dx."""
+    q, g = 1000.0 / 15.0, 0.05 * (0.2 / (math.pi / 4 * 0.3**2)) / 0.3
+    limit = 1.0 - g / (4.0 * q)
+    for courant, grows in ((1.0, True), (limit - 1e-3, False)):
+        nodes = {"lake": lake(50.0), "gate": junction(step(1.0, 0.2, 0.19))}
+        links = {"main": pipe("lake", "gate", 300.0, 0.3, 1000.0, 20, friction={"model": "steady", "factor": 0.05})}
+        numerics = {"scheme": "upwind", "method": "euler", "courant": courant}
+        case = scene(nodes, links, 60.0, numerics, ["main.flow@0.5"], 0.5)
+        before, result = step_limits(prepared(case)), fvsolve.run(case)
+        assert [one.ok for one in before] == ([False] if grows else []) and result.ok is not grows
+        assert bool([one for one in result.warnings if one.kind == "growth"]) is grows
+        if grows:
+            assert before[0].limit * q == pytest.approx(limit, abs=5e-4)

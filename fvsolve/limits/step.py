@@ -16,7 +16,7 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.limits.ends import FIFTH, LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
-from fvsolve.limits.lumped import Mode, lumped_mode, times
+from fvsolve.limits.lumped import Mode, lumped_modes, times
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.symbol import weights_of
 from fvsolve.model.schemes import FROZEN_AS
@@ -26,6 +26,7 @@ from fvsolve.steppers.tableau import method_named
 SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
 SHARE = 0.05  # of an estimate: up to here beyond it a step is doubtful, from there on wrong
 GROWS = 10.0  # times that the worst wave grows in a run: less is not seen, where no step is without growth
+SMOOTH = 1e6  # times that deviations of cells must grow to be wrong where no schedule jumps: there are hardly any
 STILL, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05  # of its range by which a step leaves what is no wave astray, on average
 LIMITED = 0.3  # the same where limiters stand between few cells: they hold by up to so much more (tests/test_ends.py)
 
@@ -56,23 +57,39 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
         return []
     try:
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
-        mode = lumped_mode(model, method.name) if numerics.step is not None else None
+        h = first_step(model)
+        modes = lumped_modes(model, method.name, h) if h > 0.0 else []
     except FvsolveError:  # a method whose stability function is not to be had
         return []
     found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
-    return found + ([] if mode is None else [of_mode(numerics.step, mode, method.name, astray)])
+    jumps = any(jump for _, jump in model.breaks)
+    modes = [mode for mode in modes if mode.own or not found]  # of cells those that waves bring with them are known
+    return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes]
 
 
-def of_mode(step: float, mode: Mode, method: str, astray: float | None) -> Notice:
-    """What is to be said of what is no wave: before a run that it grows, after it whether that was seen."""
-    seen = astray is None or astray >= WRONG or (mode.sure and astray > STILL)
-    wrong = seen and mode.grows >= GROWS**2
+def first_step(model) -> float:
+    """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
+    numerics, armed = model.case.numerics, model.tables[rec.I_ARMED]
+    if numerics.step is not None:
+        return numerics.step
+    kept = armed.copy()
+    rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
+    armed[:] = kept
+    return numerics.courant / rate if rate > 0.0 else 0.0
+
+
+def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:
+    """What is to be said of what is no wave alone: before a run that it grows, after it whether that was seen."""
+    seen = astray is None or not mode.own or astray >= WRONG or (mode.followed and astray > STILL)
+    wrong = seen and mode.grows >= (GROWS**2 if mode.own or jumps else SMOOTH)
     doubt = "it may be wrong" if seen or astray >= DOUBTFUL else "this run shows none"
     ends = "the numbers are not to be trusted" if wrong else doubt
-    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of {step:.6g} s, "
+    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
+    size = rounded_down(getattr(numerics, key) * mode.limit / h)
+    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of {h:.6g} s, "
             f"as the start has it; {mode.limit:.6g} s is the limit (an estimate); {ends}; "
-            f"give numerics.step = {rounded_down(mode.limit):.4g} s or less")  # fmt: skip
-    return Notice("step-limit", mode.place, text, "step", step, mode.limit, not wrong)
+            f"give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
+    return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
 
 
 def pipe_rooms(model, method: str) -> list[Room]:

@@ -1,0 +1,91 @@
+"""Modes of cells beside their waves: what rubs, remembers, fades and spreads. Knows a model's start; no method.
+
+Friction of slope g = d drag / d M turns both waves of a pipe into each other: with q z the symbol of a wave that
+crosses q cells a second, s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.friction import drag_slope
+from fvsolve.limits.symbol import symbol, weights_of
+from fvsolve.model.schemes import FROZEN_AS
+
+PHASES = np.linspace(0.0, np.pi, 65)
+FEW = 3  # cells of a basin, below which nothing is asked
+SHORT = 1.0 - np.cos(PHASES)  # what spreads, by its wave
+
+Modes = list[tuple[str, np.ndarray]]  # places and eigenvalues there [1/s]
+
+
+def cell_modes(model) -> Modes:
+    """All of them."""
+    return [*rubbed(model), *remembered(model), *carried(model), *spread(model)]
+
+
+def rubbed(model) -> Modes:
+    """Waves of pipes against friction, at the flow of the start."""
+    scheme, found = model.case.numerics.scheme, []
+    weights = weights_of(FROZEN_AS.get(scheme, scheme))
+    for mesh, row, q in zip(model.pipes, model.tables[rec.I_PIPES], model.wave_rates, strict=True):
+        g = slope(row)
+        if g > 0.0:
+            z = symbol(weights, PHASES * (1.0 - 0.5 / mesh.cells))  # between ends no wave is quite two cells long
+            root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
+            found.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
+    return found
+
+
+def remembered(model) -> Modes:
+    """Unsteady friction: its quickest term, with the gain of all of them and the wall's friction."""
+    found, floats = [], model.tables[rec.I_FLOATS]
+    for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
+        if row["terms"] > 0:
+            gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
+            found.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
+    return found
+
+
+def slope(row) -> float:
+    """d drag / d M of a pipe at the flow of the start [1/s]."""
+    return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
+
+
+def carried(model) -> Modes:
+    """Scalars in pipes, at the flow of the start."""
+    found, rho = [], model.case.properties.density
+    for name, scalar in model.case.scalars.items():
+        for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
+            q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
+            s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * SHORT - scalar.decay
+            found.append((f"{mesh.name}.{name}", s))
+    return found
+
+
+def spread(model) -> Modes:
+    """Scalars in basins, what spreads by its shortest wave."""
+    return [
+        (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * shortest(basin.mesh)]))
+        for name, scalar in model.case.scalars.items()
+        for basin in model.basins
+        if scalar.decay > 0.0 or scalar.diffusivity > 0.0
+    ]
+
+
+def shortest(mesh) -> float:
+    """The greatest eigenvalue of diffusion over a mesh, without what leaves it [1/m2]."""
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import eigsh
+
+    n, left, right = mesh.area.size, mesh.left[: mesh.inner], mesh.right[: mesh.inner]
+    if n < FEW:
+        return 0.0
+    near = mesh.length[: mesh.inner] / np.linalg.norm(mesh.centre[right] - mesh.centre[left], axis=1)
+    through = coo_array((near, (left, right)), shape=(n, n))
+    sides = np.bincount(left, near, n) + np.bincount(right, near, n)
+    root = diags_array(1.0 / np.sqrt(mesh.area))
+    whole = root @ (diags_array(sides) - through - through.T) @ root
+    start = np.random.default_rng(1).standard_normal(n)
+    return float(eigsh(whole.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])
