@@ -81,7 +81,8 @@ def first_step(model) -> float:
 def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:
     """What is to be said of what is no wave alone: before a run that it grows, after it whether that was seen."""
     seen = astray is None or not mode.own or astray >= WRONG or (mode.followed and astray > STILL)
-    wrong = seen and mode.grows >= (GROWS**2 if mode.own or jumps else SMOOTH)
+    enough = (GROWS if mode.followed else GROWS**2) if mode.own else GROWS**2 if jumps else SMOOTH
+    wrong = seen and mode.grows >= enough
     doubt = "it may be wrong" if seen or astray >= DOUBTFUL else "this run shows none"
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
