@@ -2,7 +2,7 @@
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.led import lead_columns, led_end, led_flow, lone_disc
+from fvsolve.kernels.led import lead_columns, led_end, led_flow, led_rate, lone_disc
 from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.rigid import (
@@ -99,7 +99,7 @@ def column_rate(t, y, tables, out, k, change):
     column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
     x = column["to_node"] if end == 1 else column["from_node"]
     if end != 0 and (lone_disc(tables, x) < 0 or gate_area(tables, out, x)[0] == 0.0):
-        return end * led_flow(t, y, tables, out, k, end, True)[1]
+        return end * led_rate(t, y, tables, out, k, end)
     pull = column_drag(column, out[tables[I_LAYOUT][0]["column"] + k])
     return column["area"] / column["length"] * (change + column["offset"]) - (pull - column["drag"])
 

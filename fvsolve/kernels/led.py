@@ -29,7 +29,7 @@ from fvsolve.kernels.restrictions import conductance, conductance_at
 from fvsolve.kernels.rigid import far_side, gate_area, grounded, is_rigid, is_vessel, pressure_at
 
 NEARLY = 1e-3  # share of their full area below which valves lead their column
-LOST = 0.05  # share of the flow at which valves take the lead, beyond what they then miss of it
+LOST = 0.05  # share of the flow at which valves take the lead, more than is then missed of it
 NEAR = 1e-13  # of a pressure, relative, at which it is found
 INSTANT = 1e-7  # over which the rate of an area is measured [s]
 
@@ -221,19 +221,15 @@ def braked_pressure(t, tables, out, x, way, start, standing, inertia, solved):
 def led_pressure(t, tables, out, x, own, standing, inertia, solved):
     """p' of node x whose valves lead a column that brings `own` [kg/s].
 
-    Shutting valves brake a flow either way: of two that they allow, it is the one that has been there. Where that is
-    no more than what was lost when they took the lead, it is the one that pressures drive, or none out of an air valve.
+    Shutting valves brake a flow either way: of two that they allow, it is the one that has been there.
     """
-    area, full = gate_area(tables, out, x)
     flow, rate, _ = gate_flow(t, tables, out, x, standing, solved)
     if flow == 0.0 and rate == 0.0:
         return standing
     if rate * flow >= 0.0:
         return opening_pressure(t, tables, out, x, standing, inertia, solved)
-    brake = -inertia * rate / flow * area
-    if abs(own) <= LOST * NEARLY * full * brake:
-        own = 1.0 if has_air(tables, x) else flow
-    way = 1.0 if own > 0.0 else -1.0
+    brake = -inertia * rate / flow * gate_area(tables, out, x)[0]
+    way = 1.0 if own > 0.0 or (own == 0.0 and flow > 0.0) else -1.0
     least, most = levels_behind(tables, out, x, solved)
     reach = brake + sqrt(max(abs(standing - least), abs(standing - most)))
     for _ in range(2):
@@ -246,12 +242,18 @@ def led_pressure(t, tables, out, x, own, standing, inertia, solved):
 
 
 @njit
-def has_air(tables, x):
-    """Whether an air valve is at node x."""
-    for e in range(tables[I_NODES][x]["gate_count"]):
-        if is_vessel(tables, tables[I_INTEGERS][tables[I_NODES][x]["gates"] + e]):
-            return True
-    return False
+def led_rate(t, y, tables, out, k, end):
+    """d/dt of the flow out of column k as its valves lead it; its state keeps the way it went to the last.
+
+    The state misses what was lost when they took the lead, about a hundredth: below LOST of it, it fades, not turns.
+    """
+    flow, rate, _ = led_flow(t, y, tables, out, k, end, True)
+    column = tables[I_COLUMNS][k]
+    if rate * flow >= 0.0:
+        return rate
+    area, full = gate_area(tables, out, column["to_node"] if end == 1 else column["from_node"])
+    least = -LOST * NEARLY * full * column["length"] / column["area"] * rate / flow * area
+    return rate * min(1.0, abs(column["flow"] + y[column["y"]]) / least)
 
 
 @njit
