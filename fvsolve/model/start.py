@@ -303,8 +303,13 @@ class Start:
                 *zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
         ends = {name: [held.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")] for name, row in rows
                 if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
-        swing = [name for name, row in rows if name in ends and self.case.links[name].initial_flow is None
-                 and abs(self.held[int(row["from_node"])] - self.held[int(row["to_node"])]) > 1e-6 * PRESSURE_SCALE]
+        swing = [
+            name
+            for name, row in rows
+            if name in ends
+            and self.case.links[name].initial_flow is None
+            and abs(self.held[int(row["from_node"])] - self.held[int(row["to_node"])]) > 1e-6 * PRESSURE_SCALE
+        ]
         for name in swing:
             text = f"{name}: without friction between unequal heads no flow is steady; it starts from rest and swings"
             self.scene.warnings.append(Notice("start", f"links.{name}", text))
