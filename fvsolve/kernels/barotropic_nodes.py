@@ -296,10 +296,10 @@ def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
 
 @njit
 def shorten(most, a, right):
-    """Make a Newton step no longer than `most` [Pa], over which density grows by e: far beyond, it is infinite."""
+    """Make a Newton step rise by no more than `most` [Pa], over which density grows by e: far above it is infinite."""
     longest = 0.0
     for r in range(right.size):
-        longest = max(longest, abs(right[r]))
+        longest = max(longest, right[r])
     if longest > most:
         for r in range(right.size):
             right[r] *= most / longest

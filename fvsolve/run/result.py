@@ -25,7 +25,7 @@ class Mark(NamedTuple):
 
 
 class Extremes(NamedTuple):
-    """Least and greatest over all accepted steps, with `rtol` over rows too, in the unit of the probe, and when [s]."""
+    """Least and greatest over all accepted steps, of long ones over rows too, in the unit of the probe, and when."""
 
     least: float
     t_least: float

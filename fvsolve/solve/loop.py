@@ -66,7 +66,9 @@ class Loop:
         for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
-        if numerics.rtol is None:  # else steps are long, and rows between them as accurate
+        accurate = not method.explicit and stepper.dense.size > 0 and stepper.dense_order > 2
+        self.holds_rows = numerics.rtol is None and not accurate
+        if self.holds_rows:  # else steps may be long, and rows between them as accurate
             stepper.seen = model.tables[rec.I_EXTREMES]
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
