@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numba import njit
 from truth.scenes import WATER, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
 
 import fvsolve
+from fvsolve.steppers import integrate
 
 TABLE = {"name": "Water", "temperature": 293.15, "law": "table"}
 MIXTURE = {**WATER, "law": "mixture", "air_fraction": 1e-3}
@@ -75,3 +77,25 @@ def test_parts_listed_the_other_way_round_take_the_same_steps(build, numerics):
     assert one.summary["steps"] == other.summary["steps"]
     for probe in ("n0.pressure", "out.flow"):
         assert np.max(np.abs(one[probe] - other[probe])) < 1e-9 * np.max(np.abs(one[probe]))
+
+
+@njit
+def flares(t, y):
+    """Grows as its square for 0.3 s, then fades."""
+    return y * y if t < 0.31 else -y
+
+
+def test_a_step_without_a_solution_is_taken_in_parts_that_end_on_its_grid():
+    """z = y + h z^2 has none for 4 h y > 1: 0.3 s from 1 have none, 0.075 s and 0.225 s behind them have."""
+    counts: dict = {}
+    found = integrate(flares, [1.0], [0.0, 0.3, 0.6, 1.2], "implicit-euler", step=0.3, counts=counts)
+
+    def end(y, h):
+        return (1.0 - np.sqrt(1.0 - 4.0 * h * y)) / (2.0 * h)
+
+    top = end(end(1.0, 0.075), 0.225)
+    assert found[:, 0] == pytest.approx([1.0, top, top / 1.3, top / 1.3**3], rel=1e-12)
+    assert (counts["steps"], counts["parted"]) == (5, 1)
+    plain: dict = {}
+    integrate(flares, [0.1], [0.0, 1.2], "implicit-euler", step=0.3, counts=plain)
+    assert (plain["steps"], plain["parted"]) == (4, 0)
