@@ -12,7 +12,7 @@ from fvsolve.model import Model, State
 from fvsolve.model.basins.dispersion import Watch, Waves
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.solve.soundness import Soundness
+from fvsolve.solve.soundness import Soundness, parted
 from fvsolve.solve.summary import (
     Event,
     Summary,
@@ -353,6 +353,7 @@ class Run:
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers), *run_downs(model)]
+        warnings += parted(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(
             reason, ok, loop.t, find_marks(model), ledgers, find_extremes(model),

@@ -56,6 +56,16 @@ class Soundness:
         return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]
 
 
+def parted(numerics, counts: dict[str, int]) -> list[Notice]:
+    """A notice where Newton could not take steps of the length that was asked for."""
+    if not counts.get("parted"):
+        return []
+    key = "step" if numerics.step is not None else "courant"
+    text = (f"{counts['parted']} of {counts['steps']} steps were too long for Newton and were taken in parts, "
+            f"which end where the whole would have; give a smaller numerics.{key}, or rtol in place of it")  # fmt: skip
+    return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
+
+
 def unclosed(name: str, ledger: dict) -> list[Notice]:
     """A notice where a ledger's remainder is beyond round-off."""
     relative = ledger.get("relative", 0.0)

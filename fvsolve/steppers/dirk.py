@@ -17,9 +17,9 @@ from fvsolve.steppers.newton import (
     WEIGHTS,
     begin,
     book_increment,
-    damp,
     evaluate,
     find_worst,
+    reach,
     renew,
     size_of,
     smoothed_error,
@@ -127,11 +127,12 @@ def try_stages(
             nnz, work, vectors, store,
         )  # fmt: skip
         if why == FAILED and fresh:
-            for j in range(y.size):
-                k[i, j] = shift * (y[j] - base[j])
-            why = damp(
-                rhs, factor, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, scale,
-                orders, memory, nnz, work, vectors, store,
+            if orders[CONTROL] == TOLERANCE:
+                for j in range(y.size):
+                    k[i, j] = shift * (y[j] - base[j])
+            why = reach(
+                rhs, factor, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y, y_stage, supply, where, out,
+                scale, orders, memory, nnz, work, vectors, store,
             )  # fmt: skip
         if why == FAILED:
             return FAILED

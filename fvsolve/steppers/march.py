@@ -35,6 +35,7 @@ from fvsolve.steppers.orders import (
     LAST,
     LEAPS,
     LEAPT,
+    LEFT,
     N_MARK,
     NEWTON_FAILED,
     NEWTON_FAILURES,
@@ -43,6 +44,7 @@ from fvsolve.steppers.orders import (
     NOT_FINITE,
     NOW,
     OLD,
+    PARTED,
     PHASE,
     RATE,
     READY,
@@ -169,7 +171,7 @@ def march(
             return STOPPED
         if orders[BUDGET] <= 0.0:
             return CHUNK
-        h = next_step(orders, memory, out[RATE], k, scale)
+        h = memory[LEFT] if memory[LEFT] > 0.0 else next_step(orders, memory, out[RATE], k, scale)
         leaping, last = may_leap(orders, memory, times, h), False
         if leaping:
             memory[CALLS] += 1.0
@@ -193,8 +195,12 @@ def march(
             if e == NEWTON_FAILED:
                 failed = NEWTON_STUCK
                 memory[NEWTON_FAILURES] += 1.0
+                if orders[CONTROL] != TOLERANCE and memory[LEFT] == 0.0:  # in parts that end where it would have
+                    memory[LEFT] = h
+                    memory[PARTED] += 1.0
                 h *= 0.25
-                memory[STEP] = h if orders[CONTROL] == TOLERANCE else 0.0
+                if orders[CONTROL] == TOLERANCE:
+                    memory[STEP] = h
                 continue
             e = judged(h, e, coefficients, supply, orders, ledger, scale)
             passing = rest <= 1e3 * shortest(orders, memory)
@@ -208,7 +214,7 @@ def march(
                     )  # fmt: skip
                     if e == NEWTON_FAILED:
                         return NEWTON_STUCK
-                    last, memory[STEP] = last and memory[T] + h >= orders[END], 0.0
+                    last, memory[STEP], memory[LEFT] = last and memory[T] + h >= orders[END], 0.0, 0.0
                     e = judged(h, e, coefficients, supply, orders, ledger, scale)
             if bearable(e, passing):
                 if orders[CONTROL] != TOLERANCE:
@@ -228,11 +234,14 @@ def march(
         rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
         memory[UNBOOKED] = h
         t_old = memory[T]
-        memory[N_MARK] += 1.0
+        part = memory[LEFT] > h
+        whole = h == memory[STEP] or h == memory[LEFT]
+        memory[LEFT] = memory[LEFT] - h if part else 0.0
+        memory[N_MARK] += 0.0 if part else 1.0
         if last:
             memory[T] = orders[END]
-        elif orders[CONTROL] != TOLERANCE and h == memory[STEP]:
-            memory[T] = memory[T_MARK] + memory[N_MARK] * h
+        elif orders[CONTROL] != TOLERANCE and whole:
+            memory[T] = memory[T_MARK] + memory[N_MARK] * memory[STEP]
         else:
             memory[T] = t_old + h
         memory[LAST] = memory[T] - t_old

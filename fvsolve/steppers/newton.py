@@ -42,16 +42,18 @@ from fvsolve.steppers.orders import (
 from fvsolve.steppers.step import copy, small
 
 # Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
-# what a stage starts from (Rosenbrock: df/dt); then, for fully implicit methods, transformed increments, f and
-# residuals of all stages.
-FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, STAGES = range(7)
+# what a stage starts from (Rosenbrock: df/dt), a slope to fall back on; then, for fully implicit methods, transformed
+# increments, f and residuals of all stages.
+FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, REACHED, STAGES = range(8)
 
 MOST = 10  # iterations
-FIXED, FLOOR = 1e-13, 1e-7  # accuracy aimed at where the step is given, relative; and what must be reached
+# Accuracy aimed at where the step is given, relative; what may be left by rounding; and what must be reached.
+FIXED, ROUNDED, FLOOR = 1e-13, 1e-10, 1e-7
 ENOUGH = 0.05  # of the tolerance
 STALE = 0.03  # a Jacobian that gains less than this in an iteration is made anew for the next step
 CONVERGED, FAILED = 0, 1
 MOST_DAMPED, LEAST_PART = 40, 1e-4  # iterations, and what part of an increment is tried
+LEAST_WAY = 1 / 64  # what part of a step's length a stage is followed by
 
 
 def forget(work: np.ndarray) -> None:
@@ -119,24 +121,31 @@ def shortened(part, ahead, size):
     """
     if not size < np.inf:
         return 0.25 * part
-    if ahead >= 0.0 or size <= (1.0 - 0.25 * part) ** 2:
+    if 0.0 <= ahead <= 1.0 or size <= (1.0 - 0.25 * part) ** 2:
         return part
+    if ahead > 1.0:  # it has grown: to where the parabola through both ends is least
+        return part * min(0.5, max(0.1, 0.5 * part / (ahead - 1.0 + part)))
     return part * min(0.7, max(0.1, 1.0 / (1.0 - ahead)))
 
 
 @inner
 def goal(orders):
-    """(increment at which Newton may stop, and which it must reach), in units of the tolerance."""
+    """(increment at which Newton may stop, and at which what is left is rounding), in units of the tolerance."""
     if orders[CONTROL] == TOLERANCE:
         enough = max(1e-15 / orders[SIZE], ENOUGH)
         return enough, enough
-    return 1.0, FLOOR / FIXED
+    return 1.0, ROUNDED / FIXED
 
 
 @inner
 def tight(orders):
-    """The same where Newton is damped: as accurate as where the step is given, for f magnifies what is left."""
-    return FIXED / orders[SIZE] if orders[CONTROL] == TOLERANCE else 1.0, goal(orders)[1]
+    """The same where Newton is damped, and what it must reach where nothing gains any more.
+
+    As accurate as where the step is given, for f magnifies what is left.
+    """
+    unit = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
+    floor = goal(orders)[1] if orders[CONTROL] == TOLERANCE else FLOOR / unit
+    return FIXED / unit, min(ROUNDED / unit, floor), floor
 
 
 @inner
@@ -152,24 +161,24 @@ def find_worst(d, f, weights, memory):
 @inner
 def verdict(turn, size, before, orders, work):
     """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
-    enough, floor = goal(orders)
+    enough, rounded = goal(orders)
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
         work[RATIO] = max(work[RATIO], ratio)
-        if ratio >= 0.3 and size <= floor:  # what remains is rounding, or a kink that no iteration sees through
+        if ratio >= 0.3 and size <= rounded:
             return True, CONVERGED
         if ratio >= 0.99:
             return True, FAILED
         work[SURE] = ratio / (1.0 - ratio)
-        if work[SURE] * size * ratio ** (MOST - 1 - turn) > floor:
+        if work[SURE] * size * ratio ** (MOST - 1 - turn) > rounded:
             return True, FAILED
     else:
         work[SURE] = max(work[SURE], 1e-4) ** 0.8
     if work[SURE] * size <= enough:
         return True, CONVERGED
-    return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= floor else FAILED
+    return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= rounded else FAILED
 
 
 @inner
@@ -202,7 +211,8 @@ def damp(
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
-    enough, floor = tight(orders)
+    enough, rounded, floor = tight(orders)
+    before = np.inf
     evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
     for turn in range(MOST_DAMPED):
         for m in range(supply.shape[1]):
@@ -216,24 +226,68 @@ def damp(
             d[j] = f[j] - ki[j]
         solve(shape, store, d)
         size = sqrt(size_of(d, weights) / max(n, 1))
-        if size <= (enough if turn < MOST_DAMPED - 1 else floor):
-            for j in range(n):
-                ki[j] += shift * d[j]
-            book_increment(shape, nnz, d, supply, i, work)
-            work[DAMPED], work[RATIO], work[SURE] = memory[STEPS], 1.0, 1.0
-            return CONVERGED
-        part, tried = 1.0, 0.0
-        while part != tried and part > LEAST_PART:
+        done = size <= enough or size <= rounded and size >= 0.5 * before or size <= floor and turn == MOST_DAMPED - 1
+        part, tried, length, before = 1.0, 0.0, 0.0, size
+        while not done and part != tried and part > LEAST_PART:
             for j in range(n):
                 ki[j] += shift * (part - tried) * d[j]
             evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, other)
+            if size <= rounded:  # which way the next increment goes says nothing
+                tried = part
+                break
             solve(shape, store, other)
             ahead, length = along(d, other, weights)
             tried, part = part, shortened(part, ahead, length)
+        if part != tried and size <= floor and length < np.inf:  # rounding, or a kink that no iterate sees through
+            done = True
+        if done:
+            for j in range(n):
+                ki[j] += shift * (1.0 - tried) * d[j]
+            book_increment(shape, nnz, d, supply, i, work)
+            work[DAMPED], work[RATIO], work[SURE] = memory[STEPS], 1.0, 1.0
+            return CONVERGED
         if part != tried or not size < np.inf:
             break
     find_worst(d, f, weights, memory)
     work[HAS] = 0.0
+    return FAILED
+
+
+@inner
+def reach(
+    rhs, factor, solve, handle, shape, t, h_gamma, i, k, y, y_stage, supply, where, out, scale, orders, memory, nnz,
+    work, vectors, store,
+):  # fmt: skip
+    """The same by `damp`; where that fails and the step is given from the stage y, and last along h gamma.
+
+    There the slope of a step of no length is followed as it grows. Under a tolerance a shorter step is cheaper.
+    """
+    base, known, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + REACHED], k[i]
+    done, part, turn, worst = 0.0, 1.0, 0, memory[WORST]  # as plain Newton left it
+    while part >= LEAST_WAY:
+        if turn == 1:
+            for j in range(ki.size):
+                ki[j] = (y[j] - base[j]) / h_gamma
+        elif turn > 1:
+            copy(known, ki)
+        why = damp(
+            rhs, factor, solve, handle, shape, t, h_gamma * (done + part), i, k, y_stage, supply, where, out, scale,
+            orders, memory, nnz, work, vectors, store,
+        )  # fmt: skip
+        if why == CONVERGED:
+            done += part
+            if done == 1.0:
+                return CONVERGED
+            copy(ki, known)
+        elif orders[CONTROL] == TOLERANCE:
+            return FAILED
+        elif turn == 0:
+            for j in range(ki.size):
+                known[j] = 0.0
+        else:
+            part *= 0.5
+        memory[WORST] = worst
+        turn += 1
     return FAILED
 
 

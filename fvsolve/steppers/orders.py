@@ -3,10 +3,13 @@
 # What the loop remembers, in one flat array of floats that a restart stores.
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
 JACOBIANS, FACTORS, NEWTON, NEWTON_FAILURES, WORST, RADIUS, CASES, SWITCHES = range(12, 20)
-MEMORY = 20
+# What is left of a given step that Newton could not take whole [s], and how many there were.
+LEFT, PARTED = range(20, 22)
+MEMORY = 22
 COUNTS = {
     "steps": STEPS, "rejections": REJECTIONS, "rhs": CALLS, "jacobians": JACOBIANS, "factorisations": FACTORS,
     "newton": NEWTON, "newton_failures": NEWTON_FAILURES,
+    "parted": PARTED,
 }  # fmt: skip
 # What a call is told.
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)

@@ -89,7 +89,7 @@ class Stepper:
 
     def forget(self) -> None:
         """Remember nothing over a kink but what has been counted."""
-        self.memory[told.STEP] = self.memory[told.ERROR_OLD] = self.memory[told.CASES] = 0.0
+        self.memory[[told.STEP, told.ERROR_OLD, told.CASES, told.LEFT]] = 0.0
         if self.work.size:
             from fvsolve.steppers.newton import forget
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from fvsolve.jit import inner
 from fvsolve.steppers.coefficients import nodes_of, row_of
-from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, damp, tight
+from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, reach, tight
+from fvsolve.steppers.orders import CONTROL, TOLERANCE
 from fvsolve.steppers.step import copy
 
 MOST = 40
@@ -40,7 +41,8 @@ def sweep(
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
-    enough, floor = tight(orders)
+    enough, rounded, floor = tight(orders)
+    still = floor if orders[CONTROL] == TOLERANCE else rounded
     before = 0.0
     for i in range(1, s):
         if low[(i - 1) * s] == 0.0:
@@ -62,9 +64,9 @@ def sweep(
             if turn == 0:
                 for e in range(n):
                     k[i, e] = (y[e] - base[e]) / own
-            if damp(
-                rhs, factor, solve, handle, shape, t + c[i] * h, own, i, k, y_stage, supply, where, out, scale, orders,
-                memory, nnz, work, vectors, store,
+            if reach(
+                rhs, factor, solve, handle, shape, t + c[i] * h, own, i, k, y, y_stage, supply, where, out, scale,
+                orders, memory, nnz, work, vectors, store,
             ) == FAILED:  # fmt: skip
                 return FAILED
             last = vectors[room + i - 1]
@@ -72,7 +74,7 @@ def sweep(
                 change = h * (k[i, e] - last[e]) * weights[e]
                 total += change * change
         size = sqrt(total / max(q * n, 1))
-        if size <= enough or size <= floor and (turn >= q and size >= 0.5 * before or turn == MOST - 1):
+        if size <= enough or size <= still and turn >= q and size >= 0.5 * before or size <= floor and turn == MOST - 1:
             return CONVERGED
         before = size
     return FAILED

@@ -1,0 +1,101 @@
+"""A step whose length is given is solved at that length: no rounding cuts it, nor does the order of the parts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit
+from truth.scenes import WATER, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
+
+import fvsolve
+from fvsolve.steppers import integrate
+
+TABLE = {"name": "Water", "temperature": 293.15, "law": "table"}
+MIXTURE = {**WATER, "law": "mixture", "air_fraction": 1e-3}
+STEADY, ROUGH = {"model": "steady", "factor": 0.02}, {"model": "quasi-steady", "roughness": 1e-4}
+
+
+def closing(**numerics) -> dict:
+    """Two cells before a valve that closes to a third: Newton's increments end where rounding does, near 2e-13."""
+    main = pipe("high", "n0", 50.0, 0.2638, 800.0, 2, friction=STEADY, minor_loss=1.5)
+    out = valve("n0", "low", 0.00446885, ramp(0.5245, 0.09345, 0.352, 0.2))
+    nodes = {
+        "high": lake(35.45, elevation=0.0),
+        "low": reservoir(283e3, elevation=0.0),
+        "n0": junction(elevation=2.631),
+    }
+    return scene(nodes, {"p0": main, "out": out}, 1.0, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=TABLE)
+
+
+def fork(**numerics) -> dict:
+    """A valve beside a rigid column, a leak, a tank by two ways: a wave of one cell turns the Jacobian nearly singular.
+
+    From the last step's end the increments of Newton run into that; along a growing step the stage is plain.
+    """
+    nodes = {
+        "high": lake(34.6, elevation=0.0), "low": reservoir(262.4e3, elevation=0.0), "n0": junction(elevation=3.888),
+        "n1": {"type": "accumulator", "volume": 0.8331, "gas_volume": 0.05, "elevation": -4.406},
+        "n2": tank(1.194, 15.8, elevation=-1.168),
+    }  # fmt: skip
+    smooth = {"model": "hazen-williams", "coefficient": 110.0}
+    links = {
+        "p0": pipe("high", "n0", 177.7, 0.1062, 1286.0, 6, friction=ROUGH, minor_loss=1.5),
+        "p1": pipe("high", "n1", 220.1, 0.2634, 894.0, 2, friction=STEADY, minor_loss=1.5),
+        "p2": pipe("n0", "n2", 300.0, 0.4, 1023.0, 8, friction=STEADY, minor_loss=1.5),
+        "out": valve("n0", "low", 0.002601639, step(0.4286, 1.0, 0.5678)),
+        "x0": pipe("n0", "n2", 62.06, 0.3502, 1210.0, 4, friction=smooth, minor_loss=1.5),
+        "x1": {"type": "rigid-column", "from": "n0", "to": "low", "length": 68.0, "diameter": 0.1, "friction": STEADY},
+        "hole": {"type": "leak", "from": "n0", "coefficient": 1.929e-6},
+    }
+    return scene(nodes, links, 1.0, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=MIXTURE)
+
+
+SCENES = [
+    (closing, {"method": "implicit-euler", "scheme": "muscl", "limiter": "minmod", "courant": 3.471}),
+    (closing, {"method": "trapezoid", "scheme": "muscl", "limiter": "minmod", "courant": 3.471}),
+    (closing, {"method": "radau-iia-3", "scheme": "weno5", "courant": 0.8596}),
+    (fork, {"method": "implicit-euler", "scheme": "weno5", "courant": 1.044}),
+]
+
+
+def said(given) -> str:
+    return given.__name__ if callable(given) else " ".join(str(one) for one in given.values())
+
+
+@pytest.mark.parametrize("build, numerics", SCENES, ids=said)
+def test_newton_finds_every_stage(build, numerics):
+    result = fvsolve.run(build(**numerics))
+    assert result.reason == "finished"
+    assert result.summary["newton_failures"] == 0
+
+
+@pytest.mark.parametrize("build, numerics", SCENES, ids=said)
+def test_parts_listed_the_other_way_round_take_the_same_steps(build, numerics):
+    case = build(**numerics)
+    turned = {**case, "nodes": dict(reversed(case["nodes"].items())), "links": dict(reversed(case["links"].items()))}
+    one, other = fvsolve.run(case), fvsolve.run(turned)
+    assert one.summary["steps"] == other.summary["steps"]
+    for probe in ("n0.pressure", "out.flow"):
+        assert np.max(np.abs(one[probe] - other[probe])) < 1e-9 * np.max(np.abs(one[probe]))
+
+
+@njit
+def flares(t, y):
+    """Grows as its square for 0.3 s, then fades."""
+    return y * y if t < 0.31 else -y
+
+
+def test_a_step_without_a_solution_is_taken_in_parts_that_end_on_its_grid():
+    """z = y + h z^2 has none for 4 h y > 1: 0.3 s from 1 have none, 0.075 s and 0.225 s behind them have."""
+    counts: dict = {}
+    found = integrate(flares, [1.0], [0.0, 0.3, 0.6, 1.2], "implicit-euler", step=0.3, counts=counts)
+
+    def end(y, h):
+        return (1.0 - np.sqrt(1.0 - 4.0 * h * y)) / (2.0 * h)
+
+    top = end(end(1.0, 0.075), 0.225)
+    assert found[:, 0] == pytest.approx([1.0, top, top / 1.3, top / 1.3**3], rel=1e-12)
+    assert (counts["steps"], counts["parted"]) == (5, 1)
+    plain: dict = {}
+    integrate(flares, [0.1], [0.0, 1.2], "implicit-euler", step=0.3, counts=plain)
+    assert (plain["steps"], plain["parted"]) == (4, 0)
