@@ -23,7 +23,6 @@ from fvsolve.steppers.tableau import Method, method_named
 
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
-STATELESS_STEPS = 1000  # at least, of a scene that stores nothing: a kink within one counts less than 1e-6
 MOST_AT_ONCE = 20  # events at one time: more is chatter
 MOST_IN_A_SPAN, SPAN = 2000, 1e-6  # events within this share of the run, or within one given step: so is this
 
@@ -60,8 +59,6 @@ class Loop:
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
         self.orders[told.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
-        if numerics.rtol is not None and model.y_size == 0:  # whose kinks no state feels
-            self.orders[told.STEP_MAX] = min(model.step_max, (numerics.end - numerics.start) / STATELESS_STEPS)
         self.orders[told.STOP_AT], self.orders[told.LEAPS] = NO_LIMIT, leaps
         for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:

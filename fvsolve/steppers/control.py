@@ -49,12 +49,12 @@ def too_short(orders, memory, h):
 
 @njit(forceinline=True)
 def first_step(k, scale, orders, span):
-    """A cautious first step from the size of the rates [s]."""
+    """A cautious first step from the size of the rates, which may be about to start [s]."""
     total, tolerance = 0.0, orders[SIZE]
     for i in range(scale.size):
         total += (k[0, i] / scale[i]) ** 2
     d = sqrt(total / max(scale.size, 1))
-    return min(span, 0.05 * tolerance ** (1.0 / (orders[ORDER] + 1.0)) / d) if d > 0.0 else 1e-3 * span
+    return min(1e-3 * span, 0.05 * tolerance ** (1.0 / (orders[ORDER] + 1.0)) / d) if d > 0.0 else 1e-3 * span
 
 
 @njit(forceinline=True)

@@ -11,9 +11,10 @@ from fvsolve.steppers.step import add_up
 
 SUMS = 5
 NOISE = 1e-12  # of all that a rate has brought: what a step has less of on one side is rounding
-STRAY = 1e-6  # the same of a step at neither end of which there is any: a negative weight, or what Newton left
+STRAY = 1e-6  # of the other side, where neither end of a step has any: a negative weight, or what Newton left
 NEAR = 1e-5  # share of a step within which its turn is found; the amount feels the square of that
 TURNS = 40
+SHARE = 0.03  # of the tolerance of a step, in all that has passed: the sum over steps is then within it
 LEAST = 1e-3  # amount that counts as none [kg]
 
 
@@ -66,18 +67,32 @@ def lesser(whole, r0, r1, m, supply, dense):
 
 
 @njit
-def book_error(h, error, supply, tolerance, ledger):
-    """Greatest error of a step's amounts over the tolerance of all that has passed: what a scene without states has."""
+def book_error(h, error, k, stored, supply, tolerance, ledger):
+    """Greatest error of a step's amounts over the tolerance of all that has passed.
+
+    What goes into states that store it errs as they do, and their errors are judged already: what passes them by, or
+    comes where they are held, is not. stored : int64[q]  where those are in k : float64[s, n]
+    """
     s, count = supply.shape
-    worst, passed = 0.0, LEAST
+    worst, passed, judged = 0.0, LEAST, 0.0
+    for i in stored:
+        judged += abs(combined(error, k, i))
     for m in range(count):
-        off, moved = 0.0, 0.0
+        moved = 0.0
         for i in range(s):
-            off += error[i] * supply[i, m]
             moved = max(moved, abs(supply[i, m]))
-        worst = max(worst, h * abs(off))
+        worst = max(worst, abs(combined(error, supply, m)))
         passed += ledger[m] - ledger[count + m] + h * moved
-    return worst / (tolerance * passed)
+    return h * max(0.0, worst - judged) / (SHARE * tolerance * passed)
+
+
+@njit(forceinline=True)
+def combined(weights, rates, m):
+    """Sum of weights[i] rates[i, m]."""
+    total = 0.0
+    for i in range(weights.size):
+        total += weights[i] * rates[i, m]
+    return total
 
 
 @njit(forceinline=True)
@@ -97,22 +112,21 @@ def book(h, b, supply, dense, steep, known, end, ledger):
     """
     s, count = supply.shape
     for m in range(count):
-        whole = 0.0
-        for i in range(b.size):
-            whole += b[i] * supply[i, m]
+        whole = combined(b, supply, m)
         r0, r1, part, gross = supply[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
-        side, trace, toward = 0 if whole > 0.0 else 1, NOISE, r0 + r1
+        side, trace, toward = 0 if whole > 0.0 else 1, NOISE * gross, r0 + r1
         if toward == 0.0:
             toward = ledger[m] + ledger[count + m]
         if r0 * r1 >= 0.0 and toward != 0.0:
-            side, trace = 0 if toward > 0.0 else 1, STRAY
+            side = 0 if toward > 0.0 else 1
+            trace = max(trace, STRAY * abs(ledger[side * count + m]))
         if steep:
             r0, r1 = ledger[4 * count + m] if known else r0, supply[s - 1, m]
         ledger[4 * count + m] = supply[s - 1, m]
         if r0 * r1 < 0.0:
             part = lesser(whole, r0, r1, m, supply, dense)
         up, down = part + max(whole, 0.0), part - min(whole, 0.0)
-        if h * (down if side == 0 else up) <= trace * gross:
+        if h * (down if side == 0 else up) <= trace:
             add(ledger, m, side, h * whole)
         else:
             add(ledger, m, 0, h * up)

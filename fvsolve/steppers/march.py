@@ -79,11 +79,11 @@ def may_leap(orders, memory, times, h):
 
 
 @njit(forceinline=True)
-def judged(h, e, coefficients, supply, orders, ledger, scale):
-    """The error of a step in units of the tolerance: of a scene without states that of its amounts."""
-    if scale.size > 0 or orders[CONTROL] != TOLERANCE:
+def judged(h, e, coefficients, k, stored, supply, orders, ledger):
+    """The error of a step in units of the tolerance: the greater of its states' and of its amounts'."""
+    if orders[CONTROL] != TOLERANCE:
         return e
-    return book_error(h, error_of(coefficients, supply.shape[0]), supply, orders[SIZE], ledger)
+    return max(e, book_error(h, error_of(coefficients, k.shape[0]), k, stored, supply, orders[SIZE], ledger))
 
 
 @njit(forceinline=True)
@@ -202,7 +202,7 @@ def march(
                 if orders[CONTROL] == TOLERANCE:
                     memory[STEP] = h
                 continue
-            e = judged(h, e, coefficients, supply, orders, ledger, scale)
+            e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
             passing = rest <= 1e3 * shortest(orders, memory)
             if bearable(e, passing):
                 events(memory[T] + h, y[new], handle, g_new)
@@ -215,7 +215,7 @@ def march(
                     if e == NEWTON_FAILED:
                         return NEWTON_STUCK
                     last, memory[STEP], memory[LEFT] = last and memory[T] + h >= orders[END], 0.0, 0.0
-                    e = judged(h, e, coefficients, supply, orders, ledger, scale)
+                    e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
             if bearable(e, passing):
                 if orders[CONTROL] != TOLERANCE:
                     break
