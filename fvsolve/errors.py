@@ -30,8 +30,9 @@ class Fault:
 class Notice:
     """What is legal but to be known: one of the `warnings` of a case or a run.
 
-    kind : "start", "mesh", "step-limit", "growth", "ledger", "range", ...; place : part or section, "nodes.a"; key : of
-    it, or None; value, limit : numbers that are compared, SI, or None; ok : False where the numbers of a run are wrong
+    kind : "start", "mesh", "step-limit", "step-error", "growth", "ledger", "range", ...; place : part or section,
+    "nodes.a"; key : of it, or None; value, limit : numbers that are compared, SI, or None; ok : False where the numbers
+    of a run are wrong
     """
 
     kind: str
