@@ -52,7 +52,8 @@ class Loop:
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.within = within(model)
-        stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
+        stepper.out, stepper.out_row = model.new_out(), model.new_out()
+        stepper.values, stepper.before = np.zeros(len(model.probes)), np.zeros(len(model.probes))
         self.tanks = np.flatnonzero(model.tables[rec.I_NODES]["kind"] == rec.TANK)
         events = model.tables[rec.I_ARMED].size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)

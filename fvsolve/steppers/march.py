@@ -96,7 +96,7 @@ def bearable(e, passing):
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
     coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
-    values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, seen, work, vectors, store,
+    values, before, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, seen, work, vectors, store,
     store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
@@ -132,6 +132,7 @@ def march(
                 memory[CALLS] += 1.0
             reuse = False
             flags[PHASE] = EMIT
+            copy(values, before)
             record(memory[T], y[now], out, handle, values)
             if not all_finite(y[now]):
                 out[STATUS] = NOT_FINITE
@@ -151,7 +152,7 @@ def march(
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
                     y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
-                    seen,
+                    seen, before, values,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -263,8 +264,8 @@ def compiled():
 
     i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
     march.compile(
-        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, ints,
-         w, w, v, w, v, types.complex128[::1])
+        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, v, ints, v, v, w,
+         ints, w, w, v, w, v, types.complex128[::1])
     )  # fmt: skip
     march.disable_compile()
     return march
