@@ -21,6 +21,7 @@ from fvsolve.kernels.records import (
     NO_SOLUTION,
     NOT_CONVERGED,
     STATUS,
+    TWO_WAY,
     WHERE,
 )
 from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step, runs_back
@@ -185,6 +186,8 @@ def prepare(cluster, tables, out, g, m):
         k = integers[cluster["first_valve"] + e]
         valve = valves[k]
         g[e], m[e] = conductance(tables, out, k), valve["flow"]
+        if valve["law"] <= TWO_WAY and 0.0 < g[e] < valve["open"]:
+            m[e] *= sqrt(g[e] / valve["open"])  # at the profile's drop: all but shut, its flow would ask for any
         quiet = quiet and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
             quiet = quiet and out[layout["pressure"] + i] == 0.0
