@@ -386,7 +386,7 @@ def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
         if done == 5:
             raise KeyboardInterrupt
 
-    given = {"methods": ["auto"], "rtol": [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7], "folder": tmp_path}
+    given = {"methods": ["auto"], "rtol": [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7], "out": tmp_path}
     with pytest.raises(KeyboardInterrupt):
         chart(pot(), progress=stop, **given)
     found = chart(pot(), **given)
