@@ -7,6 +7,8 @@ from html import escape
 from importlib import import_module
 from typing import Any, ClassVar
 
+from fvsolve.doors import PATH, door
+
 SHOWN = 12  # rows of a table in a notebook; `.frame()` has them all
 
 
@@ -33,6 +35,7 @@ class Shown:
             raise FvsolveError(f"{type(self).__name__}.frame() needs pandas: pip install pandas") from None
         return pandas.DataFrame(dict(self.listed()))
 
+    @door(path=PATH)
     def plot(self, path=None):
         """Its picture as a matplotlib Figure, also written to `path` where one is given."""
         module, _, name = self.picture.partition(":")

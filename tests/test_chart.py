@@ -261,13 +261,13 @@ def test_no_overshoot_is_claimed_that_the_references_cannot_tell(tmp_path):
     }
     case = scene(nodes, links, 6.0, {}, ["gate.pressure", "tap.flow", "main.pressure@0.5"], 0.005)
     given = {"schemes": ["upwind", "upwind5"], "methods": ["euler", "rk4"], "cells": [25, 50]}
-    found = chart(case, **given, folder=tmp_path)
+    found = chart(case, **given, out=tmp_path)
     points = [json.loads(text) for text in (tmp_path / "points.jsonl").read_text().splitlines()]
     raw = [one["found"]["overshoot"] for one in points if "overshoot" in one["found"]]
     floor, *blur = raw[:3]  # of upwind euler
     assert "exact" not in found.reference and min(blur) > 1e-3 and found.floor["overshoot"] == floor > max(blur)
     assert [one.overshoot for one in found.curves()["upwind euler"]] == [0.0, 0.0]
-    exact = chart(case | {"exact": {"name": "rays"}}, **given, folder=tmp_path / "exact")
+    exact = chart(case | {"exact": {"name": "rays"}}, **given, out=tmp_path / "exact")
     points = [json.loads(text) for text in (tmp_path / "exact" / "points.jsonl").read_text().splitlines()]
     true = [one["found"]["overshoot"] for one in points if "upwind" == one["of"].get("keys", {}).get("numerics.scheme")]
     assert len(true) == 4 and max(true) < 1e-6 and exact.reference == 'exact solution "rays"'
@@ -386,7 +386,7 @@ def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
         if done == 5:
             raise KeyboardInterrupt
 
-    given = {"methods": ["auto"], "rtol": [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7], "folder": tmp_path}
+    given = {"methods": ["auto"], "rtol": [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7], "out": tmp_path}
     with pytest.raises(KeyboardInterrupt):
         chart(pot(), progress=stop, **given)
     found = chart(pot(), **given)

@@ -178,9 +178,9 @@ def test_a_method_that_cannot_go_by_the_case_is_refused_with_its_reason():
 
 def test_finished_squares_are_kept_and_reused(tmp_path):
     asked = {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 1.0]}
-    first = failures(load(closing()), points=Points(tmp_path), **asked)
+    first = failures(load(closing()), out=tmp_path, **asked)
     again = Points(tmp_path)
-    assert failures(load(closing()), points=again, **asked) == first
+    assert failures(load(closing()), out=again, **asked) == first
     assert again.reused == len((tmp_path / "points.jsonl").read_text().splitlines()) > 2
 
 

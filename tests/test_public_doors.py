@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from functools import partial
 
 import numpy as np
@@ -11,6 +12,7 @@ from test_text_as_it_stands import still
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate
+from fvsolve.output.memory import MemorySink
 from fvsolve.studies import sweep
 
 
@@ -141,3 +143,45 @@ def test_a_state_that_is_not_finite_is_refused_with_the_name_of_the_first(value,
         with pytest.raises(FvsolveError) as error:
             door()
         assert f"y[5] = {value}, {model.state_names[5]};" in str(error.value)
+
+
+WRONG = [3, None, "", [], np.zeros(3)]
+WHAT_IS_THERE = {"case": lambda m: m.case, "model": lambda m: m, "state": initial_state, "y": lambda m: m.start}
+WHAT_IS_THERE |= {"out": lambda m: m.new_out(), "sink": MemorySink, "f": lambda m: lambda t, y: -y}
+PLAIN = {"t": 0.0, "until": 0.0, "y0": [1.0], "source": "valve-closure", "directory": "nowhere", "name": "mine", "k": 0,
+         "text": "0 |\n--+--\n  | 1", "elevation": 0.0, "pressure": 1e5}  # fmt: skip
+
+
+def doors(model):
+    """All that is called in `fvsolve` and at a Model, and its arguments."""
+    names = [name for name in fvsolve.__all__ if not isinstance(getattr(fvsolve, name), type)]
+    found = {name: getattr(fvsolve, name) for name in names} | {"State": State}
+    at_model = {name: getattr(model, name) for name in dir(model) if name[0] != "_"}
+    found |= {f"Model.{name}": one for name, one in at_model.items() if callable(one) and name not in NO_DOORS}
+    return found
+
+
+NO_DOORS = ("functions", "handle", "picture")
+
+
+def test_every_door_says_what_it_wants(model, tmp_path, monkeypatch):
+    """Anything at every argument of every door is taken, or refused by a text of ours."""
+    monkeypatch.chdir(tmp_path)
+    bad = []
+    for name, door in doors(model).items():
+        wanted = inspect.signature(door).parameters.values()
+        there = {one.name: WHAT_IS_THERE[one.name](model) if one.name in WHAT_IS_THERE else PLAIN.get(one.name)
+                 for one in wanted if one.default is one.empty}  # fmt: skip
+        if name == "integrate":
+            there["t"] = [0.0, 1.0]
+        if name == "run":
+            there["case"] = model
+        for one in wanted:
+            for given in WRONG:
+                try:
+                    door(**{**there, one.name: given})
+                except FvsolveError as error:
+                    assert str(error)
+                except Exception as error:  # which none of these is
+                    bad.append((name, one.name, given, repr(error)))
+    assert bad == []

@@ -230,9 +230,9 @@ def test_limited_schemes_are_measured_between_what_their_frozen_weights_say():
 
 
 def test_rows_that_are_finished_are_reused(tmp_path):
-    first = stability(chambers(3), None, ["euler"], steps=100, folder=tmp_path).rows
+    first = stability(chambers(3), None, ["euler"], steps=100, out=tmp_path).rows
     before = (tmp_path / "points.jsonl").read_text()
-    again = stability(chambers(3), None, ["euler"], steps=100, folder=tmp_path).rows
+    again = stability(chambers(3), None, ["euler"], steps=100, out=tmp_path).rows
     assert again[0].plain() == first[0].plain() and (tmp_path / "points.jsonl").read_text() == before
 
 

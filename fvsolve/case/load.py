@@ -16,6 +16,7 @@ from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, override, read_raw
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
@@ -56,6 +57,7 @@ TOP = {
 }
 
 
+@door(set=TABLE)
 def load(source: str | Path | Mapping[str, Any] | Case, set: Mapping[str, Any] | None = None) -> Case:
     """The case of a TOML file, the name of a shipped one, a dict shaped like a file, or a case, `set` overriding keys.
 

@@ -42,7 +42,7 @@ def order(
     folder = folder_of(scene, "order", out)
     with told() as progress, Points(folder) as points:
         found = study(scene, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
-                      methods=methods_of(method), against=against, points=points, progress=progress)  # fmt: skip
+                      methods=methods_of(method), against=against, out=points, progress=progress)  # fmt: skip
     found = found if isinstance(found, list) else [found]
     files = [write_table(folder / "order.csv", found), *draw(folder, found)]
     if as_json:

@@ -57,7 +57,7 @@ def stability(
             time_of(at),
             before,
             steps or STEPS,
-            folder=folder,
+            out=folder,
             progress=progress,
         )
     files = [write(folder / "stability.csv", found.rows)]

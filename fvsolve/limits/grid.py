@@ -16,6 +16,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from fvsolve.doors import NAME, NUMBER, door
 from fvsolve.errors import FvsolveError
 from fvsolve.limits.boxes import negative_point, value
 from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
@@ -86,6 +87,7 @@ class AdvectionLimit:
         return found
 
 
+@door(scheme=NAME, method=NAME, courant=NUMBER)
 def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """The exact Courant limit of a linear scheme and a method, and the growth at `courant`.
 

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from fvsolve.errors import CaseError, Fault, Notice
+from fvsolve.case.case import Case
+from fvsolve.errors import CaseError, Fault, FvsolveError, Notice
 from fvsolve.kernels import emitters, limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
@@ -37,6 +38,8 @@ def build(case) -> Model:
     Raises CaseError where no start can be found: a frictionless pipe between unequal heads, a demand that nothing
     can bring, a node joined only by rigid columns.
     """
+    if not isinstance(case, Case):
+        raise FvsolveError(f"build takes a Case, not {type(case).__name__}; wanted what load() gives")
     scene = Scene(case)
     scene.nodes()
     scene.links()

@@ -233,6 +233,9 @@ class Model(Shown):
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
         t, y = self.given(t, y)
+        limit = given_numbers("limit", limit)
+        if limit.ndim or np.isnan(limit):
+            raise FvsolveError(f"limit = {show(limit)} is no time; wanted a number of seconds, or infinity")
         self.tables[rec.I_SETTINGS][0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
         self.arm(t, y)
@@ -275,7 +278,11 @@ class Model(Shown):
     def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
         """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
         waves = given_numbers("waves", waves)
-        if not 0 <= k < len(self.pipes) or waves.shape != (self.pipes[k].cells,):
+        if (
+            not isinstance(k, (int, np.integer))
+            or not 0 <= k < len(self.pipes)
+            or waves.shape != (self.pipes[k].cells,)
+        ):
             raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; wanted a number for each cell of one of "
                                f"{len(self.pipes)} pipes, counted from 0")  # fmt: skip
         row = self.tables[rec.I_PIPES][k]
@@ -315,13 +322,16 @@ class Model(Shown):
         from fvsolve.kernels.density import density
 
         st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
-        return np.array([density(st, floats, float(p)) for p in pressure])
+        return np.array([density(st, floats, float(p)) for p in np.atleast_1d(given_numbers("pressure", pressure))])
 
     def swollen(self, row, pressure: np.ndarray) -> np.ndarray:
         """Area [m2] of a pipe at pressures, under all laws but linear."""
         from fvsolve.kernels.density import wall_area
 
-        return np.array([wall_area(self.tables[rec.I_SETTINGS][0], row, float(p)) for p in pressure])
+        if not isinstance(row, np.void):
+            raise FvsolveError(f"row = {show(row)} is no pipe; wanted a row of the table of pipes")
+        pressures = np.atleast_1d(given_numbers("pressure", pressure))
+        return np.array([wall_area(self.tables[rec.I_SETTINGS][0], row, float(p)) for p in pressures])
 
     def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it."""

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from fvsolve.doors import CALL, FLAG, PATH, TABLE, door
 from fvsolve.errors import CaseError, RunError
 from fvsolve.output.directory import RunDirectory, pictures, read_directory
 from fvsolve.output.memory import MemorySink
@@ -20,6 +21,7 @@ from fvsolve.run.result import Result
 __all__ = ["Result", "open_run", "run"]
 
 
+@door(set=TABLE, out=PATH, force=FLAG, resume=FLAG, progress=CALL)
 def run(
     case,
     set: Mapping | None = None,
@@ -54,6 +56,7 @@ def run(
         sink.close()
 
 
+@door(directory=PATH)
 def open_run(directory: str | Path) -> Result:
     """Read a run directory back; RunError where it holds no run that ended."""
     return Result(*read_directory(Path(directory)))

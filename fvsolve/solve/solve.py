@@ -26,6 +26,7 @@ from fvsolve.solve.summary import (
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.ledger import SUMS
+from fvsolve.units import show
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
@@ -44,6 +45,8 @@ class MemoryMisfit(RunError):
 
 def initial_state(model: Model) -> State:
     """The state a model starts from: no deviation from its profile, but where a dam breaks."""
+    if not isinstance(model, Model):
+        raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}; wanted what build() gives")
     return State(model.case.numerics.start, model.start.copy())
 
 
@@ -57,7 +60,11 @@ def solve(model: Model, state: State, sink, progress=None) -> Summary:
     if progress is not None and not callable(progress):
         raise FvsolveError(f"progress = {progress!r} cannot be called; wanted progress(t, seconds, steps)")
     model.given(state.t, state.y)
-    return Run(model, state, sink, progress).go()
+    run = Run(model, state, sink, progress)
+    lacks = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
+    if lacks:
+        raise FvsolveError(f"sink = {show(sink)} is none: it has no {listing(lacks)}()")
+    return run.go()
 
 
 class Run:

@@ -41,11 +41,13 @@ def integrate(
     Raises FvsolveError for two step settings, a method without an error estimate and no step, times out of order,
     and where the solution does not stay finite or Newton fails.
     """
-    watched = method == AUTO
+    watched = isinstance(method, str) and method == AUTO
     if watched and step is not None:
         raise FvsolveError('method "auto" goes by the error of its steps; give rtol, not step')
     if not isinstance(method, (str, Method)):
         raise FvsolveError(f"method = {method!r} is none; wanted a name or a tableau")
+    if not callable(f):
+        raise FvsolveError(f"f = {f!r} cannot be called; wanted f(t, y) or f(t, y, dydt)")
     if counts is not None and not isinstance(counts, dict):
         raise FvsolveError(f"counts = {counts!r} cannot be filled; wanted a dict")
     method = method_named(automatic.first_method(method)) if isinstance(method, str) else method
@@ -144,8 +146,6 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
 
 def _try_out(f, t, y0) -> None:
     """Compiled code cannot see how many values f gives, so it is asked once before."""
-    if not callable(f):
-        raise FvsolveError(f"f = {f!r} cannot be called; wanted f(t, y) or f(t, y, dydt)")
     if not in_place(f):
         given = f(t, y0.copy())
         count = 0 if given is None else np.size(given)

@@ -10,6 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from fvsolve.doors import COUNT, ROW, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
 from fvsolve.steppers.collocation import collocation, extrapolated
@@ -155,6 +156,7 @@ class Method:
         return Conditions(self.exact.a, self.rounding)
 
 
+@door(name=TEXT, dense=ROW, start_weight=TEXT, numbers=TABLE, digits=COUNT, source=TEXT)
 def tableau(
     name: str, text: str | Sequence, b: Sequence | None = None, c: Sequence | None = None, *, source: str = "user",
     dense: Sequence = (), start_weight: str | None = None, numbers: Mapping[str, tuple[str, float]] | None = None,
@@ -175,6 +177,8 @@ def tableau(
     if name in OWN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'"{name}" is not free: it is empty or names a method of the package; choose another name')
     if b is not None:
+        if isinstance(text, str):
+            raise FvsolveError("b is given beside a text, which has it; wanted A, b, c in numbers, or the text alone")
         text = printed(text, b, c)
     elif not isinstance(text, str):
         raise FvsolveError(f'method "{name}": A alone is no method; give tableau(name, A, b) or tableau(name, A, b, c)')

@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
+from fvsolve.doors import PATH, Kind
 from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import plain
@@ -65,3 +67,11 @@ def key_of(case, extra: dict) -> str:
     """A name for a case with settings: what it says, what it computes with, and the settings."""
     who = identity(case) | {"resolved": case.resolved(), "extra": plain(extra)}
     return hashlib.sha256(json.dumps(who, sort_keys=True).encode()).hexdigest()[:24]
+
+
+OUT = Kind(lambda given: PATH.holds(given) or isinstance(given, Points), PATH.wanted)
+
+
+def kept_in(out: str | Path | Points | None):
+    """Points of a folder, to be closed again, or those of a caller who goes on with them."""
+    return nullcontext(out) if isinstance(out, Points) else Points(out)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.text import inline
+from fvsolve.doors import CALL, COUNT, PATH, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.shown import Shown
 from fvsolve.studies.outcome import grown, refusal
@@ -74,6 +75,7 @@ class Sweep(Shown):
         return pasted(value) if name in self.keys else "" if value is None else value
 
 
+@door(vary=TABLE, set=TABLE, jobs=COUNT, out=PATH, progress=CALL)
 def sweep(
     case,
     vary: Mapping[str, Sequence[Any]],

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
+from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, PATH, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
@@ -95,6 +96,17 @@ class Chart(Shown):
         return asdict(self) | {"stands": stands} | ({} if self.aim is None else {"paste": "\n".join(self.aim.lines())})
 
 
+@door(
+    set=TABLE,
+    schemes=NAMES,
+    methods=NAMES,
+    cells=NUMBERS,
+    rtol=NUMBERS,
+    step=NUMBERS,
+    target=NUMBER,
+    out=PATH,
+    progress=CALL,
+)
 def chart(
     case,
     set: Mapping | None = None,
@@ -104,17 +116,17 @@ def chart(
     rtol: Sequence[float] | None = None,
     step: Sequence[float] | None = None,
     target: float | None = None,
-    folder: Path | None = None,
-    progress: Told = lambda done, total, what: None,
+    out: str | Path | None = None,
+    progress: Told | None = None,
 ) -> Chart:
     """Run a case over schemes x methods x cells (or tolerances) and lay error against cost.
 
     cells : of the pipe a wave takes longest to cross; rtol, step : of a case without cells [-], [s]
     target : an error over the trajectory for which a setting is to be found and run
-    folder : where finished points are kept and found again. Raises CaseError, FvsolveError.
+    out : folder where finished points are kept and found again. Raises CaseError, FvsolveError.
     """
-    with Points(folder) as kept:
-        return _Study(case, set, kept, progress).go(schemes, methods, cells, rtol, step, target)
+    with Points(out) as kept:
+        return _Study(case, set, kept, progress or (lambda *_: None)).go(schemes, methods, cells, rtol, step, target)
 
 
 def toml(value) -> str:

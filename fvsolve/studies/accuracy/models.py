@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.doors import CALL, NUMBER, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
 from fvsolve.kernels import records as rec
@@ -146,6 +147,7 @@ class Ladder:
         return own | laws | rungs | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
 
 
+@door(set=TABLE, target=NUMBER, progress=CALL)
 def ladder(
     case,
     set: Mapping | None = None,

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from fvsolve.doors import CALL, COUNT, NAMES, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.shown import Shown
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.outcome import Told, names, without_basins
-from fvsolve.studies.points import Points
+from fvsolve.studies.points import OUT, Points, kept_in
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
 
@@ -88,11 +90,26 @@ class Order(Shown):
         }  # fmt: skip
 
 
+@door(
+    set=TABLE,
+    refine=TEXT,
+    key=TEXT,
+    levels=COUNT,
+    cells=COUNT,
+    schemes=NAMES,
+    methods=NAMES,
+    against=TEXT,
+    initial=CALL,
+    source=CALL,
+    exact=CALL,
+    out=OUT,
+    progress=CALL,
+)
 def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
     cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
     against: str = "auto", initial: Callable | None = None, source: Callable | None = None,
-    exact: Callable | None = None, points: Points | None = None, progress: Told | None = None,
+    exact: Callable | None = None, out: str | Path | Points | None = None, progress: Told | None = None,
 ) -> Order | list[Order]:  # fmt: skip
     """Errors of a case over a refinement and the order at which they fall; a list where several are asked for.
 
@@ -103,7 +120,7 @@ def order(
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
     exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start where `initial` is left out
-    points : finished rows, reused; progress(done, total, next)
+    out : folder where finished rows are kept and found again; progress(done, total, next)
     Raises CaseError, FvsolveError.
     """
     if against not in REFERENCES:
@@ -111,8 +128,9 @@ def order(
             f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}; wanted {", ".join(REFERENCES)}'
         )
     told, found = progress or (lambda *_: None), []
-    for scheme in names(schemes) or [None]:
-        for method in names(methods) or [None]:
+    pairs = [(scheme, method) for scheme in names(schemes) or [None] for method in names(methods) or [None]]
+    with kept_in(out) as points:
+        for scheme, method in pairs:
             given = {"numerics.scheme": scheme, "numerics.method": method}
             settings = {**(set or {}), **{name: value for name, value in given.items() if value is not None}}
             found.append(

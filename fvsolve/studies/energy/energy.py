@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.doors import CALL, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.kernels import records as rec
 from fvsolve.model.energy_ledger import Account
@@ -144,6 +145,7 @@ PLAIN = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipated",
          "law": "law_loss"}  # fmt: skip
 
 
+@door(set=TABLE, port=TEXT, progress=CALL)
 def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """The ledger of energy of a run of a case with keys changed; `case` as `run` takes it, or a Model.
 

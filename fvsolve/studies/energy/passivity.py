@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.doors import CALL, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.model.schemes import LINEAR, ORDER
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT
@@ -93,6 +94,7 @@ def finite(value: float | None) -> float | None:
     return None if value is None or math.isinf(value) else value
 
 
+@door(schemes=NAMES, methods=NAMES, progress=CALL)
 def passivity(schemes=None, methods=None, progress=None) -> Passivity:
     """The claims of the named schemes and methods, else of all. Raises FvsolveError for unknown ones.
 

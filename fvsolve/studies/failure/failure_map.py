@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
+from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, ROW, TABLE, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.failure.columns import Columns, columns, default_schemes
 from fvsolve.studies.failure.converged import Converged, converged
@@ -15,7 +17,7 @@ from fvsolve.studies.failure.eigen_limit import LINEAR_TWIN, greatest_step, spec
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
 from fvsolve.studies.outcome import Told, names, without_basins
-from fvsolve.studies.points import Points
+from fvsolve.studies.points import OUT, Points, kept_in
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # mean error over the range of a probe
@@ -68,10 +70,21 @@ class FailureMap:
         return said | {"squares": [_plain(one) for one in self.squares]}
 
 
+@door(
+    schemes=NAMES,
+    methods=NAMES,
+    courants=NUMBERS,
+    steps=NUMBERS,
+    key=ROW,
+    tolerance=NUMBER,
+    out=OUT,
+    progress=CALL,
+    set=TABLE,
+)
 def failures(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
-    key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, points: Points | None = None,
+    key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | Points | None = None,
     progress: Told | None = None, set: Mapping | None = None,
 ) -> FailureMap:  # fmt: skip
     """Run every method, under every scheme, at every step (or value of a key), and say what became of each run.
@@ -79,6 +92,7 @@ def failures(
     case : what `load` takes; schemes, methods : see `default_schemes` and METHODS; courants or steps [s] : the
     columns; with key = (NAME, values) these are the columns, and one step, one Courant number, or else the case's own
     control holds.
+    out : folder where finished squares are kept and found again; progress(done, total, next)
     tolerance : mean error over the range of a probe. Raises FvsolveError for names and numbers that are none, and
     where the reference is no better than the tolerance asks.
     """
@@ -91,17 +105,19 @@ def failures(
     base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
     across = columns(case, base, courants, steps, key)
     schemes, methods = _known(names(schemes) or default_schemes(case, across), names(methods) or METHODS)
-    trials = Trials(case, base, across, tolerance, points or Points())
     asked = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(across.sets))]
     squares = []
-    for scheme, method, k in asked:
-        if progress:
-            progress(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
-        squares.append(trials.square(scheme, method, k))
+    with kept_in(out) as points:
+        trials = Trials(case, base, across, tolerance, points)
+        for scheme, method, k in asked:
+            if progress:
+                progress(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
+            squares.append(trials.square(scheme, method, k))
+        words = trials.reference(0).words
     limited = tuple(name for name in schemes if name in LINEAR_TWIN and across.wave_rate)
     return FailureMap(
         case.name, across.name, tuple(across.values), schemes, methods, tuple(squares), tolerance,
-        trials.reference(0).words, trials.doubt, across.wave_rate, limited,
+        words, trials.doubt, across.wave_rate, limited,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import schedule_value
@@ -93,6 +94,7 @@ def state_unit(name: str, opens: bool) -> str:
     return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
 
 
+@door(inputs=NAMES, outputs=NAMES, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def linearise(
     case, inputs=(), outputs=None, at: float | None = None, before: bool = False, scheme: str | None = None, set=None,
 ) -> Linear:  # fmt: skip

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.doors import FLAG, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.ports.state_space import TOLERANCE, StateVerdict, Transfer, state_positive_real
 
@@ -68,6 +69,7 @@ class Response:
         }  # fmt: skip
 
 
+@door(port=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def response(
     case, port: str, at: float | None = None, before: bool = False, scheme: str | None = None,
     set: Mapping | None = None, frequencies: np.ndarray | None = None,

@@ -9,19 +9,20 @@ and r the method's SSP radius (Harten 1983); and where real runs grow, from thre
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 
 import numpy as np
 
+from fvsolve.doors import CALL, COUNT, NAMES, door
 from fvsolve.errors import FvsolveError
 from fvsolve.limits.grid import AdvectionLimit, limit_of
 from fvsolve.limits.symbol import WEIGHTS, Weights
 from fvsolve.model.schemes import LIMITERS
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.tableau import method_named
-from fvsolve.studies.outcome import names
+from fvsolve.studies.outcome import Told, names
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
@@ -99,15 +100,17 @@ class LimitedLimit:
         return found
 
 
+@door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
 def limited_limits(
     schemes: Sequence[str] = LIMITED, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
-    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+    progress: Told | None = None,
 ) -> list[LimitedLimit]:  # fmt: skip
     """Limited schemes, muscl with each limiter, and explicit methods; runs of `steps`, 10 and 100 times as many.
 
     Raises FvsolveError for names that are none, implicit methods, and a circle or a run that is too short.
     """
     check_size(cells, steps)
+    told = progress or (lambda *_: None)
     schemes, named = names(schemes), [method_named(name) for name in names(methods) or METHODS]
     implicit = [one.name for one in named if not one.explicit]
     if implicit:
@@ -116,7 +119,7 @@ def limited_limits(
     pairs = [(*kind, one.name) for one in dict.fromkeys(named) for kind in kinds]
     found = []
     for scheme, limiter, method in pairs:
-        progress(len(found), len(pairs), f"{scheme} {limiter or ''} with {method}")
+        told(len(found), len(pairs), f"{scheme} {limiter or ''} with {method}")
         found.append(limited_limit(scheme, limiter, method, cells, steps))
     return found
 

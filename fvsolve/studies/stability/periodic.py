@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from fvsolve.doors import CALL, COUNT, NAMES, door
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
@@ -24,7 +25,7 @@ from fvsolve.steppers.ode import watchers
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
-from fvsolve.studies.outcome import names
+from fvsolve.studies.outcome import Told, names
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
@@ -76,15 +77,17 @@ class Circle:
         return stepper.y[stepper.flags[told.NOW]].copy()
 
 
+@door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
 def measured_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
-    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+    progress: Told | None = None,
 ) -> list[Measured]:  # fmt: skip
     """Predicted and measured limits of linear schemes and explicit methods, all of them by default.
 
     Raises FvsolveError for names that are none, and for a circle or a run that is too short.
     """
     check_size(cells, steps)
+    told = progress or (lambda *_: None)
     schemes = names(schemes) or list(WEIGHTS)
     named = [method_named(name) for name in names(methods) or ()] or list(METHODS.values())
     pairs = [(scheme, one.name) for one in dict.fromkeys(named) if one.explicit for scheme in schemes]
@@ -92,7 +95,7 @@ def measured_limits(
         weights_of(scheme)
     found = []
     for scheme, method in pairs:
-        progress(len(found), len(pairs), f"{scheme} with {method}")
+        told(len(found), len(pairs), f"{scheme} with {method}")
         found.append(measured_limit(scheme, method, cells, steps))
     return found
 
