@@ -391,9 +391,8 @@ def step_clusters(sweep, out, tables, space):
                 done[which] = 0.0
         if done[which] == 0.0:
             past[which] = moved[which]
-            moved[which] = newton_step(
-                cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide[which] == 1.0, rest
-            )
+            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide[which] == 1.0, rest)
+            moved[which] = max(0.0, step)  # one that is no number ends here: the rates say it
         a, b = i, j
 
 
