@@ -213,12 +213,10 @@ def test_what_bounds_the_step_is_of_its_own_state_alone_and_no_table_is_written(
 
 
 def test_the_pattern_of_the_jacobian_holds_while_cavities_are_open():
-    """But for rounding: all clusters of nodes share their sweeps of Newton, and one sweep more moves a last digit."""
     model = fvsolve.build(fvsolve.load(network()))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 0.25)
     pattern = sparsity(model).toarray()[: model.y_size]
-    found = np.abs(model.jacobian(state.t, state.y))
-    assert np.all(np.where(pattern, 0.0, found) <= 1e-9 * found.max(axis=1, keepdims=True))
+    assert not np.any(model.jacobian(state.t, state.y)[pattern == 0])
 
 
 def test_without_an_event_nothing_moves_by_one_bit():

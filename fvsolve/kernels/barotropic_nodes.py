@@ -336,64 +336,90 @@ def is_quiet(cluster, tables, out):
 
 @njit
 def node_space(tables):
-    """Scratch of all clusters: (slope, c, held, group, quiet of nodes, conductance and flow of valves, the rest)."""
+    """Scratch of all clusters: (slope, c, held, group of nodes, conductance and flow of valves, the rest)."""
     n, v, work = tables[I_NODES].size, tables[I_VALVES].size, tables[I_SCRATCH]
-    g, m, rest = work[5 * n : 5 * n + v], work[5 * n + v : 5 * n + 2 * v], work[5 * n + 2 * v :]
-    return work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n], work[4 * n : 5 * n], g, m, rest
+    g, m, rest = work[4 * n : 4 * n + v], work[4 * n + v : 4 * n + 2 * v], work[4 * n + 2 * v :]
+    return (
+        work[:n],
+        work[n : 2 * n],
+        work[2 * n : 3 * n],
+        work[3 * n : 4 * n],
+        g,
+        m,
+        rest[4 * tables[I_CLUSTERS].size :],
+    )
+
+
+@njit
+def cluster_space(tables):
+    """How far each cluster is: (whether it is done, its last change and the one before it, wide: as of `lift_of`)."""
+    n, v, many = tables[I_NODES].size, tables[I_VALVES].size, tables[I_CLUSTERS].size
+    work = tables[I_SCRATCH][4 * n + 2 * v :]
+    return work[:many], work[many : 2 * many], work[2 * many : 3 * many], work[3 * many : 4 * many]
 
 
 @njit
 def begin_clusters(out, tables, space):
-    """Flows and openings of all clusters before Newton's first step."""
-    clusters, (_, c, held, _, quiet, g, m, _) = tables[I_CLUSTERS], space
+    """Flows and openings of all clusters before Newton's first step; done: as in the profile, but for pipe ends."""
+    clusters, (_, c, held, _, g, m, _), (done, moved, _, wide) = tables[I_CLUSTERS], space, cluster_space(tables)
     a, b = 0, 0
     for which in range(clusters.size):
         cluster = clusters[which]
         i, j = a + cluster["nodes"], b + cluster["valves"]
         unchanged = prepare(cluster, tables, out, g[b:j], m[b:j])
-        quiet[which] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+        done[which] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+        moved[which], wide[which] = 1e300, 1.0
         find_held(cluster, tables, g[b:j], held[a:i])
         shut_out(cluster, tables, g[b:j], m[b:j], held[a:i])
         a, b = i, j
 
 
 @njit
-def step_clusters(sweep, out, tables, wide, space):
-    """A Newton step of all clusters that something reaches; returns the greatest change, relative; wide: `lift_of`."""
-    clusters, (slope, c, held, _, quiet, g, m, rest) = tables[I_CLUSTERS], space
-    a, b, moved = 0, 0, 0.0
+def step_clusters(sweep, out, tables, space):
+    """A Newton step of every cluster that something reaches and that is not done."""
+    clusters, (slope, c, held, _, g, m, rest), (done, moved, past, wide) = (
+        tables[I_CLUSTERS], space, cluster_space(tables),
+    )  # fmt: skip
+    a, b = 0, 0
     for which in range(clusters.size):
         cluster = clusters[which]
         i, j = a + cluster["nodes"], b + cluster["valves"]
-        if sweep == 1 and quiet[which] == 1.0 and not is_quiet(cluster, tables, out):
-            quiet[which] = 0.0
-        if quiet[which] == 0.0:
-            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide, rest)
-            moved = max(moved, step)
+        if sweep == 1 and done[which] == 1.0:
+            if is_quiet(cluster, tables, out):
+                moved[which] = 0.0
+            else:
+                done[which] = 0.0
+        if done[which] == 0.0:
+            past[which] = moved[which]
+            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide[which] == 1.0, rest)
+            moved[which] = max(0.0, step)  # one that is no number ends here: the rates say it
         a, b = i, j
-    return moved
 
 
 @njit
-def any_backwards(tables, space):
-    """`any_back` of all clusters."""
-    clusters, m, b = tables[I_CLUSTERS], space[6], 0
+def settle_clusters(out, tables, space):
+    """Which clusters are done, each by its own last change; returns whether one goes on."""
+    clusters, m, (done, moved, past, wide), b, on = tables[I_CLUSTERS], space[5], cluster_space(tables), 0, False
     for which in range(clusters.size):
         j = b + clusters[which]["valves"]
-        if any_back(clusters[which], tables, m[b:j]):
-            return True
+        if done[which] == 0.0 and settled(moved[which], past[which]):
+            if wide[which] == 1.0 and any_back(clusters[which], tables, m[b:j]):
+                moved[which], wide[which] = 1e300, 0.0
+            else:
+                done[which] = 1.0
+        on = on or done[which] == 0.0
         b = j
-    return False
+    return on
 
 
 @njit
-def finish_clusters(out, tables, space, moved):
-    """Write the flows of all clusters' valves; `moved` is Newton's last change."""
-    clusters, (_, c, held, group, _, g, m, _) = tables[I_CLUSTERS], space
+def finish_clusters(out, tables, space):
+    """Write the flows of all clusters' valves."""
+    clusters, (_, c, held, group, g, m, _), moved = tables[I_CLUSTERS], space, cluster_space(tables)[1]
     a, b = 0, 0
     for which in range(clusters.size):
         i, j = a + clusters[which]["nodes"], b + clusters[which]["valves"]
-        finish(clusters[which], tables, out, g[b:j], m[b:j], c[a:i], held[a:i], group[a:i], moved)
+        finish(clusters[which], tables, out, g[b:j], m[b:j], c[a:i], held[a:i], group[a:i], moved[which])
         a, b = i, j
 
 
@@ -401,18 +427,16 @@ def finish_clusters(out, tables, space, moved):
 def close_nodes_barotropic(t, y, out, tables):
     """Pressure deviation of every node, flow of every valve and both waves at every pipe end, by Newton.
 
-    All clusters take a step, then all pipe ends are evaluated again. A cluster that nothing reaches stays as it is.
+    All clusters that are not done take a step, then all pipe ends are evaluated again. Each stops by itself, so that
+    none depends on what is elsewhere; one that nothing reaches stays as it is.
     """
     space = node_space(tables)
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
-    moved, before, wide = 1e300, 1e300, True
     for sweep in range(1, 101):
         ends_into_nodes(out, tables, space[0], False)
-        before, moved = moved, step_clusters(sweep, out, tables, wide, space)
-        if settled(moved, before):
-            if not (wide and any_backwards(tables, space)):
-                break
-            moved, wide = 1e300, False
-    finish_clusters(out, tables, space, moved)
+        step_clusters(sweep, out, tables, space)
+        if not settle_clusters(out, tables, space):
+            break
+    finish_clusters(out, tables, space)
     ends_into_nodes(out, tables, space[0], True)

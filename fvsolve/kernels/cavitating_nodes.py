@@ -6,14 +6,14 @@ that lets go more than the speed of sound hears nothing of its node, and no pres
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import (
-    any_backwards,
     begin_clusters,
+    cluster_space,
     finish_clusters,
     given_flows,
     node_space,
+    settle_clusters,
     step_clusters,
 )
-from fvsolve.kernels.clusters import settled
 from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.mixture import mixture_enthalpy, mixture_volume
 from fvsolve.kernels.records import (
@@ -27,9 +27,6 @@ from fvsolve.kernels.records import (
     I_SCRATCH,
     I_SETTINGS,
     JUNCTION,
-    NOT_CONVERGED,
-    STATUS,
-    WHERE,
 )
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
 
@@ -121,15 +118,17 @@ def cavitating_ends(out, tables, slope, final):
 
 @njit
 def hold_back(sweep, out, tables, before, low, high):
-    """Keep Newton's step of every node inside what is known of its root; returns (greatest change, relative, whose).
+    """Keep Newton's step of every node inside what is known of its root; note how far each cluster moved, relative.
 
     A node alone in its cluster takes in less the higher its pressure is, so each step bounds its root on one side;
     after a while the bounds are halved. Others keep above the floor, and then take half steps.
     """
     st, nodes, clusters = tables[I_SETTINGS][0], tables[I_NODES], tables[I_CLUSTERS]
-    pressure, floor, moved = tables[I_LAYOUT][0]["pressure"], st["floor"], 0.0
-    worst = -1
+    pressure, floor, (done, moved, _, _) = tables[I_LAYOUT][0]["pressure"], st["floor"], cluster_space(tables)
     for which in range(clusters.size):
+        if done[which] == 1.0 or clusters[which]["nodes"] == 0:
+            continue
+        moved[which] = 0.0
         for k in range(clusters[which]["nodes"]):
             i = tables[I_INTEGERS][clusters[which]["first_node"] + k]
             base = nodes[i]["pressure"]
@@ -141,36 +140,38 @@ def hold_back(sweep, out, tables, before, low, high):
                 if sweep > LONG or not low[i] < q < high[i]:  # a kink can lead Newton to and fro
                     q = max(between(floor, low[i], high[i], p), least)
             out[pressure + i] = q - base
-            if abs(q - p) > moved * (1e5 + abs(p)):
-                moved, worst = abs(q - p) / (1e5 + abs(p)), i
-    return moved, worst
+            moved[which] = max(moved[which], abs(q - p) / (1e5 + abs(p)))
+
+
+@njit
+def unbind(tables, low, high, first):
+    """Forget the bounds of clusters that begin: at the first sweep, and where the wide look at lifts is over."""
+    clusters, (_, moved, _, _) = tables[I_CLUSTERS], cluster_space(tables)
+    for which in range(clusters.size):
+        if first or moved[which] == 1e300:
+            for k in range(clusters[which]["nodes"]):
+                i = tables[I_INTEGERS][clusters[which]["first_node"] + k]
+                low[i], high[i] = tables[I_SETTINGS][0]["floor"], UNBOUNDED
 
 
 @njit
 def close_nodes_cavitating(t, y, out, tables):
-    """`close_nodes_barotropic` above the law's floor; done when no pressure changes."""
-    space, n, work, st = node_space(tables), tables[I_NODES].size, tables[I_SCRATCH], tables[I_SETTINGS][0]
+    """`close_nodes_barotropic` above the law's floor; a cluster is done when none of its pressures changes."""
+    space, n, work = node_space(tables), tables[I_NODES].size, tables[I_SCRATCH]
     pressure, last = tables[I_LAYOUT][0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
-    low[:], high[:] = st["floor"], UNBOUNDED
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
-    moved, before, worst, wide = 1e300, 1e300, -1, True
     for sweep in range(1, 101):
+        unbind(tables, low, high, sweep == 1)
         cavitating_ends(out, tables, space[0], False)
         for i in range(n):
             last[i] = out[pressure + i]
-        step_clusters(sweep, out, tables, wide, space)
-        before = moved
-        moved, worst = hold_back(sweep, out, tables, last, low, high)
-        if settled(moved, before):
-            if not (wide and any_backwards(tables, space)):
-                break
-            moved, wide = 1e300, False
-            low[:], high[:] = st["floor"], UNBOUNDED
-    finish_clusters(out, tables, space, moved)
-    if out[STATUS] == NOT_CONVERGED:
-        out[WHERE] = worst
+        step_clusters(sweep, out, tables, space)
+        hold_back(sweep, out, tables, last, low, high)
+        if not settle_clusters(out, tables, space):
+            break
+    finish_clusters(out, tables, space)
     cavitating_ends(out, tables, space[0], True)
 
 

@@ -336,7 +336,7 @@ class Scene:
         system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in self.cluster_table), default=0)
         rigid = int(np.sum(self.node_table["columns"] > 1))
         system = max(system, rigid * (rigid + 3))
-        system += 7 * len(self.node_table) + 2 * len(self.valve_table)
+        system += 6 * len(self.node_table) + 2 * len(self.valve_table) + 4 * len(self.cluster_table)
         many = len(self.scalar_table)
         carried = many * len(self.node_table)
         layout = np.zeros(1, rec.LAYOUT)
