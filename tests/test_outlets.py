@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from truth.scenes import AMBIENT, RHO, WATER, chamber, inflow, junction, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.studies.energy.energy import energy
 
 ADAPTIVE = ("auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "tr-bdf2", "dormand-prince", "bogacki-shampine")
 FIXED = ("rk4", "implicit-euler", "trapezoid", "implicit-midpoint")
@@ -56,6 +57,7 @@ def demands(gauge: float) -> float:
 LAWS = {"leak": leaks, "demand": demands}
 TURNS = [0.0, 6.0, 14.0, 25.0, 40.0]
 FILLS = [0.03, -0.02, 0.025, -0.015]  # [m3/s]
+OUTSIDE = {"leak": "way", "demand": "town.demand"}
 SOFT = WATER | {"bulk_modulus": 3e5}
 
 
@@ -70,8 +72,8 @@ def left(outlet: str) -> float:
     return RHO * float(y[1])
 
 
-def ball(outlet: str, numerics: dict, every: float = 1.0, law: str = "linear"):
-    """That ball, run, and its row in the mass ledger."""
+def ball(outlet: str, numerics: dict, law: str = "linear") -> dict:
+    """That ball."""
     nodes = {
         "mouth": inflow({"time": TURNS[:-1], "value": FILLS, "kind": "step"}),
         "ball": chamber(1.0, AMBIENT + 5e4), "town": junction(0.02, **NEED),
@@ -80,20 +82,40 @@ def ball(outlet: str, numerics: dict, every: float = 1.0, law: str = "linear"):
     if outlet == "leak":
         del nodes["town"], links["way"]
         links["way"] = {"type": "leak", "from": "ball", "coefficient": 1e-4}
-    result = fvsolve.run(scene(nodes, links, 40.0, numerics, ["way.flow"], every, fluid=SOFT | {"law": law}))
-    assert result.ok
-    return result, result.ledger["mass"]["nodes"]["way.outside" if outlet == "leak" else "town.demand.outside"]
+    return scene(nodes, links, 40.0, numerics, ["way.flow"], 0.002, fluid=SOFT | {"law": law})
 
 
-@pytest.mark.parametrize("method", [*ADAPTIVE, *FIXED])
-@pytest.mark.parametrize("outlet", LAWS)
+PAIRS = [
+    (outlet, method) for outlet in LAWS for method in (*ADAPTIVE, *FIXED)
+    if outlet == "leak" or method not in ("dormand-prince", "bogacki-shampine")  # held by what stands behind the valve
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("outlet, method", PAIRS)
 def test_a_way_out_of_a_soft_place_takes_nothing_in_and_lets_out_what_its_law_says(outlet, method):
     numerics = {"method": method, "step": 0.005} if method in FIXED else {"method": method}
-    result, way = ball(outlet, numerics)
+    result = fvsolve.run(ball(outlet, numerics))
+    way = result.ledger["mass"]["nodes"][f"{OUTSIDE[outlet]}.outside"]
     near = 1e-4 if method == "implicit-euler" else 3e-5  # as the ball's own pressure is
     assert way["outflow"] == pytest.approx(left(outlet), rel=near)
     assert way.get("inflow", 0.0) == 0.0
     assert abs(result.ledger["mass"]["relative"]) < 1e-10  # of Rosenbrock methods, whose slopes round by differences
+
+
+@pytest.mark.parametrize("method", ["auto", "radau-iia-5", "rodas-4", "rk4"])
+@pytest.mark.parametrize("outlet", LAWS)
+def test_so_it_is_with_a_fluid_whose_density_follows_the_pressure(outlet, method):
+    numerics = {"method": method, "step": 0.005} if method in FIXED else {"method": method}
+    result = fvsolve.run(ball(outlet, numerics, "log"))
+    way = result.ledger["mass"]["nodes"][f"{OUTSIDE[outlet]}.outside"]
+    assert way["inflow"] == 0.0 and result["way.flow"].min() >= 0.0
+    assert abs(result.ledger["mass"]["relative"]) < 1e-10
+
+
+@pytest.mark.parametrize("method", ["auto", "rodas-4", "radau-iia-5", "dormand-prince"])
+def test_its_energy_ledger_closes_over_steps_that_end_at_a_bend(method):
+    relative = energy(ball("leak", {"method": method})).relative
+    assert relative < 1e-5
 
 
 SWINGS = [0.0, 10.0, 20.0, 30.0], [1e5, -0.5e5, 0.7e5, -0.2e5]  # of a source [s], [Pa]

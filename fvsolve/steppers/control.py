@@ -48,13 +48,14 @@ def too_short(orders, memory, h):
 
 
 @njit(forceinline=True)
-def first_step(k, scale, orders, span):
+def first_step(k, scale, orders, memory):
     """A cautious first step from the size of the rates, which may be about to start [s]."""
-    total, tolerance = 0.0, orders[SIZE]
+    total, tolerance, span = 0.0, orders[SIZE], orders[END] - memory[T]
+    most = min(span, max(1e-3 * span, shortest(orders, memory)))
     for i in range(scale.size):
         total += (k[0, i] / scale[i]) ** 2
     d = sqrt(total / max(scale.size, 1))
-    return min(1e-3 * span, 0.05 * tolerance ** (1.0 / (orders[ORDER] + 1.0)) / d) if d > 0.0 else 1e-3 * span
+    return min(most, 0.05 * tolerance ** (1.0 / (orders[ORDER] + 1.0)) / d) if d > 0.0 else most
 
 
 @njit(forceinline=True)
@@ -62,7 +63,7 @@ def next_step(orders, memory, out_rate, k, scale):
     """Length of the step to try, before the end of the segment is looked at [s]."""
     if orders[CONTROL] == TOLERANCE:
         if too_short(orders, memory, memory[STEP]):  # none is remembered, or one that would not move the time
-            memory[STEP] = first_step(k, scale, orders, orders[END] - memory[T])
+            memory[STEP] = first_step(k, scale, orders, memory)
         stable = orders[STEP_MAX]  # error control alone would chatter at the limit of an explicit method
         if out_rate > 0.0 and orders[KIND] == EXPLICIT:
             stable = 2.0 / out_rate

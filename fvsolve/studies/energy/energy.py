@@ -107,7 +107,7 @@ class Energy:
     @property
     def relative(self) -> float:
         """|made| at the end over `through`; 0 where nothing passed."""
-        return float(abs(self.made[-1]) / self.through) if self.through > 0.0 else 0.0
+        return 0.0 if self.through == 0.0 else float(abs(self.made[-1]) / self.through)
 
     @property
     def newton_counts(self) -> bool:
