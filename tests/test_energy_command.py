@@ -227,9 +227,11 @@ def test_what_newton_leaves_is_told_beside_the_verdict(told, tmp_path):
         text = text.replace(old, new)
     (tmp_path / "pot.toml").write_text(text)
     step = ["--set", "numerics.step=0.01"]
-    code, out, _ = told("pot.toml", "--set", "numerics.method=gauss-4", *step)
+    code, out, _ = told("pot.toml", "--set", "numerics.method=radau-iia-5", "--set", "numerics.rtol=1e-3")
     assert code == 0
     assert "J, what Newton leaves: " in out
+    code, out, _ = told("pot.toml", "--set", "numerics.method=gauss-4", *step)
+    assert code == 0
     assert "that passed: rounding" in out
     code, out, _ = told("pot.toml", "--set", "numerics.method=rk4", *step)
     assert "Newton" not in out

@@ -24,7 +24,7 @@ def claims(model, extremes: dict, result) -> dict:
 def expectation(text: str, expect, column: Column, extremes: dict, result) -> dict:
     """One line of `[expect]`: claimed, found, tolerance in the unit of the probe, and whether it holds.
 
-    `max` and `min` are the extremes of the run, `mean` is over time (trapezoids), `at` is between rows.
+    `max` and `min` are over all steps and rows, `mean` is over time (trapezoids), `at` is between rows.
     """
     found = _found(expect, column.name, extremes, result)
     tolerance = expect.atol + expect.rtol * abs(expect.value)

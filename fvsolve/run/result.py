@@ -25,7 +25,7 @@ class Mark(NamedTuple):
 
 
 class Extremes(NamedTuple):
-    """Least and greatest over all accepted steps, of long ones over rows too, in the unit of the probe, and when."""
+    """Least and greatest over all accepted steps and rows, in the unit of the probe, and when [s]."""
 
     least: float
     t_least: float

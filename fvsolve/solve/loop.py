@@ -52,8 +52,7 @@ class Loop:
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.within = within(model)
-        stepper.out, stepper.out_row = model.new_out(), model.new_out()
-        stepper.values, stepper.before = np.zeros(len(model.probes)), np.zeros(len(model.probes))
+        stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
         self.tanks = np.flatnonzero(model.tables[rec.I_NODES]["kind"] == rec.TANK)
         events = model.tables[rec.I_ARMED].size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
@@ -64,10 +63,6 @@ class Loop:
         for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
-        accurate = not method.explicit and stepper.dense.size > 0 and stepper.dense_order > 2
-        self.holds_rows = numerics.rtol is None and not accurate
-        if self.holds_rows:  # else steps may be long, and rows between them as accurate
-            stepper.seen = model.tables[rec.I_EXTREMES]
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest

@@ -169,11 +169,10 @@ class Run:
         rows = self.loop.take_rows()
         if len(rows):
             self.sink.rows(rows[:, 0], rows[:, 1:])
-            if not self.loop.holds_rows:
-                self.widen(rows)
+            self.widen(rows)
 
     def widen(self, rows: np.ndarray) -> None:
-        """Extremes by rows as well where steps may be long: what lies between them is as accurate."""
+        """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
         least, t_least, greatest, t_greatest = self.model.tables[rec.I_EXTREMES]
         for k in range(rows.shape[1] - 1):
             low, high = rows[np.argmin(rows[:, k + 1])], rows[np.argmax(rows[:, k + 1])]

@@ -139,7 +139,7 @@ def find_cavities(model: Model) -> list[Cavity]:
 
 
 def find_extremes(model: Model) -> dict[str, tuple[float, float, float, float]]:
-    """Probe -> (least, its time, greatest, its time), over all accepted steps, with long ones over rows too."""
+    """Probe -> (least, its time, greatest, its time), over all accepted steps and rows."""
     table = model.tables[rec.I_EXTREMES]
     return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(model.probes)}
 

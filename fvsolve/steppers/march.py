@@ -96,8 +96,7 @@ def bearable(e, passing):
 def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
     coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
-    values, before, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, seen, work, vectors, store,
-    store_complex,
+    values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -107,8 +106,8 @@ def march(
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
-    within_at, within_by, seen : what rows are held to, see `rows.keep_within`, `rows.keep_seen`; work, vectors, store,
-    store_complex : what an implicit step keeps.
+    within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
+    implicit step keeps.
     """
     s, reuse = k.shape[0], False
     b = weights_of(coefficients, s)
@@ -132,7 +131,6 @@ def march(
                 memory[CALLS] += 1.0
             reuse = False
             flags[PHASE] = EMIT
-            copy(values, before)
             record(memory[T], y[now], out, handle, values)
             if not all_finite(y[now]):
                 out[STATUS] = NOT_FINITE
@@ -152,7 +150,6 @@ def march(
                 why = emit(
                     rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
                     y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
-                    seen, before, values,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -264,8 +261,8 @@ def compiled():
 
     i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
     march.compile(
-        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, v, ints, v, v, w,
-         ints, w, w, v, w, v, types.complex128[::1])
+        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, ints,
+         w, v, w, v, types.complex128[::1])
     )  # fmt: skip
     march.disable_compile()
     return march

@@ -74,28 +74,9 @@ def keep_within(at, by, y_old, y, out):
 
 
 @njit
-def keep_seen(seen, part, before, now, row):
-    """Hold a row to what accepted steps have read so far, so that these alone tell least and greatest.
-
-    A polynomial past a front goes beyond both; the chord between what they read does not, and what is linear in what
-    is read (a head and those of its ends) holds on it too.
-    seen : float64[4, q]  of every probe the least, its time, the greatest, its time; float64[4, 0] to hold nothing
-    before, now : what both ends of the step read; part : of the step, up to the row
-    """
-    beyond = False
-    for q in range(seen.shape[1]):
-        if row[q] < seen[0, q] <= seen[2, q] or row[q] > seen[2, q] >= seen[0, q]:
-            beyond = True
-    if beyond:
-        for q in range(seen.shape[1]):
-            least, greatest = min(before[q], now[q]), max(before[q], now[q])
-            row[q] = min(max(before[q] + part * (now[q] - before[q]), least), greatest)
-
-
-@njit
 def emit(
     rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
-    within_at, within_by, seen, before, now,
+    within_at, within_by,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
@@ -107,14 +88,12 @@ def emit(
             return DONE
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
-        part = (due - t_old) / h
-        interpolate(part, h, y_old, f_old, y, f, k, dense, y_out)
+        interpolate((due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
         keep_within(within_at, within_by, y_old, y, y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
             observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
-            keep_seen(seen, part, before, now, rows[flags[ROWS], 1:])
             flags[ROWS] += 1
             memory[NEXT_OUTPUT] += 1.0
         if field <= due:

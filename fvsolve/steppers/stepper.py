@@ -34,10 +34,10 @@ class Stepper:
         self.flags = np.array([told.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
-        self.out, self.out_row, self.values, self.before = np.zeros(4), np.zeros(4), np.zeros(0), np.zeros(0)
+        self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
         self.g = self.g_new = self.none
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
-        self.within, self.seen = (self.nobody, np.zeros((0, 4))), np.zeros((4, 0))
+        self.within = self.nobody, np.zeros((0, 4))
         self.use(method)
 
     def use(self, method: Method) -> None:
@@ -120,8 +120,8 @@ class Stepper:
         return self.march(
             self.attempt, leap, observe, record, events, rhs, *self.algebra, handle, self.coefficients, self.shape,
             self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.supply,
-            where, self.ledger, self.scale, self.out, self.out_row, self.values, self.before, self.g, self.g_new, armed,
-            self.stored, self.carry, self.y_out, self.rows, *self.within, self.seen, self.work, self.vectors,
+            where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
+            self.stored, self.carry, self.y_out, self.rows, *self.within, self.work, self.vectors,
             self.store, self.store_complex,
         )  # fmt: skip
 
