@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numba import njit
-from truth.scenes import chamber, lake, scene, tank, valve
+from truth import scenes
+from truth.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.steppers import integrate
@@ -89,3 +90,26 @@ def test_a_long_step_over_a_bare_root_ends_where_its_quadratic_says(name, own, k
     z = (np.sqrt(own**2 + 4.0 * abs(right)) - own) / 2.0
     found = integrate(rooted, [1.0], [0.0, 0.1], name, step=0.1)[-1, 0]
     assert found == pytest.approx(np.sign(right) * z**2, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["auto", "rodas-4", "rodas-5p", "radau-iia-5", "dormand-prince"])
+@pytest.mark.parametrize("volume, area", [(0.01, 1e-4), (0.1, 1e-3), (1.0, 1e-5)])
+def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(name, volume, area):
+    """Root of the drop falls by beta A sqrt(2 / rho) / 2 V a second, A the area of the jet.
+
+    Linearly implicit steps never got to rest: two million of them.
+    """
+    low, high = 1e5, 5e5
+    rho, beta = scenes.WATER["density"], scenes.WATER["bulk_modulus"]
+    pace = beta * area * np.sqrt(2.0 / rho) / (2.0 * volume)
+    whole = np.sqrt(high - low) / pace
+    nodes = {"lake": reservoir(high), "pot": chamber(volume, low)}
+    numerics = {"method": name, "rtol": 1e-6}
+    result = fvsolve.run(
+        scene(nodes, {"tap": valve("lake", "pot", area)}, 100.0 * whole, numerics, ["pot.pressure"], 0.1 * whole)
+    )
+    truth = high - np.maximum(np.sqrt(high - low) - pace * result.t, 0.0) ** 2
+    assert result["pot.pressure"] == pytest.approx(truth, abs=2e-6 * high)  # errors of steps add up
+    assert abs(result["pot.pressure"][-1] - high) < 1e-2
+    if name != "dormand-prince":  # which stability holds
+        assert result.summary["steps"] < 200
