@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.led import lead_columns, led_end, led_flow, led_rate, lone_disc
-from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES, RATE
+from fvsolve.kernels.records import CLOSING, I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.rigid import (
     add_pushes,
@@ -106,8 +106,12 @@ def column_rate(t, y, tables, out, k, change):
 
 @njit
 def quickest_column(t, y, dydt, out, handle):
-    """Greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM, into out[RATE]."""
+    """Greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM, into out[RATE].
+
+    Discs, which come after, say in out[CLOSING] how they close on one.
+    """
     tables = open_tables(handle)
+    out[CLOSING] = 0.0
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     for k in range(tables[I_COLUMNS].size):
         column = tables[I_COLUMNS][k]

@@ -15,6 +15,7 @@ from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF_DISC
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
 from fvsolve.kernels.records import (
+    CLOSING,
     I_ARMED,
     I_COLUMNS,
     I_DEVICES,
@@ -116,7 +117,11 @@ def led_beside(out, tables, device, yielding):
 
 @njit
 def move_disc(y, dydt, out, tables, device):
-    """Rates of its lift and of its speed, none against a stop; and its greatest rate."""
+    """Rates of its lift and of its speed, none against a stop; its greatest rate.
+
+    And -x'/x where it closes on a column into out[CLOSING]: one that flows back slams it, x ~ (time left)^(1/3), which
+    no step leads across.
+    """
     floats, armed, at, o = tables[I_FLOATS], tables[I_ARMED], device["event"], device["y"]
     drive, held = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
@@ -129,6 +134,10 @@ def move_disc(y, dydt, out, tables, device):
     else:
         dydt[o] = 0.0 if held else y[o + 1]
         dydt[o + 1] = 0.0 if held else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
+    valve, nodes = tables[I_VALVES][device["valve"]], tables[I_NODES]
+    brakes = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
+    if brakes and dydt[o] < 0.0 and not leads(tables, device["valve"]):
+        out[CLOSING] = max(out[CLOSING], -dydt[o] / max(disc_lift(y, tables, device), 1e-300))
 
 
 @njit
