@@ -293,10 +293,10 @@ def test_so_they_do_in_a_fluid_that_is_all_but_stiff(after):
     assert_leaves(case, name, LAG, "drop")
 
 
-def slamming(disc) -> float:
+def slamming(disc, rho=RHO) -> float:
     """When the disc of `held_column` meets its seat, by SciPy under the linear law, as the far end rises past it."""
     far, k = (lambda t: np.interp(t, [1.0, 4.0, 9.0], [3e5, 4.4e5, 3.2e5])), area(0.1) / 50.0
-    g, friction = 2.0 * RHO * (0.61 * 0.01) ** 2, 0.02 * 50.0 / (0.1 * 2.0 * RHO * area(0.1) ** 2)
+    g, friction = 2.0 * rho * (0.61 * 0.01) ** 2, 0.02 * 50.0 / (0.1 * 2.0 * rho * area(0.1) ** 2)
     lag, w, zeta = (disc.get(key, 0.0) for key in ("time_constant", "natural_frequency", "damping_ratio"))
     w *= 2.0 * math.pi
     drop = lambda x, m: m * abs(m) / (g * x * x)  # noqa: E731
@@ -321,26 +321,46 @@ def slamming(disc) -> float:
     return found.t_events[0][0] + 1e-5 / abs(rates(found.t[-1], found.y[:, -1])[0])
 
 
+def slammed(disc, law, numerics, end):
+    """A run of the same scene."""
+    case, name = held_column("check-valve", False, disc, numerics)
+    case["nodes"] |= {
+        "up": reservoir(3.3e5),
+        "down": reservoir({"time": [1.0, 4.0, 9.0], "value": [3e5, 4.4e5, 3.2e5]}),
+    }
+    case["numerics"]["end"] = end
+    water = {"name": "Water", "temperature": 293.15, "pressure": 101325.0, "law": "table"}
+    case["fluid"] = water if law == "table" else {**case["fluid"], "law": law}
+    return fvsolve.run(case), name
+
+
 @pytest.mark.parametrize("law", ["log", "table"])
 @pytest.mark.parametrize("disc", [LAG, SWING])
 @pytest.mark.parametrize("numerics", [METHODS["auto"], METHODS["radau"], METHODS["explicit"],
                                       {"method": "rk4", "step": 2e-4}])  # fmt: skip
 def test_a_column_that_slams_its_disc_shut_is_followed_under_every_law(numerics, disc, law):
     """Drops of a thousand bar, where density is an exponential of pressure; linear and it differ by p / K before."""
-    case, name = held_column("check-valve", False, disc, numerics)
-    case["nodes"] |= {
-        "up": reservoir(3.3e5),
-        "down": reservoir({"time": [1.0, 4.0, 9.0], "value": [3e5, 4.4e5, 3.2e5]}),
-    }
-    water = {"name": "Water", "temperature": 293.15, "pressure": 101325.0, "law": "table"}
-    case["fluid"] = {**case["fluid"], "law": "log"} if law == "log" else water
-    result = fvsolve.run(case)
+    result, name = slammed(disc, law, numerics, 10.0)
     shuts, leaves = result.summary["events"]
     start, (_, flow) = leaving(disc, "drop")
     assert result.reason == "finished" and (shuts["what"], leaves["what"]) == ("is shut", "leaves its seat")
     assert shuts["time"] == pytest.approx(slamming(disc), abs=2e-3)
     assert leaves["time"] == pytest.approx(start, abs=1e-6)
     assert result[f"{name}.flow"][-1] * RHO == pytest.approx(flow[-1], rel=5e-3)
+
+
+@pytest.mark.parametrize("law", ["linear", "log", "table"])
+@pytest.mark.parametrize("disc", [LAG, SWING], ids=["lag", "swing"])
+@pytest.mark.parametrize("method", ["rk4", "ssp-rk3", "heun", "rodas-5p", "radau-iia-5"])
+def test_steps_of_given_length_do_not_leap_over_a_slam(method, disc, law):
+    """The lift ends as (time left)^(1/3) or ^(2/3), and drives what drives it: such a step is taken in parts."""
+    for step in (2e-4, 5e-4, 1e-3, 2e-3):
+        result, _ = slammed(disc, law, {"method": method, "step": step}, 3.6)
+        (shuts,) = result.summary["events"]
+        assert result.ok and shuts["what"] == "is shut"
+        assert shuts["time"] == pytest.approx(slamming(disc, result.summary["fluid"]["density"]), rel=3e-5)
+        (said,) = result.summary["warnings"]
+        assert (said["kind"], said["ok"]) == ("step-limit", True) and "rigid column" in said["text"]
 
 
 @pytest.mark.parametrize("disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}])

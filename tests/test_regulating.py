@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth import discs
+from truth import discs, stems
 from truth.scenes import AMBIENT, GRAVITY, RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
@@ -180,3 +180,59 @@ def test_a_set_pressure_is_an_input():
     model = fvsolve.build(fvsolve.load(line("pressure-reducing", 4e5)))
     after = fvsolve.advance(model, fvsolve.initial_state(model), 0.2, {"v.set_pressure": 4.5e5})
     assert after.y[model.state_names.index("v.opening")] > 0.0
+
+
+COLUMN = {"type": "rigid-column", "length": 50.0, "diameter": 0.1,
+          "friction": {"model": "quasi-steady", "factor": 0.02}}  # fmt: skip
+FALLS, RISES = {"time": [2.0, 4.0], "value": [6e5, 3e5]}, {"time": [2.0, 4.0], "value": [4e5, 7e5]}
+
+
+def lag_of(kind, after):
+    """Long where it senses the far side, which its flow does not mend."""
+    return 0.3 if after == (kind == "pressure-sustaining") else 30.0
+
+
+def held_column(kind, after, law, numerics):
+    """A valve, set to 5 bar, that leaves its seat beside the column it alone holds; `after` it, or before."""
+    up, down = {"pressure-reducing": (8e5, FALLS), "pressure-sustaining": (RISES, 1e5)}[kind]
+    part = {"type": kind, "area": 0.01, "discharge_coefficient": 0.61, "set_pressure": 5e5}
+    part["time_constant"] = lag_of(kind, after)
+    first, second = (COLUMN, part) if after else (part, COLUMN)
+    links = {"one": {**first, "from": "up", "to": "m"}, "two": {**second, "from": "m", "to": "down"}}
+    nodes, name = {"up": reservoir(up), "m": junction(), "down": reservoir(down)}, "two" if after else "one"
+    probes = [f"{name}.opening", f"{name}.flow"]
+    return scene(nodes, links, 6.0, numerics, probes, 0.1, fluid={**WATER, "law": law}), name
+
+
+def leaving_with_column(kind, after, at):
+    area = math.pi * 0.05**2
+    up, down = (8e5, FALLS) if kind == "pressure-reducing" else (RISES, 1e5)
+    ends = [lambda t, p=p: np.interp(t, p["time"], p["value"]) if isinstance(p, dict) else p for p in (up, down)]
+
+    def lifted(t, drop):
+        before, behind = (ends[1](t) + drop, ends[1](t)) if after else (ends[0](t), ends[0](t) - drop)
+        return SET - behind if kind == "pressure-reducing" else before - SET
+
+    start = 2.0 + 2.0 / 3.0
+    return stems.leaves_with_column(
+        lambda t: ends[0](t) - ends[1](t), start, [4.0], lifted, 2.0 * RHO * 0.0061**2, 1e5 * lag_of(kind, after),
+        50.0 / area, 0.02 * 50.0 / (0.1 * 2.0 * RHO * area**2), at,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("numerics", [{"rtol": 1e-6}, {"method": "dormand-prince", "rtol": 1e-6},
+                                      {"method": "rodas-5p", "rtol": 1e-9}, {"method": "radau-iia-5", "rtol": 1e-6},
+                                      {"method": "rk4", "step": 1e-3}])  # fmt: skip
+@pytest.mark.parametrize("kind", ["pressure-reducing", "pressure-sustaining"])
+@pytest.mark.parametrize("after", [False, True])
+def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say(kind, after, law, numerics):
+    """Both start as s^2, and exchange what they have at a rate that starts at infinity."""
+    case, name = held_column(kind, after, law, numerics)
+    result, at = fvsolve.run(case), (2.8, 3.0, 4.0, 6.0)
+    lift, flow = leaving_with_column(kind, after, at)
+    (leaves,) = result.summary["events"]
+    assert result.ok and (leaves["what"], leaves["time"]) == ("leaves its seat", pytest.approx(8.0 / 3.0, abs=1e-9))
+    rows, near = [int(np.argmin(abs(result.t - t))) for t in at], 2e-3 if "step" in numerics else 4e-4
+    assert result[f"{name}.opening"][rows] == pytest.approx(lift, rel=near)
+    assert result[f"{name}.flow"][rows] * RHO == pytest.approx(flow, rel=near)

@@ -6,7 +6,7 @@ from fvsolve.kernels.clusters import settled
 from fvsolve.kernels.columns import add_led, column_rate
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.led import led_by_disc, led_end, led_flow, lone_disc
+from fvsolve.kernels.led import led_by_lift, led_end, led_flow, lone_lead
 from fvsolve.kernels.records import (
     I_COLUMNS,
     I_FLOATS,
@@ -92,21 +92,21 @@ def hold_columns_barotropic(t, y, dydt, out, handle):
         rise = st["gravity"] * (nodes[x]["elevation"] - nodes[i]["elevation"])
         h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
         out[pressure + x] = pressure_of_enthalpy(st, floats, h - rise) - nodes[x]["pressure"]
-        if lone_disc(tables, x) >= 0:
-            drive_with_disc(y, tables, out, k, x, lone_disc(tables, x))
+        if lone_lead(tables, x) >= 0:
+            drive_with_lift(t, y, tables, out, k, x, lone_lead(tables, x))
         elif gate_area(tables, out, x)[0] > 0.0:
             rate = led_flow(t, y, tables, out, k, end, True)[1]
             out[pressure + x] -= column["length"] / column["area"] * rate
 
 
 @njit
-def drive_with_disc(y, tables, out, k, x, which):
-    """Take off the standing pressure of node x what moves column k and the disc that leads it."""
+def drive_with_lift(t, y, tables, out, k, x, which):
+    """Take off the standing pressure of node x what moves column k and the valve that leads it."""
     valve, pressure = tables[I_VALVES][which], tables[I_LAYOUT][0]["pressure"]
     still, ahead = head_drop(tables, out, which)[1], valve["from_node"] == x
     other = out[pressure + (valve["to_node"] if ahead else valve["from_node"])]
     inertia = tables[I_COLUMNS][k]["length"] / tables[I_COLUMNS][k]["area"]
-    drop = led_by_disc(y, tables, out, k, which, out[pressure + x], inertia, other, still)[0]
+    drop = led_by_lift(t, y, tables, out, k, which, out[pressure + x], inertia, other, still)[0]
     out[pressure + x] += drop - still if ahead else still - drop
 
 

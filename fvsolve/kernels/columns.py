@@ -2,8 +2,8 @@
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.led import lead_columns, led_end, led_flow, led_rate, lone_disc
-from fvsolve.kernels.records import I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES, RATE
+from fvsolve.kernels.led import lead_columns, led_end, led_flow, led_rate, lone_lead
+from fvsolve.kernels.records import CLOSING, I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.rigid import (
     add_pushes,
@@ -94,11 +94,11 @@ def column_rates(t, y, dydt, out, handle):
 def column_rate(t, y, tables, out, k, change):
     """d/dt of one column's flow, (A / L) (change of what drives it) - drag'; one that stands or is led, by its valves.
 
-    Where a disc leads it, the pressure beside that tells.
+    Where one leads it from its seat, the pressure beside that tells.
     """
     column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
     x = column["to_node"] if end == 1 else column["from_node"]
-    if end != 0 and (lone_disc(tables, x) < 0 or gate_area(tables, out, x)[0] == 0.0):
+    if end != 0 and (lone_lead(tables, x) < 0 or gate_area(tables, out, x)[0] == 0.0):
         return end * led_rate(t, y, tables, out, k, end)
     pull = column_drag(column, out[tables[I_LAYOUT][0]["column"] + k])
     return column["area"] / column["length"] * (change + column["offset"]) - (pull - column["drag"])
@@ -106,8 +106,12 @@ def column_rate(t, y, tables, out, k, change):
 
 @njit
 def quickest_column(t, y, dydt, out, handle):
-    """Greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM, into out[RATE]."""
+    """Greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM, into out[RATE].
+
+    Discs, which come after, say in out[CLOSING] how they close on one.
+    """
     tables = open_tables(handle)
+    out[CLOSING] = 0.0
     layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
     for k in range(tables[I_COLUMNS].size):
         column = tables[I_COLUMNS][k]

@@ -5,16 +5,19 @@ A column that leads to a node without storage is held by that node's valves alon
 I = sum of F sqrt(dP), with (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP) the pressure that slows it down. When the
 last of them shuts, nothing can flow: the column stands, and the node has the pressure of its other end.
 
-A column follows a disc that leaves its seat and alone holds it, too: lift x and flow start as powers of time, and
-dP = M^2 / (G x^2), of 0 / 0 there, would relax at an infinite rate. Until x has grown, dP is what drives both,
+A column follows a disc that leaves its seat and alone holds it, too, or the stem of a valve that regulates: lift x
+and flow start as powers of time, and dP = M^2 / (G x^2), of 0 / 0 there, would relax at an infinite rate. Until x has
+grown, dP is what drives both,
 (L / A) sqrt(G dP) dx/dt(dP) + dP = that at rest; the column's momentum is kept.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.codes import RELIEF_DISC
-from fvsolve.kernels.devices.disc import disc_speed, leads
+from fvsolve.kernels.devices.codes import CHECK_DISC, REDUCING
+from fvsolve.kernels.devices.disc import disc_speed
+from fvsolve.kernels.devices.lead import is_disc, leads
+from fvsolve.kernels.devices.regulator import stem_speed
 from fvsolve.kernels.records import (
     I_COLUMNS,
     I_DEVICES,
@@ -36,16 +39,19 @@ INSTANT = 1e-7  # over which the rate of an area is measured [s]
 
 @njit
 def led_at(tables, out, i):
-    """Whether node i is the end of one column whose every valve is all but shut, and asks for nothing."""
-    if tables[I_NODES][i]["gates"] < 0 or tables[I_NODES][i]["columns"] > 1:
+    """Whether node i is the end of one column whose every valve is all but shut or leads, and asks for nothing."""
+    node = tables[I_NODES][i]
+    if node["gates"] < 0 or node["columns"] > 1:
         return False
+    if node["gate_count"] == 1 and lone_lead(tables, i) >= 0:
+        return True
     area, full = gate_area(tables, out, i)
     return area == 0.0 or (area < NEARLY * full and foreseen(tables, out, i))
 
 
 @njit
 def foreseen(tables, out, i):
-    """Whether the rate of area of node i's valves is known: schedules alone move them, or it is one disc that leads."""
+    """Whether the rate of area of node i's valves is known: schedules alone move them, or one that leads."""
     node = tables[I_NODES][i]
     for e in range(node["gate_count"]):
         k = tables[I_INTEGERS][node["gates"] + e]
@@ -93,16 +99,31 @@ def standing_pressure(y, tables, out, k, end, solved):
 
 
 @njit
-def disc_drop(y, tables, device, before, drop, slack, heavy):
-    """(drop across a disc that leads its column, dx/dt), by Newton on its root r: r2 + heavy r dx/dt(r2) = drop.
+def lift_speed(t, y, tables, device, before, behind, drop):
+    """dx/dt of what leads a column, at p' before it and behind it and a drop, and d(dx/dt) / d(what it feels)."""
+    if is_disc(device):
+        return disc_speed(y, tables, device, before, drop)
+    return stem_speed(t, tables, device, before, behind)
 
-    drop : where nothing moves; slack : what it feels for a drop of 1 Pa more; heavy : (L / A) sqrt(G). From above: the
-    cubic is convex from its greatest root on.
+
+@njit
+def feels(device, ahead):
+    """Whether what lifts it rises with the drop across it; ahead: its column lies before it."""
+    if device["kind"] == CHECK_DISC:
+        return True
+    return not ahead if device["kind"] == REDUCING else ahead
+
+
+@njit
+def lift_drop(drop, still, slope, heavy):
+    """(drop across what leads its column, dx/dt), by Newton on its root r: r2 + heavy r dx/dt(r2) = drop.
+
+    drop : where nothing moves; still : dx/dt there; slope : of it over the drop; heavy : (L / A) sqrt(G). From above:
+    the cubic is convex from its greatest root on.
     """
-    still, slope = disc_speed(y, tables, device, before, drop)
     if drop <= 0.0 or still == 0.0:
         return drop, still
-    r, slope, speed = sqrt(drop), slope * slack, still
+    r, speed = sqrt(drop), still
     while r * r - drop + heavy * r * (still + slope * (r * r - drop)) < 0.0:
         r *= 2.0
     for _ in range(100):
@@ -115,31 +136,32 @@ def disc_drop(y, tables, device, before, drop, slack, heavy):
 
 
 @njit
-def lone_disc(tables, i):
-    """The disc that alone holds the column of node i and leads it; -1 for none."""
+def lone_lead(tables, i):
+    """The valve that alone holds the column of node i and leads it from its seat; -1 for none."""
     k = tables[I_INTEGERS][tables[I_NODES][i]["gates"]]
     return k if leads(tables, k) else -1
 
 
 @njit
-def led_by_disc(y, tables, out, k, which, standing, inertia, other, still):
-    """(drop across the disc `which` that leads column k, dx/dt), at p' beside it and a drop where nothing moves."""
+def led_by_lift(t, y, tables, out, k, which, standing, inertia, other, drop):
+    """(drop across the valve `which` that leads column k, dx/dt), at p' beside it and a drop where nothing moves."""
     valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
     device, heavy = tables[I_DEVICES][valve["device"]], inertia * sqrt(valve["conductance"])
-    if valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]:
-        return disc_drop(y, tables, device, standing, still, 1.0, heavy)
-    return disc_drop(y, tables, device, other, still, 0.0 if device["kind"] == RELIEF_DISC else 1.0, heavy)
+    ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
+    before, behind = (standing, other) if ahead else (other, standing)
+    still, slope = lift_speed(t, y, tables, device, before, behind, drop)
+    return lift_drop(drop, still, slope if feels(device, ahead) else 0.0, heavy)
 
 
 @njit
-def led_from_rest(y, tables, out, k, end, which, solved):
-    """`led_flow` of a column that one disc holds."""
+def led_from_rest(t, y, tables, out, k, end, which, solved):
+    """`led_flow` of a column that one valve leads from its seat."""
     valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
     standing, inertia = standing_pressure(y, tables, out, k, end, solved)
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
     still = valve["drop"] + side * (standing - other)
-    drop, speed = led_by_disc(y, tables, out, k, which, standing, inertia, other, still)
+    drop, speed = led_by_lift(t, y, tables, out, k, which, standing, inertia, other, still)
     root = side * (sqrt(drop) if drop >= 0.0 else -sqrt(-drop))
     rate = speed * sqrt(valve["conductance"]) * root if drop > 0.0 else 0.0
     return sqrt(conductance(tables, out, which)) * root, rate, standing + side * (drop - still)
@@ -261,8 +283,8 @@ def led_flow(t, y, tables, out, k, end, solved):
     """(flow out of column k through the valves that lead it, its rate, p' of that end)."""
     column, limit = tables[I_COLUMNS][k], tables[I_SETTINGS][0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
-    if lone_disc(tables, x) >= 0:
-        return led_from_rest(y, tables, out, k, end, lone_disc(tables, x), solved)
+    if lone_lead(tables, x) >= 0:
+        return led_from_rest(t, y, tables, out, k, end, lone_lead(tables, x), solved)
     early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate on this side of a kink
     standing, inertia = standing_pressure(y, tables, out, k, end, solved)
     own = end * (column["flow"] + y[column["y"]])

@@ -297,7 +297,7 @@ LAYOUT = np.dtype(
     ],
     align=True,
 )
-RATE, STATUS, WHERE = 0, 1, 2  # first entries of `out`
+RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # first entries of `out`
 OUT_HEAD = 4
 
 PROBE = np.dtype(

@@ -57,12 +57,13 @@ class Soundness:
 
 
 def parted(numerics, counts: dict[str, int]) -> list[Notice]:
-    """A notice where Newton could not take steps of the length that was asked for."""
+    """A notice where steps of the length that was asked for were taken in parts."""
     if not counts.get("parted"):
         return []
     key = "step" if numerics.step is not None else "courant"
-    text = (f"{counts['parted']} of {counts['steps']} steps were too long for Newton and were taken in parts, "
-            f"which end where the whole would have; give a smaller numerics.{key}, or rtol in place of it")  # fmt: skip
+    text = (f"{counts['parted']} of {counts['steps']} steps were too long, for Newton or for a disc that shuts on a "
+            "rigid column, and were taken in parts, which end where the whole would have; give a smaller "
+            f"numerics.{key}, or rtol in place of it")  # fmt: skip
     return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
 
 

@@ -12,9 +12,11 @@ from fvsolve.steppers.orders import (
     EXPLICIT,
     KIND,
     LAST,
+    LEFT,
     N_MARK,
     NEWTON_SOLVED,
     ORDER,
+    PARTED,
     PRICE,
     RADIUS,
     SIZE,
@@ -32,6 +34,7 @@ PATIENCE = 15  # steps that must agree before another kind of step is tried; dou
 BOUNDARY = 3.0  # of h times the spectral radius: `dormand-prince` bears 3.3 on the real axis
 HELD = 2.5  # held by stability it swings from 1 to 3.5, held by accuracy it hardly moves
 CALM = 0.4  # what a step that is not held takes off the count
+CLOSED = 0.15  # share of an opening that may shut in a given step; of x ~ (time left)^(1/3) that is half the time left
 DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
 
 
@@ -75,6 +78,17 @@ def next_step(orders, memory, out_rate, k, scale):
     if h != memory[STEP]:
         memory[STEP], memory[T_MARK], memory[N_MARK] = h, memory[T], 0.0
     return h
+
+
+@njit(forceinline=True)
+def closing_step(memory, closing, h, least):
+    """A given step h, or a part of it where something shuts at a rate that has no bound, -x'/x = closing [1/s]."""
+    if h * closing <= CLOSED or h <= 2.0 * least:
+        return h
+    if memory[LEFT] == 0.0:  # in parts that end where it would have
+        memory[LEFT] = h
+        memory[PARTED] += 1.0
+    return max(least, min(0.5 * h, CLOSED / closing))
 
 
 @njit(forceinline=True)

@@ -9,7 +9,7 @@ from math import isfinite
 
 from fvsolve.jit import njit
 from fvsolve.steppers.coefficients import error_of, row_of, weights_of
-from fvsolve.steppers.control import grown, kept, next_step, reduced, shortest, too_short, watch
+from fvsolve.steppers.control import closing_step, grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
 from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.orders import (
@@ -21,6 +21,7 @@ from fvsolve.steppers.orders import (
     CALLS,
     CASES,
     CHUNK,
+    CLOSING,
     CONTROL,
     DONE,
     EMIT,
@@ -170,6 +171,8 @@ def march(
         if orders[BUDGET] <= 0.0:
             return CHUNK
         h = memory[LEFT] if memory[LEFT] > 0.0 else next_step(orders, memory, out[RATE], k, scale)
+        if orders[CONTROL] != TOLERANCE:
+            h = closing_step(memory, out[CLOSING], h, shortest(orders, memory))
         leaping, last = may_leap(orders, memory, times, h), False
         if leaping:
             memory[CALLS] += 1.0

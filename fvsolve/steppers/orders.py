@@ -3,7 +3,7 @@
 # What the loop remembers, in one flat array of floats that a restart stores.
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
 JACOBIANS, FACTORS, NEWTON, NEWTON_FAILURES, WORST, RADIUS, CASES, SWITCHES = range(12, 20)
-# What is left of a given step that Newton could not take whole [s], and how many there were.
+# What is left of a given step that is taken in parts [s], and how many there were.
 LEFT, PARTED = range(20, 22)
 MEMORY = 22
 COUNTS = {
@@ -26,7 +26,7 @@ DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON
 PHASE, BEHIND, NOW, OLD, ROWS, BENT = range(6)
 FRESH, LEAPT, EMIT, READY = range(4)
 
-RATE, STATUS, WHERE = 0, 1, 2  # the entries of `out` that the loop reads
+RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # the entries of `out` that the loop reads
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step

@@ -4,24 +4,22 @@ T dx/dt = target - x, or x'' = w^2 (target - x) - 2 zeta w x', between its seat 
 to rest: armed[event] says that it is against its stop, armed[event + 2] that it is on its seat. target =
 (what is felt - what begins to open it) / span, of the pressure before a relief valve, of the drop across a check valve.
 
-Where it alone holds a rigid column, it leads that from its seat (armed[event + 4]) until its lift is above LEADS, and
-a given step resolves what the two exchange: `kernels.columns`.
+Where it alone holds a rigid column, it leads that from its seat (armed[event + 4]): `devices.lead`.
 """
 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF_DISC
+from fvsolve.kernels.devices.codes import RELIEF_DISC
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
+from fvsolve.kernels.devices.lead import lead_events, leads
 from fvsolve.kernels.records import (
+    CLOSING,
     I_ARMED,
-    I_COLUMNS,
-    I_DEVICES,
     I_FLOATS,
     I_LAYOUT,
     I_NODES,
-    I_SETTINGS,
     I_VALVES,
     RATE,
 )
@@ -32,7 +30,6 @@ AT_REST = 1e-10  # share of its span that does not lift it off a stop: rounding 
 SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
 EARLY = 1e-6  # share of 1 / w by which it is asked which way it moves
 SLAM = 1e-9  # share of T or 1 / w in which a disc that is about to reach its seat has done so
-LEADS, AT_MOST = 1e-4, 0.03  # lift up to which it leads its column, and at most where a given step asks for more
 
 
 @njit
@@ -72,51 +69,23 @@ def disc_speed(y, tables, device, before, drop):
         return 0.0, 0.0
     if device["states"] == 2:
         return y[device["y"] + 1], 0.0
-    return disc_push(y, tables, device, before, drop) / floats[data + TIME], 1.0 / floats[data + TIME] / floats[
-        data + SPAN
-    ]
+    return disc_push(y, tables, device, before, drop) / floats[data + TIME], disc_slope(tables, device)
 
 
 @njit
-def leads(tables, k):
-    """Whether restriction k is a disc that leads the rigid column which it alone holds."""
-    if tables[I_VALVES][k]["device"] < 0:
-        return False
-    device = tables[I_DEVICES][tables[I_VALVES][k]["device"]]
-    return (device["kind"] == CHECK_DISC or device["kind"] == RELIEF_DISC) and tables[I_ARMED][
-        device["event"] + 4
-    ] > 0.0
-
-
-@njit
-def led_until(out, tables, device):
-    """Lift above which it does not lead its column; 0 where it holds none alone."""
-    valve, columns, most = tables[I_VALVES][device["valve"]], tables[I_COLUMNS], 0.0
-    for k in range(columns.size):
-        for i in (columns[k]["from_node"], columns[k]["to_node"]):
-            joined, node = i == valve["from_node"] or i == valve["to_node"], tables[I_NODES][i]
-            if joined and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
-                most = max(most, led_beside(out, tables, device, columns[k]["area"] / columns[k]["length"]))
-    return most
-
-
-@njit
-def led_beside(out, tables, device, yielding):
-    """The same, beside a column of area over length `yielding`: LEADS, or where a given step resolves their exchange.
-
-    Its rate is (2 dP / x) (1 / (T span) + (A / L) / sqrt(G dP)).
-    """
-    floats, data, step = tables[I_FLOATS], device["data"], tables[I_SETTINGS][0]["step"]
-    root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
-    rate = 2.0 * root * yielding / sqrt(tables[I_VALVES][device["valve"]]["conductance"])
-    if device["states"] == 1:
-        rate += 2.0 * root * root / floats[data + TIME] / floats[data + SPAN]
-    return min(max(LEADS, 2.0 * step * rate), AT_MOST)
+def disc_slope(tables, device):
+    """d(dx/dt) / d(what it feels) [1/Pa/s]; none of a disc with inertia."""
+    floats, data = tables[I_FLOATS], device["data"]
+    return 1.0 / (floats[data + TIME] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
 @njit
 def move_disc(y, dydt, out, tables, device):
-    """Rates of its lift and of its speed, none against a stop; and its greatest rate."""
+    """Rates of its lift and of its speed, none against a stop; its greatest rate.
+
+    And -x'/x where it closes on a column into out[CLOSING]: one that flows back slams it, x ~ (time left)^(1/3), which
+    no step leads across.
+    """
     floats, armed, at, o = tables[I_FLOATS], tables[I_ARMED], device["event"], device["y"]
     drive, held = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
@@ -129,6 +98,10 @@ def move_disc(y, dydt, out, tables, device):
     else:
         dydt[o] = 0.0 if held else y[o + 1]
         dydt[o + 1] = 0.0 if held else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
+    valve, nodes = tables[I_VALVES][device["valve"]], tables[I_NODES]
+    brakes = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
+    if brakes and dydt[o] < 0.0 and not leads(tables, device["valve"]):
+        out[CLOSING] = max(out[CLOSING], -dydt[o] / max(disc_lift(y, tables, device), 1e-300))
 
 
 @njit
@@ -164,11 +137,7 @@ def disc_events(y, out, tables, device, g):
         seat = max(x + SLAM * min(speed, 0.0), onward[0])
     either(tables, g, at, stop)
     either(tables, g, at + 2, seat)
-    most = led_until(out, tables, device)
-    if armed[at + 4] > 0.0:
-        either(tables, g, at + 4, x - most)
-    else:
-        either(tables, g, at + 4, -1.0 if armed[at + 2] > 0.0 and most > 0.0 else 1.0)
+    lead_events(out, tables, device, g, x, armed[at + 2] > 0.0, disc_slope(tables, device))
 
 
 @njit

@@ -2,7 +2,7 @@
 
 dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP. armed[event] says that it holds back reversed flow,
 armed[event + 2] that it stands fully open, armed[event + 4] that it stands on its seat: these change on accepted
-states alone.
+states alone. Where it alone holds a rigid column, it leads that from its seat (armed[event + 6]): `devices.lead`.
 """
 
 from math import sqrt
@@ -11,7 +11,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
-from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_VALVES, RATE
+from fvsolve.kernels.devices.lead import is_stem, lead_events, leads
+from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_NODES, I_VALVES, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
 
@@ -37,6 +38,23 @@ def set_regulator(y, out, tables, device):
 
 
 @njit
+def stem_speed(t, tables, device, before, behind):
+    """dx/dt of one that a pressure moves, at p' before it and behind it, and d(dx/dt) / d(what it senses)."""
+    floats, armed, at, data = tables[I_FLOATS], tables[I_ARMED], device["event"], device["data"]
+    if armed[at + 2] > 0.0 or armed[at + 4] > 0.0:
+        return 0.0, 0.0
+    change, slope = schedule_value(tables, device["schedule"], t) - floats[data + SET], 1.0 / stroke(tables, device)
+    error = change - behind if device["kind"] == REDUCING else before - change
+    return (floats[data + ERROR] + error) * slope, slope
+
+
+@njit
+def stroke(tables, device):
+    """Band times time constant: dx/dt = error / stroke."""
+    return tables[I_FLOATS][device["data"] + BAND] * tables[I_FLOATS][device["data"] + TIME]
+
+
+@njit
 def regulator_error(t, out, tables, device):
     """What asks it to open, as a share of its band: set less sensed, but sensed less set where it sustains."""
     layout, floats, data = tables[I_LAYOUT][0], tables[I_FLOATS], device["data"]
@@ -54,7 +72,7 @@ def regulator_error(t, out, tables, device):
 @njit
 def move_regulator(t, y, dydt, out, tables, device):
     """dx/dt, none against a stop; and its greatest rate."""
-    out[RATE] = max(out[RATE], regulator_rate(out, tables, device))
+    out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
     armed, at = tables[I_ARMED], device["event"]
@@ -63,14 +81,16 @@ def move_regulator(t, y, dydt, out, tables, device):
 
 
 @njit
-def regulator_rate(out, tables, device):
-    """How fast the loop through what it senses can be [1/s]."""
-    k, floats, data = device["valve"], tables[I_FLOATS], device["data"]
-    speed = 1.0 / (floats[data + BAND] * floats[data + TIME])
-    if device["kind"] == FLOW_CONTROL:
-        return speed * sqrt(tables[I_VALVES][k]["conductance"] * abs(head_drop(tables, out, k)[1]))
+def regulator_rate(y, out, tables, device):
+    """How fast the loop through what it senses can be [1/s]; where a column sets its flow, d dP / dx = -2 dP / x."""
+    k, speed = device["valve"], 1.0 / stroke(tables, device)
+    drop = abs(head_drop(tables, out, k)[1])
+    if not is_stem(device):
+        return speed * sqrt(tables[I_VALVES][k]["conductance"] * drop)
     end = tables[I_VALVES][k]["to_node"] if device["kind"] == REDUCING else tables[I_VALVES][k]["from_node"]
-    return loop_rate(out, tables, k, end, speed)
+    if tables[I_NODES][end]["gates"] < 0:
+        return loop_rate(out, tables, k, end, speed)
+    return 0.0 if leads(tables, k) else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
 
 
 @njit
@@ -88,11 +108,12 @@ def regulator_events(t, y, out, tables, device, g):
     full, seat = -error - AT_REST, error - AT_REST
     if armed[at + 2] == 0.0:
         full = max(full + SETTLED, 1.0 - x)
-    if armed[at + 4] == 0.0:
-        seat = max(seat + SETTLED, x)
+    if armed[at + 4] == 0.0:  # a column that it leads holds it back, as it did not on its seat
+        seat = max(error + (AT_REST if leads(tables, device["valve"]) else -SETTLED), x)
     either(tables, g, at, back)
     either(tables, g, at + 2, full)
     either(tables, g, at + 4, seat)
+    lead_events(out, tables, device, g, x, is_stem(device) and armed[at + 4] > 0.0, 1.0 / stroke(tables, device))
 
 
 @njit

@@ -41,7 +41,7 @@ class Regulator(Device, kind=""):
     states = ("opening",)
     quantities = ("opening",)
     events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
-              "leaves its seat")  # fmt: skip
+              "leaves its seat", "", "")  # fmt: skip
     remedy = "give it a longer time_constant"
     key, end, verb = "set_pressure", "", ""  # what is set, at which end it is sensed, what it does
 

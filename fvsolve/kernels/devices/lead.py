@@ -1,0 +1,78 @@
+"""Valves that lead the rigid column which they alone hold, from their seat. Knows one valve and the columns beside it.
+
+A disc or a stem leads from its seat (armed[event + 4], of a stem + 6) until its lift is above LEADS, and a given step
+resolves what the two exchange: `kernels.led`.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.devices.codes import CHECK_DISC, REDUCING, RELIEF_DISC, SUSTAINING
+from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.records import I_ARMED, I_COLUMNS, I_DEVICES, I_NODES, I_SETTINGS, I_VALVES
+from fvsolve.kernels.restrictions import head_drop
+
+LEADS, AT_MOST = 1e-4, 0.03  # lift up to which it leads its column, and at most where a given step asks for more
+
+
+@njit
+def is_disc(device):
+    """Whether it is a disc on a spring."""
+    return device["kind"] == CHECK_DISC or device["kind"] == RELIEF_DISC
+
+
+@njit
+def is_stem(device):
+    """Whether it is a stem that a pressure moves."""
+    return device["kind"] == REDUCING or device["kind"] == SUSTAINING
+
+
+@njit
+def lead_flag(device):
+    """Which flag says that it leads its column."""
+    return device["event"] + (4 if is_disc(device) else 6)
+
+
+@njit
+def leads(tables, k):
+    """Whether restriction k leads the rigid column which it alone holds."""
+    if tables[I_VALVES][k]["device"] < 0:
+        return False
+    device = tables[I_DEVICES][tables[I_VALVES][k]["device"]]
+    return (is_disc(device) or is_stem(device)) and tables[I_ARMED][lead_flag(device)] > 0.0
+
+
+@njit
+def led_until(out, tables, device, speed):
+    """Lift above which it does not lead its column; 0 where it holds none alone.
+
+    speed : d(dx/dt) / d(drop) [1/Pa/s].
+    """
+    valve, columns, most = tables[I_VALVES][device["valve"]], tables[I_COLUMNS], 0.0
+    for k in range(columns.size):
+        for i in (columns[k]["from_node"], columns[k]["to_node"]):
+            joined, node = i == valve["from_node"] or i == valve["to_node"], tables[I_NODES][i]
+            if joined and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
+                most = max(most, led_beside(out, tables, device, columns[k]["area"] / columns[k]["length"], speed))
+    return most
+
+
+@njit
+def led_beside(out, tables, device, yielding, speed):
+    """The same, beside a column of area over length `yielding`: LEADS, or where a given step resolves their exchange.
+
+    Its rate is (2 dP / x) (speed + (A / L) / sqrt(G dP)).
+    """
+    root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
+    rate = 2.0 * root * (root * speed + yielding / sqrt(tables[I_VALVES][device["valve"]]["conductance"]))
+    return min(max(LEADS, 2.0 * tables[I_SETTINGS][0]["step"] * rate), AT_MOST)
+
+
+@njit
+def lead_events(out, tables, device, g, x, seated, speed):
+    """g: way to a lift x at which it leads no column any more, both ways; it takes the lead on its seat alone."""
+    at, most = lead_flag(device), led_until(out, tables, device, speed)
+    if tables[I_ARMED][at] > 0.0:
+        either(tables, g, at, x - most)
+    else:
+        either(tables, g, at, -1.0 if seated and most > 0.0 else 1.0)

@@ -1,0 +1,33 @@
+"""Valves that regulate a pressure beside a rigid column, by SciPy at 1e-11. Knows no fvsolve."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+
+def leaves_with_column(source, start, kinks, lifted, g, stroke, inertia, friction, at):
+    """[lift, mass flow] at times `at` of a stem that leaves its seat at `start` with the rigid column that it holds.
+
+    inertia dM/dt = source(t) - M^2 / (G x^2) - friction M |M|, stroke dx/dt = lifted(t, drop across it). Both start as
+    powers of the time s since then: x = a s^2, M = a s^2 sqrt(G source), at s = 1e-5 here.
+    """
+    s = 1e-5
+    drop = source(start + s)
+    steep = (lifted(start + s, drop) - lifted(start, source(start))) / s
+    felt = lifted(start, 1.0) - lifted(start, 0.0)  # over the drop
+    root = math.sqrt(g * drop)
+    x = 0.5 * steep * s**2 / (stroke + felt * inertia * root)  # stroke x' = steep s - felt inertia root x'
+
+    def rates(t, y):
+        drop = (y[1] / y[0]) ** 2 / g
+        return [lifted(t, drop) / stroke, (source(t) - drop - friction * y[1] * abs(y[1])) / inertia]
+
+    y, now, found = [x, root * x], start + s, {}
+    for end in [*(k for k in kinks if k > now), max(at)]:
+        step = solve_ivp(rates, (now, end), y, method="Radau", rtol=1e-10, atol=1e-14, dense_output=True)
+        found |= {t: step.sol(t) for t in at if now <= t <= end}
+        now, y = end, step.y[:, -1]
+    return np.array([found[t] for t in at]).T
