@@ -184,7 +184,6 @@ def test_a_set_pressure_is_an_input():
 
 COLUMN = {"type": "rigid-column", "length": 50.0, "diameter": 0.1,
           "friction": {"model": "quasi-steady", "factor": 0.02}}  # fmt: skip
-FALLS, RISES = {"time": [2.0, 4.0], "value": [6e5, 3e5]}, {"time": [2.0, 4.0], "value": [4e5, 7e5]}
 
 
 def lag_of(kind, after):
@@ -192,32 +191,34 @@ def lag_of(kind, after):
     return 0.3 if after == (kind == "pressure-sustaining") else 30.0
 
 
-def held_column(kind, after, law, numerics):
-    """A valve, set to 5 bar, that leaves its seat beside the column it alone holds; `after` it, or before."""
-    up, down = {"pressure-reducing": (8e5, FALLS), "pressure-sustaining": (RISES, 1e5)}[kind]
+def far_ends(kind, start, end):
+    """(before, behind) a valve and its column, one of them from `start` to `end` in two seconds."""
+    moves = {"time": [2.0, 4.0], "value": [start, end]}
+    return (8e5, moves) if kind == "pressure-reducing" else (moves, 1e5)
+
+
+def held_column(kind, after, ends, law, numerics):
+    """A valve, set to 5 bar, beside the column it alone holds; `after` it, or before."""
     part = {"type": kind, "area": 0.01, "discharge_coefficient": 0.61, "set_pressure": 5e5}
     part["time_constant"] = lag_of(kind, after)
     first, second = (COLUMN, part) if after else (part, COLUMN)
     links = {"one": {**first, "from": "up", "to": "m"}, "two": {**second, "from": "m", "to": "down"}}
-    nodes, name = {"up": reservoir(up), "m": junction(), "down": reservoir(down)}, "two" if after else "one"
+    nodes, name = {"up": reservoir(ends[0]), "m": junction(), "down": reservoir(ends[1])}, "two" if after else "one"
     probes = [f"{name}.opening", f"{name}.flow"]
     return scene(nodes, links, 6.0, numerics, probes, 0.1, fluid={**WATER, "law": law}), name
 
 
-def leaving_with_column(kind, after, at):
-    area = math.pi * 0.05**2
-    up, down = (8e5, FALLS) if kind == "pressure-reducing" else (RISES, 1e5)
-    ends = [lambda t, p=p: np.interp(t, p["time"], p["value"]) if isinstance(p, dict) else p for p in (up, down)]
+def equations(kind, after, ends):
+    """(source, lifted, G, stroke, inertia, friction) as `truth.stems` wants them."""
+    bore = math.pi * 0.05**2
+    up, down = (lambda t, p=p: np.interp(t, p["time"], p["value"]) if isinstance(p, dict) else p for p in ends)
 
     def lifted(t, drop):
-        before, behind = (ends[1](t) + drop, ends[1](t)) if after else (ends[0](t), ends[0](t) - drop)
+        before, behind = (down(t) + drop, down(t)) if after else (up(t), up(t) - drop)
         return SET - behind if kind == "pressure-reducing" else before - SET
 
-    start = 2.0 + 2.0 / 3.0
-    return stems.leaves_with_column(
-        lambda t: ends[0](t) - ends[1](t), start, [4.0], lifted, 2.0 * RHO * 0.0061**2, 1e5 * lag_of(kind, after),
-        50.0 / area, 0.02 * 50.0 / (0.1 * 2.0 * RHO * area**2), at,
-    )  # fmt: skip
+    return (lambda t: up(t) - down(t), lifted, 2.0 * RHO * 0.0061**2, 1e5 * lag_of(kind, after), 50.0 / bore,
+            0.02 * 50.0 / (0.1 * 2.0 * RHO * bore**2))  # fmt: skip
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -228,11 +229,29 @@ def leaving_with_column(kind, after, at):
 @pytest.mark.parametrize("after", [False, True])
 def test_it_leaves_its_seat_with_the_column_that_it_holds_as_their_equations_say(kind, after, law, numerics):
     """Both start as s^2, and exchange what they have at a rate that starts at infinity."""
-    case, name = held_column(kind, after, law, numerics)
+    ends = far_ends(kind, *((6e5, 3e5) if kind == "pressure-reducing" else (4e5, 7e5)))
+    case, name = held_column(kind, after, ends, law, numerics)
     result, at = fvsolve.run(case), (2.8, 3.0, 4.0, 6.0)
-    lift, flow = leaving_with_column(kind, after, at)
+    lift, flow = stems.leaves_with_column(*equations(kind, after, ends), 8.0 / 3.0, [4.0], at)
     (leaves,) = result.summary["events"]
     assert result.ok and (leaves["what"], leaves["time"]) == ("leaves its seat", pytest.approx(8.0 / 3.0, abs=1e-9))
     rows, near = [int(np.argmin(abs(result.t - t))) for t in at], 2e-3 if "step" in numerics else 4e-4
     assert result[f"{name}.opening"][rows] == pytest.approx(lift, rel=near)
     assert result[f"{name}.flow"][rows] * RHO == pytest.approx(flow, rel=near)
+
+
+@pytest.mark.parametrize("numerics", [{"rtol": 1e-6}, {"method": "dormand-prince", "rtol": 1e-6},
+                                      {"method": "rodas-5p", "rtol": 1e-9}, {"method": "radau-iia-5", "rtol": 1e-6},
+                                      {"method": "rk4", "step": 1e-3}])  # fmt: skip
+@pytest.mark.parametrize("kind", ["pressure-reducing", "pressure-sustaining"])
+def test_it_comes_to_its_seat_with_the_column_that_it_holds(kind, numerics):
+    """Ever faster they exchange what they have, until both stand; what a given step leaves of the flow is stopped."""
+    after = kind == "pressure-sustaining"
+    ends = far_ends(kind, *((6e5, 2e5) if after else (3e5, 7e5)))
+    case, name = held_column(kind, after, ends, "linear", numerics)
+    result = fvsolve.run(case)
+    (shuts,) = result.summary["events"]
+    assert result.ok and shuts["what"] == "is shut"
+    assert "step" in numerics or result.summary["marks"] == []
+    assert shuts["time"] == pytest.approx(stems.shuts_with_column(*equations(kind, after, ends), 2.0), rel=1e-4)
+    assert not result[f"{name}.flow"][result.t > shuts["time"]].any()

@@ -137,7 +137,7 @@ def disc_events(y, out, tables, device, g):
         seat = max(x + SLAM * min(speed, 0.0), onward[0])
     either(tables, g, at, stop)
     either(tables, g, at + 2, seat)
-    lead_events(out, tables, device, g, x, armed[at + 2] > 0.0, disc_slope(tables, device))
+    lead_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, disc_slope(tables, device))
 
 
 @njit

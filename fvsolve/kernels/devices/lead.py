@@ -1,7 +1,7 @@
-"""Valves that lead the rigid column which they alone hold, from their seat. Knows one valve and the columns beside it.
+"""Valves that lead the rigid column which they alone hold, near their seat. Knows one valve and the columns beside it.
 
-A disc or a stem leads from its seat (armed[event + 4], of a stem + 6) until its lift is above LEADS, and a given step
-resolves what the two exchange: `kernels.led`.
+A disc leads from its seat, a stem to its seat too (armed[event + 4], of a stem + 6), until its lift is above LEADS and
+a given step resolves what the two exchange: `kernels.led`. A disc that goes to its seat may slam.
 """
 
 from math import sqrt
@@ -69,10 +69,10 @@ def led_beside(out, tables, device, yielding, speed):
 
 
 @njit
-def lead_events(out, tables, device, g, x, seated, speed):
-    """g: way to a lift x at which it leads no column any more, both ways; it takes the lead on its seat alone."""
+def lead_events(out, tables, device, g, x, share, speed):
+    """g: way to a lift x at which it leads no column any more; to this share of it, where it takes the lead, if any."""
     at, most = lead_flag(device), led_until(out, tables, device, speed)
     if tables[I_ARMED][at] > 0.0:
         either(tables, g, at, x - most)
     else:
-        either(tables, g, at, -1.0 if seated and most > 0.0 else 1.0)
+        either(tables, g, at, x - share * most if share * most > 0.0 else 1.0)

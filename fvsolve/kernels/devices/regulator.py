@@ -20,6 +20,7 @@ OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at
 AT_REST = 1e-10  # error, as a share of the band, that does not lift it off a stop: rounding must not
 SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
 ALMOST_SHUT = 1e-6  # opening below which its flow may be rounding
+RETURNS = 0.5  # share of the lift up to which it leads its column, below which it takes the lead again
 RELUCTANCE = 1e-3  # drop below which it stays shut against reversed flow [Pa]
 
 
@@ -113,7 +114,7 @@ def regulator_events(t, y, out, tables, device, g):
     either(tables, g, at, back)
     either(tables, g, at + 2, full)
     either(tables, g, at + 4, seat)
-    lead_events(out, tables, device, g, x, is_stem(device) and armed[at + 4] > 0.0, 1.0 / stroke(tables, device))
+    lead_events(out, tables, device, g, x, RETURNS if is_stem(device) else 0.0, 1.0 / stroke(tables, device))
 
 
 @njit
