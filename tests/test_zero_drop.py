@@ -113,3 +113,17 @@ def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(nam
     assert abs(result["pot.pressure"][-1] - high) < 1e-2
     if name != "dormand-prince":  # which stability holds
         assert result.summary["steps"] < 200
+
+
+def test_what_error_control_does_not_see_shrinks_with_the_opening_that_is_held():
+    """A valve declared open and held at a tenth passes what one declared a tenth open does, at any drop above 1 Pa."""
+    low, high, area = 1e5, 1e5 + 40.0, 1e-4
+    nodes = {"lake": reservoir(high), "pot": chamber(1e-3, low)}
+    found = []
+    for opening, inputs in ((1.0, {"tap.opening": 0.1}), (0.1, {})):
+        links = {"tap": {**valve("lake", "pot", area), "opening": opening}}
+        numerics = {"method": "radau-iia-5", "rtol": 1e-6}
+        model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, numerics, ["tap.flow"], 0.1)))
+        held = fvsolve.advance(model, fvsolve.initial_state(model), 1e-7, inputs)
+        found.append(held.y[0])
+    assert found[0] == pytest.approx(found[1], rel=1e-6)

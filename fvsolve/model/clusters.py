@@ -124,7 +124,7 @@ def soften(scene, ks) -> None:
         if row["transition"] == 0.0 and row["law"] <= rec.TWO_WAY:
             link = scene.case.conduits[scene.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            opening = getattr(link, "opening", None)
+            opening = getattr(link, "opening", getattr(link, "position", None))  # none: of a tank's connection
             stays = row["law"] == rec.ROOT and (opening is None or np.all(opening.value == 1.0))
             drop = max(1.0 if neck else 0.0, unseen if stays else 0.0)
             flow = scene.law.transition_flow(scene.valve_names[k], link, 10.0, scene.fault)
