@@ -114,6 +114,20 @@ def test_a_short_pipe_whose_waves_do_not_come_back_is_but_doubtful():
     assert found == [(False, ["links.main"]), (True, ["links.main"])]
 
 
+@pytest.mark.parametrize("cells", [5, 12, 30, 39])
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_proved_limit_is_one_of_few_cells_too_grown_or_not(cells, turned):
+    """Twenty steps of upwind by euler at Courant 1.05, whose shortest wave is seven times what it was."""
+    found = []
+    for courant in (1.0, 1.05):
+        h = courant * LENGTH / cells / SPEED
+        nodes = {"lake": lake(50.0), "end": {"type": "inflow", "flow": 0.0}}
+        links = {"main": pipe(*(("end", "lake") if turned else ("lake", "end")), LENGTH, 0.3, SPEED, cells)}
+        result = fvsolve.run(scene(nodes, links, 20 * h, {"scheme": "upwind", "method": "euler", "step": h}, [], h))
+        found.append((result.ok, [(one.place, one.limit) for one in result.warnings if one.kind == "step-limit"]))
+    assert found == [(True, []), (False, [("links.main", pytest.approx(1.0))])]
+
+
 def test_upwind_keeps_its_step_so_that_courant_one_stays_exact():
     assert "upwind" not in QUICKER
     assert all(quicker("upwind", cells) == 1.0 for cells in range(1, 20))

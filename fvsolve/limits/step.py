@@ -105,22 +105,28 @@ def pipe_rooms(model, method: str) -> list[Room]:
     cells = np.array([pipe.cells for pipe in model.pipes])
     long = cells >= (FIFTH if numerics.scheme == "weno5" else LONG)  # at whose ends it is of a lower order where rough
     rooms = [room for k in np.flatnonzero(~long) if (room := short_pipe(model, method, int(k), float(courant[k])))]
-    if long.any():
-        k = int(np.argmax(np.where(long, courant, -1.0)))
+    inner = cells >= FIFTH if proved(model) else long  # what grows between the ends does so in few cells, too
+    if inner.any():
+        k = int(np.argmax(np.where(inner, courant, -1.0)))
         rooms += long_pipe(model, method, k, float(courant[k]))
     return sorted(rooms, key=lambda room: (not sound(room), room.courant / max(room.limit, 1e-300)))[-1:]
 
 
 def long_pipe(model, method: str, k: int, courant: float) -> list[Room]:
-    """Pipe k of many cells, if a wave grows on a grid without ends."""
-    scheme, limited = frozen(model.case.numerics.scheme)
+    """Pipe k, if a wave grows on a grid without ends."""
+    scheme = frozen(model.case.numerics.scheme)[0]
     if holds_well(scheme, method, courant):
         return []
     one = advection_limit(scheme, method)
     grows = math.inf if one.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
-    proved = one.proved and not limited and model.case.fluid.law == "linear"
-    found = Room(f"links.{model.pipes[k].name}", courant, one.limit, scheme, proved, "on a long pipe", grows=grows)
+    sure = one.proved and proved(model)
+    found = Room(f"links.{model.pipes[k].name}", courant, one.limit, scheme, sure, "on a long pipe", grows=grows)
     return [found] if grows >= GROWS else []
+
+
+def proved(model) -> bool:
+    """Whether von Neumann's limit is one of its pipes, by proof: a linear scheme, and waves that no state changes."""
+    return not frozen(model.case.numerics.scheme)[1] and model.case.fluid.law == "linear"
 
 
 def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
