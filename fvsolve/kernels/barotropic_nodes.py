@@ -63,7 +63,7 @@ from fvsolve.kernels.records import (
 from fvsolve.kernels.restrictions import conductance, head_drop, is_lifting, lifting_slope, lifting_step, pump_step
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
-from fvsolve.kernels.valves import LEAST, flow_at_drop
+from fvsolve.kernels.valves import LEAST, flow_at_drop, transition_of
 
 
 @njit
@@ -207,7 +207,7 @@ def valve_target(tables, out, k, g):
     if valve["law"] == TWO_WAY and drop < 0.0:
         dense *= valve["back"]
     if valve["transition"] > 0.0:
-        return flow_at_drop(dense, valve["transition"], drop), dense
+        return flow_at_drop(dense, transition_of(valve, dense), drop), dense
     return dense * drop, dense
 
 
@@ -218,11 +218,11 @@ def valve_move(tables, out, k, g, m, wide):
     if valve["law"] == CURVE:
         rho, drop = head_drop(tables, out, k)
         return pump_step(tables, out, k, rho, g, m, drop)
-    transition = valve["transition"]
     if valve["law"] == POWER:
         drop, denser = valve_drive(tables, out, k)
         return emitter_step(tables[I_FLOATS], valve["data"], g * denser * denser, m, drop, rule_of(tables, k))
     target, slope = valve_target(tables, out, k, g)
+    transition = transition_of(valve, slope)
     if valve["law"] == LIFT and is_lifting(tables, k):
         return lifting_step(tables, out, k, full_flow(target, transition), slope, m, wide)
     if transition > 0.0:

@@ -171,7 +171,7 @@ def quickest_valve(t, y, dydt, out, handle):
             if valve["transition"] > 0.0 and g > 0.0:
                 change = stiff_i * out[layout["net"] + i]
                 change -= stiff_j * out[layout["net"] + j]
-                width = valve["transition"] * valve["transition"] / g
+                width = max(valve["transition"] ** 2 / g, valve["unseen"])
                 if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
     out[RATE] = rate

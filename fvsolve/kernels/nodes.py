@@ -27,6 +27,7 @@ from fvsolve.kernels.valves import (
     flow_at_drop,
     flow_change,
     flow_change_laminar,
+    transition_of,
 )
 
 
@@ -87,8 +88,8 @@ def close_single(out, tables):
         pj, zj = side_of(out, layout, nodes, j)
         g = conductance(tables, out, k)
         if valve["transition"] > 0.0:
-            base = flow_at_drop(valve["open"], valve["transition"], valve["drop"]) - valve["flow"]
-            x = flow_change_laminar(g, valve["transition"], zi + zj, valve["flow"], base, valve["drop"] + (pi - pj))
+            base = flow_at_drop(valve["open"], transition_of(valve, valve["open"]), valve["drop"]) - valve["flow"]
+            x = flow_change_laminar(g, transition_of(valve, g), zi + zj, valve["flow"], base, valve["drop"] + (pi - pj))
         else:
             surplus = (g - valve["open"]) * valve["drop"] + g * (pi - pj)
             x = flow_change(g, zi + zj, valve["flow"], surplus, g * (valve["drop"] + (pi - pj)))

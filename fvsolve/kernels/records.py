@@ -158,6 +158,7 @@ VALVE = np.dtype(
         ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
         ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
         ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 where pipes soften the root
+        ("unseen", "f8"),  # drop below which it is so at any opening [Pa]: error control sees none as small
         ("law", "i8"),
         ("device", "i8"),  # which device sets its conductance; -1: its schedule does
         ("data", "i8"),  # offset of a law's own numbers in `floats`

@@ -20,7 +20,7 @@ from fvsolve.kernels.records import (
     POWER,
     TWO_WAY,
 )
-from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, valve_conductance, valve_step
+from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of, valve_conductance, valve_step
 
 
 @njit(forceinline=True)
@@ -57,10 +57,10 @@ def restriction_step(tables, out, k, g, m, drop, wide):
         rho = tables[I_SETTINGS][0]["rho"]
         return pump_step(tables, out, k, rho, g, m, drop)
     if valve["law"] == LIFT and is_lifting(tables, k):
-        return lifting_step(tables, out, k, flow_at_drop(g, valve["transition"], drop), g, m, wide)
+        return lifting_step(tables, out, k, flow_at_drop(g, transition_of(valve, g), drop), g, m, wide)
     if valve["law"] == TWO_WAY and drop < 0.0:
         g *= valve["back"]
-    return valve_step(g, valve["transition"], m, drop)
+    return valve_step(g, transition_of(valve, g), m, drop)
 
 
 @njit
@@ -95,11 +95,11 @@ def restriction_slope(tables, out, k, drop):
         m = out[tables[I_LAYOUT][0]["valve"] + k]
         return pump_step(tables, out, k, tables[I_SETTINGS][0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
     if valve["law"] == LIFT and is_lifting(tables, k):
-        x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, valve["transition"], drop)
-        return x * flow_slope(g, valve["transition"], drop) + max(full, 0.0) * lift_rise(tables, k)
+        x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, transition_of(valve, g), drop)
+        return x * flow_slope(g, transition_of(valve, g), drop) + max(full, 0.0) * lift_rise(tables, k)
     if valve["law"] == TWO_WAY and drop < 0.0:
         g *= valve["back"]
-    return flow_slope(g, valve["transition"], drop)
+    return flow_slope(g, transition_of(valve, g), drop)
 
 
 @njit
@@ -139,7 +139,7 @@ def lift_of(tables, out, k, full, wide):
 @njit
 def lifting_step(tables, out, k, full, g, m, wide):
     """a, s of the flow x `full` of a lifting valve: of the root the chord as in `valve_step`, backwards its slope."""
-    x, transition = lift_of(tables, out, k, full, wide), tables[I_VALVES][k]["transition"]
+    x, transition = lift_of(tables, out, k, full, wide), transition_of(tables[I_VALVES][k], g)
     if x <= 0.0:
         return x * full - m, 0.0
     near = x * abs(full) if full < 0.0 and not wide else abs(m)
@@ -163,7 +163,7 @@ def restriction_lift(tables, out, k, g, drop, wide):
     valve = tables[I_VALVES][k]
     if valve["law"] != LIFT or not is_lifting(tables, k):
         return 0.0
-    return lifting_slope(tables, out, k, flow_at_drop(g, valve["transition"], drop), wide)
+    return lifting_slope(tables, out, k, flow_at_drop(g, transition_of(valve, g), drop), wide)
 
 
 @njit

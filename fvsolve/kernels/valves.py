@@ -39,6 +39,12 @@ def valve_conductance(tables, index, t):
 
 
 @njit(forceinline=True)
+def transition_of(valve, g):
+    """Flow below which the law of a restriction is laminar at a conductance [kg/s]."""
+    return max(valve["transition"], sqrt(g * valve["unseen"]))
+
+
+@njit(forceinline=True)
 def flow_at_drop(conductance, transition, drop):
     """Mass flow at a pressure drop; below `transition` [kg/s] an odd polynomial with a bounded slope, C2 joined."""
     if conductance <= 0.0:

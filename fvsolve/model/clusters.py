@@ -115,8 +115,8 @@ UNSEEN = 10.0  # tolerances of a vessel: that grows with what it has deviated, n
 def soften(scene, ks) -> None:
     """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10.
 
-    At a bladder accumulator, whose neck holds the least of pressures in hardly any mass, below a drop of 1 Pa; at a
-    valve that stays fully open, below a drop that error control does not see (`unseen_drop`).
+    At a bladder accumulator, whose neck holds the least of pressures in hardly any mass, below a drop of 1 Pa; and
+    below one that error control does not see (`unseen_drop`).
     """
     places, unseen = list(scene.case.places.values()), unseen_drop(scene, ks)
     for k in ks:
@@ -124,11 +124,8 @@ def soften(scene, ks) -> None:
         if row["transition"] == 0.0 and row["law"] <= rec.TWO_WAY:
             link = scene.case.conduits[scene.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            opening = getattr(link, "opening", getattr(link, "position", None))  # none: of a tank's connection
-            stays = row["law"] == rec.ROOT and (opening is None or np.all(opening.value == 1.0))
-            drop = max(1.0 if neck else 0.0, unseen if stays else 0.0)
-            flow = scene.law.transition_flow(scene.valve_names[k], link, 10.0, scene.fault)
-            row["transition"] = max(flow, math.sqrt(row["conductance"] * drop))
+            row["transition"] = scene.law.transition_flow(scene.valve_names[k], link, 10.0, scene.fault)
+            row["unseen"] = max(1.0 if neck else 0.0, unseen)
 
 
 def unseen_drop(scene, ks) -> float:

@@ -14,7 +14,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.emitters import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_step
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.schedules import schedule_value
-from fvsolve.kernels.valves import flow_at_drop, flow_slope, valve_conductance
+from fvsolve.kernels.valves import flow_at_drop, flow_slope, transition_of, valve_conductance
 from fvsolve.model.bodies import start_bodies
 from fvsolve.model.probes import probe_offsets
 from fvsolve.model.unsteady import add_terms
@@ -215,7 +215,7 @@ class Start:
         if row["law"] == rec.POWER:
             row["open"] = g
             return self.outlet_edge(k, g)
-        transition, back = float(row["transition"]), float(row["back"])
+        back = float(row["back"])
         row["open"] = g
         g *= self.factor.get(k, 1.0)
         i, j = int(row["from_node"]), int(row["to_node"])
@@ -226,6 +226,7 @@ class Start:
 
         def newton(flow, present):
             here = g * back if present < 0.0 else g
+            transition = transition_of(row, here)
             target = flow_at_drop(here, transition, present)
             if transition > 0.0 and abs(target) < transition:
                 slope = flow_slope(here, transition, present)
@@ -404,7 +405,7 @@ class Start:
             if row["law"] >= rec.CURVE:
                 continue
             here = row["open"] * (row["back"] if row["drop"] < 0.0 else 1.0)
-            law = flow_at_drop(here, row["transition"], row["drop"])
+            law = flow_at_drop(here, transition_of(row, here), row["drop"])
             if abs(law - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                 row["open"] = 0.0
             elif row["transition"] == 0.0 and row["open"] > 0.0:

@@ -12,14 +12,11 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.valves import relative_area
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.units import show
-
-LEAST_OPEN = 1e-6  # of the area, that still counts as open
 
 
 def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
@@ -83,7 +80,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         return model
     tables = list(model.tables)
     schedules, pieces, nodes = tables[rec.I_SCHEDULES].copy(), tables[rec.I_PIECES], tables[rec.I_NODES].copy()
-    scalars, valves = tables[rec.I_SCALARS].copy(), tables[rec.I_VALVES].copy()
+    scalars = tables[rec.I_SCALARS].copy()
     known = input_schedules(model)
     linear = model.case.fluid.law == "linear"
     rows = []
@@ -98,8 +95,6 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             nodes["head_given"][one.node] = one.kind == "head"
         else:
             found = one.scale * found + one.offset
-        if one.kind == "opening":
-            soften(model, valves, one.schedule, found)
         parts = [(one.schedule, found)]
         if one.other >= 0:
             parts = [(one.schedule, max(found, 0.0)), (one.other, max(-found, 0.0))]
@@ -110,17 +105,8 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             bounds = scalars[one.scalar]
             bounds["least"], bounds["greatest"] = min(bounds["least"], found), max(bounds["greatest"], found)
     tables[rec.I_SCHEDULES], tables[rec.I_NODES], tables[rec.I_SCALARS] = schedules, nodes, scalars
-    tables[rec.I_VALVES] = valves
     tables[rec.I_PIECES] = np.vstack([pieces, rows])
     return replace(model, tables=tuple(tables))
-
-
-def soften(model: Model, valves: np.ndarray, schedule: int, opening: float) -> None:
-    """Keep the drop below which a valve is laminar for error control's sake, however far it is open now."""
-    for name, row in zip(model.valve_names, valves, strict=True):
-        if row["schedule"] == schedule and getattr(model.case.conduits[name], "laminar_reynolds", None) is None:
-            floats, table, size = model.tables[rec.I_FLOATS], row["table"], row["table_size"]
-            row["transition"] *= max(relative_area(row["characteristic"], floats, table, size, opening), LEAST_OPEN)
 
 
 def checked(name: str, value: float, one: Input) -> float:

@@ -8,7 +8,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import disc as law
 from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
-from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope
+from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.devices.device import Device
 from fvsolve.model.devices.regulator import opening_of
 from fvsolve.steady import Edge
@@ -60,7 +60,7 @@ class Lifting(Device, kind=""):
     def law(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
         """(flow, its slope over the drop at this lift, its slope over the lift)."""
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
-        transition = float(start.valves[k]["transition"])
+        transition = transition_of(start.valves[k], g)
         full, x = flow_at_drop(g, transition, drop), max(lift, 0.0)
         steep = flow_slope(g, transition, drop) if transition > 0.0 else 0.5 * g / max(abs(full), LEAST * math.sqrt(g))
         return x * full, x * steep, max(full, 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING, SUSTAINING
 from fvsolve.kernels.schedules import schedule_value
-from fvsolve.kernels.valves import flow_at_drop
+from fvsolve.kernels.valves import flow_at_drop, transition_of
 from fvsolve.model.devices.device import Device
 from fvsolve.steady import Edge
 
@@ -219,13 +219,14 @@ def opening_of(start, k: int) -> float:
     """Opening x between 0 and 1 at which valve k passes its flow of the profile, M |M| = G x^2 dP."""
     valve = start.valves[k]
     dense, drop = start.law_of(k)
-    flow, transition = abs(float(valve["flow"])), float(valve["transition"])
+    flow = abs(float(valve["flow"]))
     if flow == 0.0 or not dense * drop > 0.0:
         return 0.0
-    if flow >= transition:
+    if flow >= valve["transition"] and drop >= valve["unseen"]:
         return min(flow / math.sqrt(dense * drop), 1.0)
     low, high, x = 0.0, 1.0, 0.5
     for _ in range(60):
-        low, high = (x, high) if flow_at_drop(dense * x * x, transition, drop) < flow else (low, x)
+        g = dense * x * x
+        low, high = (x, high) if flow_at_drop(g, transition_of(valve, g), drop) < flow else (low, x)
         x = 0.5 * (low + high)
     return x
