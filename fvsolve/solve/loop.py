@@ -13,7 +13,7 @@ from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
-from fvsolve.solve.meeting import parted, shut_places
+from fvsolve.solve.meeting import let_go, shut_places
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
 from fvsolve.steppers.ledger import SUMS
@@ -158,7 +158,7 @@ class Loop:
         Returns (number, flow [kg/s] that it has lost) of those that had another.
         """
         found, out, layout = [], self.evaluate(limit), self.model.layout
-        while (event := parted(self.model, self.t, self.now, out)) is not None:
+        while (event := let_go(self.model, self.t, self.now, out)) is not None:
             before = self.armed.copy()
             self.armed[event], self.armed[event + 1] = 1.0, 0.0
             self.note(before)

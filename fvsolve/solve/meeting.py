@@ -69,7 +69,7 @@ def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[in
     return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
 
 
-def parted(model: Model, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+def let_go(model: Model, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
     """The event of the air valve where columns part the most, which air lets go on; None where none part."""
     places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]
