@@ -119,7 +119,7 @@ def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(nam
 @pytest.mark.parametrize("name", ["auto", "rodas-4", "rodas-5p", "radau-iia-5"])
 @pytest.mark.parametrize("kind", ["valve", "relief-valve", "check-valve", "spool-valve"])
 def test_what_fills_through_a_valve_that_moves_comes_to_rest_in_few_steps(name, kind):
-    """A slow schedule of a valve or a spool, a disc that takes its time; 79 004 and 7 653 steps where it was forgotten."""
+    """A slow schedule of a valve or a spool, a disc that takes its time: 79 004 and 7 653 steps before."""
     area = {"area": 1e-3, "discharge_coefficient": 1.0}
     slow = {"time": [0.0, 1.0, 4.0], "value": [0.3, 0.8, 0.5]}
     nodes = {"lake": reservoir(5e5), "pot": chamber(0.1, 1e5)}
