@@ -21,7 +21,7 @@ from fvsolve.steppers.tableau import method_named
 
 SHARE = 0.01  # of what drives the scene, over which slopes are taken
 MOST = 300  # states: of more, nothing is predicted
-GROWS = 10.0  # times in the run: less is not seen
+GROWS = 10.0  # times that a mode or a wave grows in a run: less is not seen, where no step is without growth
 LEAST, FINE = 1e-15, 40  # of the step, where one that holds is looked for; halvings back from there
 FOLLOWED = 1.0  # of |h s|: such a mode is followed step by step, and grows as the start says
 

@@ -16,7 +16,7 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.limits.ends import FIFTH, LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
-from fvsolve.limits.lumped import Mode, lumped_modes, times
+from fvsolve.limits.lumped import GROWS, Mode, lumped_modes, times
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.symbol import weights_of
 from fvsolve.model.schemes import FROZEN_AS
@@ -25,7 +25,6 @@ from fvsolve.steppers.tableau import method_named
 
 SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
 SHARE = 0.05  # of an estimate: up to here beyond it a step is doubtful, from there on wrong
-GROWS = 10.0  # times that the worst wave grows in a run: less is not seen, where no step is without growth
 SMOOTH = 1e6  # times that deviations of cells must grow to be wrong where no schedule jumps: there are hardly any
 STILL, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05  # of its range by which a step leaves what is no wave astray, on average
 LIMITED = 0.3  # the same where limiters stand between few cells: they hold by up to so much more (tests/test_ends.py)
