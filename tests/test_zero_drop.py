@@ -40,10 +40,11 @@ def test_a_given_step_is_taken_whole_and_ends_in_rest(name, build, step):
 
 
 @pytest.mark.parametrize("name", ["trapezoid", "implicit-midpoint", "gauss-4"])
-def test_what_is_not_l_stable_swings_but_takes_the_steps_it_is_given(name):
+def test_what_is_not_l_stable_swings_but_takes_the_steps_it_is_given_and_says_that_it_is_wrong(name):
     result = fvsolve.run(dead_end(method=name, step=0.01))
-    assert result.ok, result.reason
-    assert result.summary["steps"] == 100
+    assert result.reason == "finished" and result.summary["steps"] == 100
+    wrong = np.mean(np.abs(result["pot.pressure"] - 101325.0 - 9806.65 * 50.0)) / (9806.65 * 50.0)
+    assert wrong > 0.1 and not result.ok and [one.kind for one in result.warnings] == ["step-error"]
 
 
 @pytest.mark.parametrize("name", ["tr-bdf2", "esdirk-4", "radau-iia-5", "radau-iia-9"])

@@ -1,8 +1,9 @@
-"""A fixed step of a run taken again as two halves, now and then: by how much it goes astray. Knows explicit methods.
+"""A given step of a run taken again as two halves, now and then: what its errors amount to. Knows no kind of method.
 
-Beyond its limit a step need not grow: a valve bends what swings about its drop, so that vessels go to and fro between
-two wrong pressures for ever, as large as the step is long. Seen from where it was, such a step ends nowhere near where
-two halves of it do.
+A step that is too long need not grow: a valve bends what swings about its drop, so that vessels go to and fro between
+two wrong pressures for ever, and implicit methods bear any step. Seen from where it was, such a step does not end where
+two halves of it do, by e. What e of n steps amount to hangs on how much of an error a step leaves, r: of a vessel that
+drains r is near one, and all remain; where r is small each step makes its own, e (1 - r^n) / (1 - r).
 """
 
 from __future__ import annotations
@@ -10,37 +11,42 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
 from fvsolve.limits.drives import lumped, spreads
 from fvsolve.limits.step import DOUBTFUL, WRONG
 from fvsolve.steppers import automatic
 from fvsolve.steppers import orders as told
+from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.tableau import method_named
 
 LOOKS = 32  # in a run
 LEAST = 0.1  # of what counts as small: a range that is less is none
 WHOLE = 0.99  # of a step: what an event or a kink has cut says nothing
+ROUNDING = 1e-10  # of ranges: an error that is less does not show what a step leaves of it
 
 
 class Halves:
-    """What no cell holds, looked at over a run of fixed explicit steps; nothing where there is none or no such step.
+    """States looked at over a run of given steps: all of implicit methods, of explicit ones what no cell holds.
 
-    kept : float64[2 + 3 k]  looks, the step count from which on the next is due; sums of what was astray, least and
-    greatest of each state: what a resumed run needs
+    Nothing where there is none or no such step. Of cells a Courant number says how long an explicit step may be.
+
+    kept : float64[4 + 5 k]  looks, the step count from which on the next is due, that of the last, what a step leaves
+    of an error; of each state the error of the last step seen, what all amount to, the sum of that over the looks,
+    its least and its greatest: what a resumed run needs
     """
 
     def __init__(self, model) -> None:
-        numerics = model.case.numerics
+        numerics, self.step = model.case.numerics, float(model.tables[rec.I_SETTINGS][0]["step"])
         method = method_named(automatic.first_method(numerics.method))
-        fixed = numerics.step is not None and method.explicit
-        self.model, self.which = model, lumped(model) if fixed else np.zeros(0, dtype=np.int64)
-        self.kept = np.zeros(2 + 3 * self.which.size)
-        self.astray, self.least, self.greatest = self.kept[2:].reshape(3, -1)
+        which = lumped(model) if method.explicit else np.arange(model.y_size)
+        self.model, self.which = model, which[: None if self.step > 0.0 else 0]
+        self.kept = np.zeros(4 + 5 * self.which.size)
+        self.error, self.astray, self.sums, self.least, self.greatest = self.kept[4:].reshape(5, -1)
         self.least[:] = self.greatest[:] = model.start[self.which]
+        self.kept[3], self.stepper = 1.0, None
         if self.which.size:
-            self.a, self.b = method.a.astype(float), method.b.astype(float)
-            self.step, self.out = numerics.step, model.new_out()
-            self.every = max(1.0, (numerics.end - numerics.start) / numerics.step // LOOKS)
-            self.kept[1] = self.every
+            self.every = max(1.0, (numerics.end - numerics.start) / self.step // LOOKS)
+            self.kept[1], self.small = self.every, spreads(model, LEAST)[self.which]
 
     def room(self, steps: float) -> float:
         """Steps that may be taken before the next look."""
@@ -48,38 +54,68 @@ class Halves:
 
     def look(self, loop) -> None:
         """At an accepted state, if it is time: take the last step again."""
-        steps, h = loop.memory[told.STEPS], loop.memory[told.LAST]
+        memory = loop.memory
+        steps, h = memory[told.STEPS], memory[told.LAST]
         if not self.which.size or steps < self.kept[1]:
             return
-        if h < WHOLE * self.step:  # the next one then
-            self.kept[1] = steps + 1.0
+        self.kept[1] = steps + 1.0  # the next one, if this says nothing
+        end = loop.orders[told.END]
+        whole = self.step if loop.t < end else min(self.step, end - memory[told.T_MARK])
+        if h < WHOLE * whole:
             return
-        before, now = loop.before, loop.now[self.which]
-        y = before
-        for part in range(2):
-            y = self.stepped(loop.t - h + part * 0.5 * h, y, 0.5 * h)
-        for end in (before[self.which], now):
-            np.fmin(self.least, end, out=self.least)
-            np.fmax(self.greatest, end, out=self.greatest)
-        self.astray += np.abs(y[self.which] - now)
-        self.kept[:2] = self.kept[0] + 1.0, steps + self.every
+        before, now = loop.before[self.which], loop.now[self.which]
+        t = loop.t - h
+        middle = self.stepped(loop, t, loop.before, 0.5 * h, fresh=True)
+        halves = self.stepped(loop, t + 0.5 * h, middle, 0.5 * h)
+        if not np.all(np.isfinite(halves)):  # such a step is not to be had
+            return
+        for state in (before, now):
+            np.fmin(self.least, state, out=self.least)
+            np.fmax(self.greatest, state, out=self.greatest)
+        with np.errstate(over="ignore", invalid="ignore"):  # of what grows beyond all numbers
+            self.gather(loop, h, steps - self.kept[2], halves - loop.now)
+        self.kept[:3] = self.kept[0] + 1.0, steps + self.every, steps
 
-    def stepped(self, t: float, y: np.ndarray, h: float) -> np.ndarray:
-        """One step of the method by the compiled rates, as devices stand now."""
-        k = np.zeros((self.b.size, y.size))
-        for i, row in enumerate(self.a):
-            self.model.functions.rhs(t + h * row.sum(), y + h * (row @ k), k[i], self.out, self.model.handle)
-        return y + h * (self.b @ k)
+    def gather(self, loop, h: float, steps: float, error: np.ndarray) -> None:
+        """Add what so many steps have done, the last of them by `error`, those before by no more than the last seen."""
+        widths, own = self.widths(), np.abs(error[self.which])
+        size = float(np.linalg.norm(own / widths))
+        if size > ROUNDING:
+            moved = self.stepped(loop, loop.t - h, loop.before + error, h) - loop.now
+            left = float(np.linalg.norm(moved[self.which] / widths)) / size
+            self.kept[3] = left if left < 1.0 else 1.0
+        left = self.kept[3]
+        after = left ** (steps - 1.0)
+        many = steps - 1.0 if left > 1.0 - ROUNDING else (1.0 - after) / (1.0 - left)
+        self.astray[:] = left * (after * self.astray + many * np.fmin(own, self.error)) + own
+        self.error[:] = own
+        self.sums += self.astray
+
+    def stepped(self, loop, t: float, y: np.ndarray, h: float, fresh=False) -> np.ndarray:
+        """One step of the run's method from a state, as devices stand now; `fresh` for the first at a place."""
+        if self.stepper is None:
+            model = self.model
+            self.stepper = Stepper(
+                loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure, model.scale
+            )
+            self.stepper.out = model.new_out()
+        if fresh:
+            self.stepper.forget()
+        self.stepper.orders[:] = loop.orders
+        return self.stepper.once(loop.rhs, self.model.handle, int(self.model.layout["supply"]), t, h, y)
+
+    def widths(self) -> np.ndarray:
+        """Ranges of the states so far."""
+        return np.maximum(self.greatest - self.least, self.small)
 
     def worst(self) -> tuple[str, float]:
-        """(state, share of its range by which it went astray on average), of the one that did most."""
+        """(place, share of its range by which it is astray on average), of the state that is most."""
         if not self.kept[0]:
             return "", 0.0
-        widths = np.maximum(self.greatest - self.least, spreads(self.model, LEAST)[self.which])
-        share = self.astray / self.kept[0] / widths
+        share = self.sums / self.kept[0] / self.widths()
         share[np.isnan(share)] = np.inf
         at = int(np.argmax(share))
-        return self.model.state_names[self.which[at]], float(share[at])
+        return self.model.state_names[self.which[at]].partition("[")[0], float(share[at])
 
     def notice(self) -> Notice | None:
         """What is to be said of a run that ended."""
@@ -88,6 +124,7 @@ class Halves:
             return None
         ok = share < WRONG
         said = "it may be wrong" if ok else "the numbers are not to be trusted"
-        text = (f"{place}: steps of {self.step:.6g} s end {100 * share:.2g} % of its range from where two halves "
-                f"do, on average; {said}; halve the step")  # fmt: skip
-        return Notice("step-error", place, text, "step", share, WRONG, ok)
+        text = (f"{place}: steps of {self.step:.6g} s leave it about {100 * share:.2g} % of its range astray, on "
+                f"average, by where two halves of them end; {said}; halve the step")  # fmt: skip
+        key = "step" if self.model.case.numerics.step is not None else "courant"
+        return Notice("step-error", place, text, key, share, WRONG, ok)

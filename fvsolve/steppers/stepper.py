@@ -115,6 +115,21 @@ class Stepper:
         """How much work the run was."""
         return {name: int(self.memory[at]) for name, at in told.COUNTS.items()}
 
+    def once(self, rhs, handle, where: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
+        """The state after a single step of h from y at t, whatever step was before; NaN where it is not to be had.
+
+        Of what is remembered a Newton step takes the Jacobian alone, a linearly implicit one nothing.
+        """
+        self.y[0] = y
+        self.memory[told.STEPS] += 1.0
+        rhs(t, self.y[0], self.k[0], self.out, handle)
+        self.supply[0] = self.out[where : where + self.supply.shape[1]]
+        error = self.attempt(
+            rhs, *self.algebra, handle, self.coefficients, self.shape, t, h, self.y, 0, 1, self.k, self.supply, where,
+            self.out, self.scale, self.orders, self.memory, self.work, self.vectors, self.store, self.store_complex,
+        )  # fmt: skip
+        return self.y[1].copy() if error != told.NEWTON_FAILED else np.full(y.size, np.nan)
+
     def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
         """March on; returns one of the codes of `steppers.orders`."""
         return self.march(
