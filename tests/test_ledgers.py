@@ -163,3 +163,31 @@ def test_what_a_dry_tank_is_asked_for_is_as_accurate_as_what_it_holds(method):
     mass = fvsolve.run(case).ledger["mass"]
     assert {key: mass[key] for key in seesaw()} == pytest.approx(seesaw(), rel=7e-5)
     assert abs(mass["remainder"]) < 1e-8
+
+
+def sucked(method: str, scheme: str = "muscl", rtol: float = 1e-6, **more):
+    """A pool over a slope that suction drains dry through all of its shallow side, and goes on to draw."""
+    outlet = {"outlet": {"side": "east", "span": [0.0, 4.0]}}
+    nodes = {
+        "pool": {"type": "basin", "size": [6.0, 4.0], "cells": [6, 4], "level": 0.2, "elevation": 0.0, "bed": "0.02*x",
+                 "patches": outlet, **more},
+        "out": reservoir(AMBIENT - 1e4, elevation=0.0),
+    }  # fmt: skip
+    numerics = {"scheme": scheme, "method": method, "rtol": rtol}
+    return fvsolve.run(scene(nodes, {"tap": valve("pool.outlet", "out", 0.05)}, 10.0, numerics, ["tap.flow"], 0.01))
+
+
+ISLAND = [[1.0, 1.0, 2.0, 2.0]]
+
+
+@pytest.mark.parametrize("method", ["dormand-prince", "auto", "rodas-5p", "radau-iia-5", "tr-bdf2", "esdirk-4"])
+@pytest.mark.parametrize("more", [{}, {"holes": ISLAND}], ids=["grid", "faces"])
+def test_a_patch_that_runs_dry_books_what_it_has_and_what_is_made_up(method, more):
+    result = sucked(method, **more)
+    mass, flowed = result.ledger["mass"], 1000.0 * np.trapezoid(result["tap.flow"], result.t)
+    fine, first = (sucked("dormand-prince", *how, **more).ledger["mass"] for how in (("muscl", 1e-9), ("upwind",)))
+    assert result.ok and mass["inflow"] == 0.0 and 0.0 <= mass["spilled"] <= 1e-8 * mass["initial"]
+    assert mass["outflow"] == pytest.approx(flowed, rel=1e-6)
+    assert mass["made_up"] == pytest.approx(fine["made_up"], rel=1e-4)
+    assert mass["made_up"] == pytest.approx(first["made_up"], rel=0.15)
+    assert abs(mass["remainder"]) <= 1e-12 * mass["initial"]

@@ -37,7 +37,7 @@ THIN = 1e-6  # depth below which velocities fade [m]
 # rows of BLOCK in the scratch of `settle`: what lies beyond, rates, sums for the step, flow through the side
 _E, _U, _V, _C, _RH, _RX, _RY, _FAST, _GONE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-ROWS = 14
+ROWS = 13
 
 
 @njit
@@ -165,9 +165,9 @@ def shallow_rates(
     if first_order:
         hs, es, us, vs = h, e, u, v
     shown, w = rest[4 * wide : 4 * wide + 2 * b], rest[4 * wide + 2 * b :]
-    top, free, shore = w[11 * BLOCK :], w[12 * BLOCK :], w[13 * BLOCK :]
+    top, shore = w[11 * BLOCK :], w[12 * BLOCK :]
     for i in range(BLOCK):
-        top[i], free[i] = 0.0, HUGE
+        top[i] = 0.0
     wide_by = width(limiter)
     known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
@@ -187,8 +187,9 @@ def shallow_rates(
                 )  # from zero to twice the depth
                 put_shores(h[o:], shore)
                 put_sides(sided, floats, integers, e, wide_by, shore, su, edges[:0], w, es)
-                put_sides(sided, floats, integers, u, wide_by, free, su, here, w, us)
-                put_sides(sided, floats, integers, v, wide_by, free, sv, here, w, vs)
+                # velocities by no more than waves run: beside a thin cell that runs away a linear field turns back
+                put_sides(sided, floats, integers, u, wide_by, c[o:], su, here, w, us)
+                put_sides(sided, floats, integers, v, wide_by, c[o:], sv, here, w, vs)
             sided += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
