@@ -50,11 +50,46 @@ def fork(**numerics) -> dict:
     return scene(nodes, links, 1.0, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=MIXTURE)
 
 
+def to_and_fro(**numerics) -> dict:
+    """A main before two valves and beside a relief valve: solved in turn, its stages swing for ever under weno5."""
+    nodes = {"high": lake(53.26, elevation=0.0), "low": reservoir(215.7e3, elevation=0.0),
+             "n0": junction(elevation=0.05578)}  # fmt: skip
+    relief = {"type": "relief-valve", "from": "high", "to": "n0", "area": 0.0005761, "set_pressure": 392.6e3,
+              "overpressure": 2e4, "time_constant": 0.2726}  # fmt: skip
+    links = {
+        "p0": pipe("high", "n0", 129.9, 0.1003, 1118.0, 8, friction=STEADY, minor_loss=1.5),
+        "out": valve("n0", "low", 0.006473770491803279, step(0.5423, 1.0, 0.5)),
+        "x0": valve("low", "n0", 0.003122950819672131),
+        "x1": relief,
+    }
+    return scene(nodes, links, 1.0, numerics, ["n0.pressure", "out.flow"], 0.05)
+
+
+def slowly(**numerics) -> dict:
+    """Three pipes under a step of four cells: solved in turn, the stages gain no more than a fifth by each turn."""
+    nodes = {
+        "high": lake(48.17, elevation=0.0), "low": reservoir(150e3, elevation=0.0), "n0": junction(elevation=4.0),
+        "n1": junction(0.002195, elevation=-0.4073),
+        "n2": {"type": "inflow", "flow": 0.002244, "elevation": 4.195},
+    }  # fmt: skip
+    smooth, rough = {"model": "hazen-williams", "coefficient": 110.0}, {"model": "chezy-manning", "coefficient": 0.012}
+    links = {
+        "p0": pipe("high", "n0", 224.2, 0.3333, 823.6, 8, friction=smooth, minor_loss=1.5),
+        "p1": pipe("high", "n1", 75.24, 0.1909, 858.5, 7, friction=rough),
+        "p2": pipe("n1", "n2", 290.6, 0.2065, 1185.0, 8, friction=STEADY, minor_loss=1.5),
+        "out": valve("n2", "low", 0.003960655737704918, step(0.3355, 1.0, 0.5568)),
+        "hole": {"type": "leak", "from": "n1", "coefficient": 2.838e-06},
+    }
+    return scene(nodes, links, 0.5, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=MIXTURE)
+
+
 SCENES = [
     (closing, {"method": "implicit-euler", "scheme": "muscl", "limiter": "minmod", "courant": 3.471}),
     (closing, {"method": "trapezoid", "scheme": "muscl", "limiter": "minmod", "courant": 3.471}),
     (closing, {"method": "radau-iia-3", "scheme": "weno5", "courant": 0.8596}),
     (fork, {"method": "implicit-euler", "scheme": "weno5", "courant": 1.044}),
+    (to_and_fro, {"method": "radau-iia-3", "scheme": "weno5", "courant": 1.009}),
+    (slowly, {"method": "lobatto-iiic-4", "scheme": "weno5", "courant": 3.979}),
 ]
 
 

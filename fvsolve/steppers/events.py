@@ -1,9 +1,10 @@
 """Events: functions that fall through zero, and the step that ends there. Knows no model."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.orders import NEWTON_FAILED, T
+from fvsolve.steppers.orders import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
 
 EVENT_TOLERANCE = 1e-13
+JUMP = 1e-6  # share of an event function, and of a given step: what is less is no jump, and not looked at
 
 
 @njit(forceinline=True)
@@ -51,12 +52,13 @@ def locate(
 ):  # fmt: skip
     """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] belongs to it.
 
-    h, e : those of the step that passes it; the error is NEWTON_FAILED where a stage on the way could not be solved.
+    h, e : those of the step that passes it. The error is NEWTON_FAILED where a stage on the way could not be solved, or
+    the end of a given step jumps across the event: its stages have several solutions, those of a shorter step one.
     """
-    t, low, high, at_low, at_high = memory[T], 0.0, h, 1.0, nearness(g, g_new)
-    guess = h
+    t, low, high, at_low, past = memory[T], 0.0, h, 1.0, nearness(g, g_new)
+    guess, at_high, side = h, past, 0
     for turn in range(101):
-        done = turn == 100 or at_high >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
+        done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
         if done and guess == high:
             break
         guess = high - at_high * (high - low) / (at_high - at_low)
@@ -76,7 +78,12 @@ def locate(
             break
         here = nearness(g, g_new)
         if here <= 0.0:
-            high, at_high, at_low = guess, here, 0.5 * at_low
+            high, at_high, past = guess, here, here
+            at_low, side = 0.5 * at_low if side > 0 else at_low, 1
         else:
-            low, at_low, at_high = guess, here, 0.5 * at_high
+            low, at_low = guess, here
+            at_high, side = 0.5 * at_high if side < 0 else at_high, -1
+    given = orders[KIND] == NEWTON_SOLVED and orders[CONTROL] != TOLERANCE
+    if given and past < -JUMP and high > JUMP * memory[STEP]:
+        e = NEWTON_FAILED
     return high, e

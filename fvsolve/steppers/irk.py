@@ -364,7 +364,7 @@ def attempt(
             finish(coefficients, shape, nnz, h, k, supply, work, vectors)
             break
         if work[MADE] == memory[STEPS]:
-            low, room = matrix(coefficients, s, LOWER), s + STAGES + F * q
+            low, room = matrix(coefficients, s, LOWER), s + STAGES + W * q
             why = sweep(
                 rhs, factor, solve, handle, coefficients, low, shape, t, h, y[now], y[3], k, supply, where, out, scale,
                 orders, memory, nnz, room, work, vectors, store,

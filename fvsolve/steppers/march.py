@@ -193,6 +193,21 @@ def march(
                 rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, memory[T], h, y, now,
                 new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
             )  # fmt: skip
+            passing = rest <= 1e3 * shortest(orders, memory)
+            if e != NEWTON_FAILED:
+                e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
+                if bearable(e, passing):
+                    events(memory[T] + h, y[new], handle, g_new)
+                    if fallen(g, g_new):
+                        length, e = locate(
+                            attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients,
+                            shape, h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store,
+                            store_complex, g, g_new, e,
+                        )  # fmt: skip
+                        if e != NEWTON_FAILED:
+                            h, memory[STEP], memory[LEFT] = length, 0.0, 0.0
+                            last = last and memory[T] + h >= orders[END]
+                            e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
             if e == NEWTON_FAILED:
                 failed = NEWTON_STUCK
                 memory[NEWTON_FAILURES] += 1.0
@@ -203,20 +218,6 @@ def march(
                 if orders[CONTROL] == TOLERANCE:
                     memory[STEP] = h
                 continue
-            e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
-            passing = rest <= 1e3 * shortest(orders, memory)
-            if bearable(e, passing):
-                events(memory[T] + h, y[new], handle, g_new)
-                if fallen(g, g_new):
-                    h, e = locate(
-                        attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients,
-                        shape, h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store,
-                        store_complex, g, g_new, e,
-                    )  # fmt: skip
-                    if e == NEWTON_FAILED:
-                        return NEWTON_STUCK
-                    last, memory[STEP], memory[LEFT] = last and memory[T] + h >= orders[END], 0.0, 0.0
-                    e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
             if bearable(e, passing):
                 if orders[CONTROL] != TOLERANCE:
                     break

@@ -95,10 +95,9 @@ def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
             j += 2
         return
     s, r = theta, 1.0 - theta
-    h00, h01 = r * r * (1.0 + 2.0 * s), s * s * (1.0 + 2.0 * r)
-    h10, h11 = h * s * r * r, -h * s * s * r
-    for i in range(y.size):
-        out[i] = h00 * y[i] + h01 * y_new[i] + (h10 * f[i] + h11 * f_new[i])
+    h01, h10, h11 = s * s * (1.0 + 2.0 * r), h * s * r * r, -h * s * s * r
+    for i in range(y.size):  # by differences: what stands still does to the last bit
+        out[i] = y[i] + (h01 * (y_new[i] - y[i]) + (h10 * f[i] + h11 * f_new[i]))
 
 
 @njit(forceinline=True)

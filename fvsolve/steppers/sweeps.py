@@ -2,7 +2,9 @@
 
 With A = C U, C lower triangular and the diagonal of U one, K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a
 diagonally implicit step, which `newton.damp` solves. On a stiff part it ends after q such sweeps, I - U being
-nilpotent; a soft part gains a factor of 4 or more by each (van der Houwen and de Swart 1997).
+nilpotent; a soft part gains a factor of 4 or more by each (van der Houwen and de Swart 1997). A limiter or weno's
+weights take that gain, or let sweeps go to and fro: then K goes on from where the last two changes would cancel
+(Anderson 1965, of depth one).
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from fvsolve.steppers.orders import CONTROL, TOLERANCE
 from fvsolve.steppers.step import copy
 
 MOST = 40
+SLOW, FARTHEST = 0.4, 10.0  # what a sweep may leave of the change of the one before; how many changes K is led on
 
 
 def lower(a: np.ndarray) -> np.ndarray:
@@ -37,7 +40,8 @@ def sweep(
 ):  # fmt: skip
     """Slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
 
-    low : float64[q q], C flat; room : first of q rows of `vectors` for the slopes of the sweep before.
+    low : float64[q q], C flat; room : first of 3 q rows of `vectors`, for the slopes from which a sweep starts, what it
+    changed, and what came of it.
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
@@ -76,5 +80,30 @@ def sweep(
         size = sqrt(total / max(q * n, 1))
         if size <= enough or size <= still and turn >= q and size >= 0.5 * before or size <= floor and turn == MOST - 1:
             return CONVERGED
+        lead_on(q, k, room, weights, vectors, 1.0 if turn >= q and size > SLOW * before else 0.0)
         before = size
     return FAILED
+
+
+@inner
+def lead_on(q, k, room, weights, vectors, share):
+    """K <- K - g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 of the changes d; keeps both for the next.
+
+    share : 0 to keep them alone.
+    """
+    dot, square = 0.0, 0.0
+    for i in range(q):
+        ki, last, change = k[i + 1], vectors[room + i], vectors[room + q + i]
+        for e in range(weights.size):
+            d = (ki[e] - last[e]) * weights[e]
+            more = d - change[e] * weights[e]
+            dot += d * more
+            square += more * more
+    g = share * max(dot / square, -FARTHEST) if square > 0.0 and square < np.inf else 0.0
+    for i in range(q):
+        ki, last, change, came = k[i + 1], vectors[room + i], vectors[room + q + i], vectors[room + 2 * q + i]
+        for e in range(weights.size):
+            new = ki[e]
+            change[e] = new - last[e]
+            ki[e] = new - g * (new - came[e])
+            came[e] = new

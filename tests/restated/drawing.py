@@ -36,7 +36,6 @@ SCHEMES = ["upwind", "muscl", "upwind5", "weno5", "fromm", "linear-upwind", "upw
 LIMITERS = ["minmod", "van-leer", "monotonized-central"]
 BY_COURANT = ["ssp-rk3", "rk4", "ssp-rk10-4"]
 IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-3", "alexander-2", "lobatto-iiic-4"]
-ONE_BY_ONE = ["implicit-euler", "trapezoid", "alexander-2"]
 BY_ERROR = ["rodas-4", "rodas-5p", "radau-iia-5", "esdirk-4", "tr-bdf2", "dormand-prince", "bogacki-shampine", "auto"]
 FLUIDS = {
     "linear": dict(WATER),
@@ -55,11 +54,7 @@ FRICTIONS = [
 
 @st.composite
 def numerics(draw) -> dict:
-    """Any scheme with an explicit method by Courant number, an implicit one by its own step, or one by its error.
-
-    Limited ones with steps by Newton at a given length where stages are solved one by one: all at once they may have no
-    solution near, and where a step is taken in parts is decided by rounding.
-    """
+    """Any scheme with an explicit method by Courant number, an implicit one by its own step, or one by its error."""
     given = {"scheme": draw(st.sampled_from(SCHEMES))}
     if given["scheme"] == "muscl":
         given["limiter"] = draw(st.sampled_from(LIMITERS))
@@ -67,8 +62,7 @@ def numerics(draw) -> dict:
     if kind == "courant":
         return given | {"method": draw(st.sampled_from(BY_COURANT)), "courant": draw(between(0.3, 0.5))}
     if kind == "implicit":
-        able = ONE_BY_ONE if given["scheme"] in ("muscl", "weno5") else IMPLICIT
-        return given | {"method": draw(st.sampled_from(able)), "courant": draw(between(0.5, 4.0))}
+        return given | {"method": draw(st.sampled_from(IMPLICIT)), "courant": draw(between(0.5, 4.0))}
     return given | {"method": draw(st.sampled_from(BY_ERROR)), "rtol": draw(st.sampled_from([1e-4, 1e-6]))}
 
 
