@@ -39,10 +39,7 @@ class Shown:
     def plot(self, path=None):
         """Its picture as a matplotlib Figure, also written to `path` where one is given."""
         module, _, name = self.picture.partition(":")
-        figure = getattr(import_module(module), name)(self)
-        if path is not None:
-            figure.savefig(path)
-        return figure
+        return kept(getattr(import_module(module), name)(self), path)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.said()}>"
@@ -54,6 +51,18 @@ class Shown:
         body = "".join("<tr>" + "".join(f"<td>{escape(_cell(x))}</td>" for x in row) + "</tr>" for row in rows[:SHOWN])
         more = f"<p>{len(rows) - SHOWN} more rows in .frame()</p>" if len(rows) > SHOWN else ""
         return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
+
+
+def kept(figure, path):
+    """A figure, also written to `path` where one is given; FvsolveError where that cannot be."""
+    try:
+        if path is not None:
+            figure.savefig(path)
+    except (OSError, ValueError) as error:  # no such folder, no such kind of picture
+        from fvsolve.errors import FvsolveError
+
+        raise FvsolveError(f"{path}: the picture cannot be written: {error}") from error
+    return figure
 
 
 def _cell(value: Any) -> str:

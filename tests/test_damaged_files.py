@@ -207,6 +207,15 @@ def test_tables_that_are_damaged_are_refused_when_they_are_read(name, text, stop
         ask.get(name, result.view)()
 
 
+def test_an_envelope_that_was_written_and_is_gone_is_named(stopped, tmp_path):
+    shutil.copytree(stopped[1], tmp_path / "out")
+    result = fvsolve.open_run(tmp_path / "out")
+    assert "main" in fvsolve.open_run(tmp_path / "out").envelope
+    (tmp_path / "out" / "envelope.csv").unlink()
+    with pytest.raises(RunError, match=r"envelope\.csv cannot be read: No such file"):
+        result.envelope  # noqa: B018
+
+
 def test_points_of_a_study_that_are_damaged_are_made_anew(tmp_path):
     case, vary = json.loads(json.dumps(branched(fields=0))), {"links.valve.area": [0.004, 0.005]}
     case["numerics"] |= {"end": 0.05}

@@ -29,6 +29,7 @@ def drains(section: float, bore: float, numerics: dict, level: float = 3.0, end:
 
 @pytest.mark.parametrize("method", ["auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "rk4"])
 def test_a_tank_that_runs_empty_makes_up_no_water(method):
+    near = {"rk4": 5e-6, "rodas-5p": 2e-6}.get(method, 2e-7)  # of steps of 0.25 s; few at rtol 1e-6; more of them
     for section in (0.5, 1.0, 2.0, 3.0, 5.0):
         for bore in (0.05, 0.08, 0.1):
             result = drains(section, bore, settings(method, 0.25))
@@ -36,7 +37,7 @@ def test_a_tank_that_runs_empty_makes_up_no_water(method):
             left = vessels.prism(section, 0.61 * scenes.area(bore), 3.0, np.array([1500.0]))[0]
             assert result.ok and not result.marks
             assert mass["outflow"] == pytest.approx(contents - mass["final"], abs=1e-8 * contents)
-            assert mass["final"] == pytest.approx(1000.0 * section * left, abs=5e-6 * contents)  # as steps are
+            assert mass["final"] == pytest.approx(1000.0 * section * left, abs=near * contents)
             assert max(mass["made_up"], mass["spilled"], mass["inflow"]) <= 1e-8 * contents
             assert min(mass["made_up"], mass["spilled"], mass["inflow"]) >= 0.0
             assert abs(mass["remainder"]) <= 1e-12 * contents
@@ -116,8 +117,9 @@ def test_what_a_scene_without_a_state_passes_is_as_accurate_as_its_tolerance(met
     case = scene(nodes, {"way": valve("lake", "town", 0.01)}, 100.0, settings(method, 0.02), ["way.flow"], 0.01)
     result = fvsolve.run(case)
     mass, flowed = result.ledger["mass"], np.trapezoid(1000.0 * result["way.flow"], result.t)
+    near = 5e-6 if method == "tr-bdf2" else 1e-6  # of second order: rtol 1e-6 bounds each of its many steps
     for word in ("inflow", "outflow"):
-        assert mass[word] == pytest.approx(flowed, rel=5e-6)
+        assert mass[word] == pytest.approx(flowed, rel=near)
     assert mass["nodes"]["lake"]["outflow"] == 0.0 and mass["nodes"]["town.demand.outside"]["inflow"] == 0.0
 
 

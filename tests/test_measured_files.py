@@ -57,6 +57,7 @@ def test_other_encodings_of_spreadsheets_are_read(encoding, tmp_path):
 @pytest.mark.parametrize("text, words", {
     "decimal commas between commas": ("t [s],H [m]\n0,0,45,7\n0,1,46,1\n", "line 2: 4 cells under 2 headers; decimal"),
     "one of them": ("t [s],H [m]\n0,45,7\n1,46,1\n", "line 2: 3 cells under 2 headers; decimal commas?"),
+    "one of them under a comma at the end": ("t [s],H [m],\n0,45,7\n1,46,1\n", 'line 2: "7" stands under no header'),
     "only further down": ("t [s],H [m]\n0,45\n1,46,1\n", "line 3: 3 cells under 2 headers; decimal commas?"),
     "a row too short": ("t,H,p\n0,45,1\n1,46\n", "line 3: 2 cells under 3 headers"),
     "a row too long": ("t;H\n0;45\n1;46;3\n", "line 3: 3 cells under 2 headers"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,9 @@ from test_output import branched
 from test_text_as_it_stands import still
 
 import fvsolve
-from fvsolve import FvsolveError, State, advance, initial_state, integrate
+from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies
 from fvsolve.output.memory import MemorySink
-from fvsolve.studies import sweep
+from fvsolve.studies import LineImpedance, Transfer, sweep
 
 
 @pytest.fixture(scope="module")
@@ -162,6 +163,109 @@ def doors(model):
 
 
 NO_DOORS = ("functions", "handle", "picture")
+LINE, FIRST = LineImpedance(1.0, 1.0, 0.5), Transfer([[-1.0]], [1.0], [1.0], 0.0)
+OTHERS = {  # of what functions hand out and studies offer: what is taken
+    "Result.plot": (lambda there: there.result.plot, {"path": None}),
+    "Result.plot_envelope": (lambda there: there.result.plot_envelope, {"path": None}),
+    "Result.column": (lambda there: there.result.column, {"probe": "gate.pressure"}),
+    "Result.si": (lambda there: there.result.si, {"probe": "gate.pressure"}),
+    "Result.view": (lambda there: there.result.view, {"time": None, "field": None, "path": None, "contours": 0}),
+    "Result.animate": (lambda there: there.result.animate, {"path": None, "field": None, "contours": 0}),
+    "Case.elevation": (lambda there: there.case.elevation, {"name": "gate"}),
+    "Case.wave_speed": (lambda there: there.case.wave_speed, {"name": "main"}),
+    "Case.plot": (lambda there: there.case.plot, {"path": None}),
+    "fit": (lambda there: studies.fit, {"sizes": [4, 2, 1], "errors": [16, 4, 1], "floor": 0.0}),
+    "advection_limit": (lambda there: studies.advection_limit, {"scheme": "upwind", "method": "rk4", "courant": None}),
+    "advection_limits": (lambda there: studies.advection_limits, {"schemes": "upwind", "methods": "rk4", "courant": 1}),
+    "limit_of": (lambda there: studies.limit_of,
+                 {"weights": (0, 0, 1, 0, 0), "scheme": "mine", "method": "rk4", "courant": 1}),
+    "positive_real": (lambda there: studies.positive_real, {"numerator": [1], "denominator": [1, 1]}),
+    "line_positive_real": (lambda there: studies.line_positive_real, {"line": LINE, "shift": None, "tolerance": 1e-6}),
+    "sweep_positive_real": (lambda there: studies.sweep_positive_real,
+                            {"h": lambda s: 1.0, "slope": 0.0, "high": 1.0, "shift": 0.0, "tolerance": 1e-6}),
+    "state_positive_real": (lambda there: studies.state_positive_real, {"h": FIRST, "tolerance": 1e-9}),
+    "LineImpedance": (lambda there: partial(LineImpedance), {"z0": 1.0, "time": 1.0, "reflection": 0.5}),
+    "LineImpedance()": (lambda there: LINE, {"s": 1j}),
+    "Transfer": (lambda there: partial(Transfer), {"a": [[-1.0]], "b": [1.0], "c": [1.0], "d": 0.0}),
+    "Transfer()": (lambda there: FIRST, {"s": 1j}),
+    "limited_limits": (lambda there: studies.limited_limits, {"schemes": "muscl", "methods": "rk4", "cells": 3}),
+    "analyse": (lambda there: steppers.analyse, {"method": "rk4"}),
+    "local_error": (lambda there: steppers.local_error, {"method": "rk4", "lam": -1.0, "h": 0.1, "y": 1.0}),
+    "global_error": (lambda there: steppers.global_error, {"method": "rk4", "lam": 1j, "h": 0.1, "steps": 3}),
+    "seen_frequency": (lambda there: steppers.seen_frequency, {"method": "rk4", "omega": 1.0, "h": 0.1}),
+    "stability_function": (lambda there: steppers.stability_function, {"method": "rk4"}),
+    "pade": (lambda there: steppers.pade, {"k": 1, "m": 1}),
+}  # fmt: skip
+OTHER = [object(), "", "no\0where", "nowhere/at all", [None], ["a"], [np.nan], np.zeros((2, 3)), {"a": 1}, b"x", np.nan,
+         np.inf, -1, 2.5, True, 1 + 1j]  # fmt: skip
+TAKEN = {  # of all these
+    "2.5": "fit.floor advection_limit.courant advection_limits.courant limit_of.courant line_positive_real.shift "
+    "line_positive_real.tolerance sweep_positive_real.slope sweep_positive_real.high sweep_positive_real.shift "
+    "sweep_positive_real.tolerance state_positive_real.tolerance LineImpedance.z0 LineImpedance.time seen_frequency.h",
+    "2.5 -1": "positive_real.numerator positive_real.denominator LineImpedance.reflection Transfer.d local_error.h "
+    "global_error.h seen_frequency.omega",
+    "2.5 -1 (1+1j)": "LineImpedance().s Transfer().s local_error.lam local_error.y global_error.lam",
+    "'nowhere/at all' 'no\\x00where'": "limit_of.scheme",
+}
+TAKEN = {one: given for given, many in TAKEN.items() for one in many.split()}
+
+
+@pytest.fixture(scope="module")
+def there(model):
+    return SimpleNamespace(case=model.case, result=fvsolve.run(branched(fields=0), {"numerics.end": 0.01}))
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_doors_of_results_and_studies_take_what_they_name_and_refuse_all_else(name, there, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    make, plain = OTHERS[name]
+    door, bad = make(there), []
+    for one in plain:
+        for given in OTHER:
+            try:
+                door(**{**plain, one: given})
+                if repr(given) not in TAKEN.get(f"{name}.{one}", ""):
+                    bad.append(f"{name}: {one} = {given!r} was taken")
+            except FvsolveError as error:
+                assert len(str(error)) > 10
+            except Exception as error:  # which none of these is
+                bad.append(f"{name}: {one} = {given!r}: {error!r}")
+    assert bad == []
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("given, words", [
+    ("gate.presure", 'did you mean "gate.pressure"'), (3, "no probe 3"),
+])  # fmt: skip
+def test_a_result_suggests_the_probe_that_was_meant(given, words, there):
+    for door in (there.result.column, there.result.si):
+        with pytest.raises(FvsolveError, match=words):
+            door(given)
+
+
+def test_a_picture_that_cannot_be_written_is_named(there, tmp_path):
+    for name, words in (("no/such/folder.png", "folder.png"), ("gate.flow", "flow")):
+        for plot in (there.result.plot, there.result.plot_envelope, there.case.plot):
+            with pytest.raises(FvsolveError, match=f"{words}.*cannot be written"):
+                plot(tmp_path / name)
+
+
+def test_a_study_says_what_is_wrong_with_what_it_is_given():
+    for study, given, words in (
+        (studies.sweep, {"vary": {"nodes.pond.level": 3}}, "wanted a table of lists"),
+        (studies.failures, {"key": ["links.main.cells"]}, "wanted a key and its values"),
+        (studies.order, {"cells": 3, "refine": "time"}, "cells = 3: here steps alone are refined"),
+    ):
+        with pytest.raises(FvsolveError, match=words):
+            study(still(), **given)
+    with pytest.raises(FvsolveError, match="limited schemes are muscl, weno5"):
+        studies.limited_limits("fromm", "rk4")
+    with pytest.raises(FvsolveError, match="no input named 3"):
+        model = fvsolve.build(fvsolve.load(still()))
+        advance(model, initial_state(model), 1.0, {3: 1.0})
+    for bad in (lambda s: "a", lambda s: np.zeros(3), lambda s: {}):
+        with pytest.raises(FvsolveError, match="wanted a number for each"):
+            studies.sweep_positive_real(bad, 0.0, 1.0)
 
 
 def test_every_door_says_what_it_wants(model, tmp_path, monkeypatch):

@@ -42,6 +42,10 @@ SLIPS = {  # settings -> (place, key, value, limit, what the text says)
         {"links.main.wall": {"youngs_modulus": "170 MPa", "thickness": "8 mm"}},
         "links.main", "wall.youngs_modulus", 170e6, 2e8, "GPa meant?",
     ),
+    "modulus of steel": (
+        {"links.main.wall": {"youngs_modulus": "210 MPa", "thickness": "8 mm"}},
+        "links.main", "wall.youngs_modulus", 210e6, 4e8, "GPa meant?",
+    ),
     "modulus in GPa": (
         {"links.main.wall": {"youngs_modulus": 170, "thickness": "8 mm"}},
         "links.main", "wall.youngs_modulus", 170.0, 1e5, '"170 GPa"',
@@ -119,6 +123,7 @@ def test_examples_of_the_docs_are_within_what_practice_knows(name):
     [
         {"links.main.wave_speed": 50},  # a hose
         {"links.main.wall": {"youngs_modulus": "5 MPa", "thickness": "4 mm"}, "links.main.diameter": "20 mm"},  # rubber
+        {"links.main.wall": {"youngs_modulus": "0.25 GPa", "thickness": "20 mm"}},  # low-density polyethylene, SDR 17
         {"links.main.diameter": "0.1 mm", "links.main.friction.roughness": 0, "links.main.length": "0.1 m"},
         {"links.main.diameter": "12 m"},  # a penstock
         {"fluid.density": 13534, "fluid.bulk_modulus": "28 GPa"},  # mercury
@@ -143,9 +148,19 @@ def noted(case: dict) -> list:
     return [one for one in model_of(load(case)).warnings if one.kind == "range"]
 
 
+def rigid(case: dict) -> dict:
+    """The same flow in a rigid column into a tank."""
+    pipe, flow = case["links"]["main"], case["nodes"]["end"]["demand"]
+    kept = {key: pipe[key] for key in ("from", "to", "length", "diameter", "friction")}
+    column = {"type": "rigid-column", **kept, "initial_flow": flow}
+    nodes = {"lake": scenes.lake(50.0), "end": scenes.tank(10.0, 50.0)}
+    return {**case, "nodes": nodes, "links": {"main": column}, "numerics": {"end": 1.0}}
+
+
+@pytest.mark.parametrize("made", [dict, rigid])
 @pytest.mark.parametrize(("flow", "viscosity"), [(0.03, 1.0), (3e-5, 1e-3)])
-def test_laminar_water_in_a_main_is_noted(flow, viscosity):
-    (note,) = noted(main(flow, viscosity))
+def test_laminar_water_in_a_main_is_noted(flow, viscosity, made):
+    (note,) = noted(made(main(flow, viscosity)))
     reynolds = 1000.0 * flow / (math.pi / 4.0 * 0.3**2) * 0.3 / viscosity
     assert (note.place, note.key) == ("links.main", "reynolds") and note.value == pytest.approx(reynolds)
     assert f"{reynolds:.4g}" in note.text
@@ -158,9 +173,10 @@ def test_oil_may_be_laminar_and_water_at_rest():
 
 
 def test_a_flow_that_no_pipe_carries_is_noted():
-    friction = {"model": "none"}
-    (note,) = noted(main(30.0, friction=friction))
-    assert note.key == "flow" and note.value == pytest.approx(30.0 / (math.pi / 4.0 * 0.3**2))
+    case = main(30.0, friction={"model": "none"})
+    for same in (case, rigid(case)):
+        (note,) = noted(same)
+        assert note.key == "flow" and note.value == pytest.approx(30.0 / (math.pi / 4.0 * 0.3**2))
 
 
 @pytest.mark.parametrize("cells", [1, 2])

@@ -85,6 +85,13 @@ def test_a_reference_of_many_letters_is_answered_shortly():
     assert len(str(refused.value)) < 5000
 
 
+def test_a_unit_of_many_letters_is_refused_at_once():
+    with pytest.raises(CaseError, match="no unit has 100000 letters; wanted a length"):
+        fvsolve.load(branched(), {"links.main.length": "900 " + "m" * 10**5})
+    with pytest.raises(CaseError, match="no unit has 100000 letters; wanted a pressure"):
+        fvsolve.load(branched(), {"output.units": {"pressure": "q" * 10**5}})
+
+
 def test_a_long_run_is_told_before_it_starts(fvs, tmp_path, monkeypatch):
     long = fvsolve.build(fvsolve.load(branched(), {"numerics.end": 1e12, "output.every": 1e9}))
     assert re.fullmatch(r"case will take about \S+ years", expected(long))

@@ -12,11 +12,12 @@ from fvsolve.case import basins, ranges, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactSpec, FluidSpec, Numerics, Output
-from fvsolve.errors import Notice
+from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import Fluid
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.table import plain
 from fvsolve.shown import Shown
+from fvsolve.units import show
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,7 +125,7 @@ class Case(Shown):
         A reservoir given by head may leave it out where others state theirs: it then lies level with the
         first node that one of its links leads to, since its head alone drives the flow.
         """
-        if (beside := getattr(self.places[name], "level_of", None)) is not None:
+        if (beside := getattr(self._known(name, self.places, "place of the fluid"), "level_of", None)) is not None:
             return self.elevation(beside)
         stated = self.places[name].elevation
         if stated is not None or not self.elevations_stated:
@@ -138,7 +139,14 @@ class Case(Shown):
 
     def wave_speed(self, name: str) -> float:
         """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho), 1/K = 1/beta + diameter / (E wall)."""
-        return wave_speed(self.links[name], self.properties)
+        pipes = {one: link for one, link in self.links.items() if link.kind == "pipe"}
+        return wave_speed(self._known(name, pipes, "pipe"), self.properties)
+
+    def _known(self, name: str, known: dict[str, Any], what: str) -> Any:
+        if not isinstance(name, str) or name not in known:
+            said = f"no {what} {show(name)}{did_you_mean(str(name), known)}"
+            raise FvsolveError(f"{said}; it has {listing(known) or 'none'}")
+        return known[name]
 
     def resolved(self) -> str:
         """TOML text with every default filled in, in SI; it reads back as an equal case beside its files.

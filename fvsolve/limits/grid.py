@@ -13,11 +13,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from numbers import Rational
 
 import numpy as np
 
-from fvsolve.doors import NAME, NUMBER, door
-from fvsolve.errors import FvsolveError
+from fvsolve.doors import NAME, NAMES, POSITIVE, TEXT, Kind, door, is_row
 from fvsolve.limits.boxes import negative_point, value
 from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability import a_stable
@@ -87,7 +87,7 @@ class AdvectionLimit:
         return found
 
 
-@door(scheme=NAME, method=NAME, courant=NUMBER)
+@door(scheme=NAME, method=NAME, courant=POSITIVE)
 def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """The exact Courant limit of a linear scheme and a method, and the growth at `courant`.
 
@@ -96,12 +96,11 @@ def advection_limit(scheme: str, method: str, courant: float | None = None) -> A
     return limit_of(weights_of(scheme), scheme, method, courant)
 
 
+@door(schemes=NAMES, methods=NAMES, courant=POSITIVE)
 def advection_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
 ) -> list[AdvectionLimit]:
     """Rows of the table, schemes inside methods; None for all of them."""
-    if courant is not None and not (math.isfinite(courant) and courant > 0):
-        raise FvsolveError(f"courant = {courant:g}: wanted a positive number")
     schemes, methods = ([x] if isinstance(x, str) else x for x in (schemes, methods))
     schemes = list(dict.fromkeys(schemes or WEIGHTS))
     for name in schemes:
@@ -110,6 +109,13 @@ def advection_limits(
     return [advection_limit(scheme, name, courant) for name in dict.fromkeys(named) for scheme in schemes]
 
 
+WHOLE = Kind(
+    lambda given: is_row(given, lambda one: isinstance(one, Rational)) and len(given) == 5 and sum(given) == 1,
+    "five whole numbers or fractions that add up to one",
+)
+
+
+@door(weights=WHOLE, scheme=TEXT, method=NAME, courant=POSITIVE)
 def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """The same for any face weights of cells u-2 .. u+2 that add up to one."""
     known = method_named(method)

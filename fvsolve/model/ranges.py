@@ -17,17 +17,23 @@ SHORT = 0.1  # of the longest travel time: pipes that may have fewer
 
 def flow_notices(scene: Any) -> list[Notice]:
     """Notices of velocity, of laminar water, of cells; one each for all pipes, at the worst of them."""
-    if not scene.pipe_names:
-        return []
-    return [*_quick(scene), *_laminar(scene), *_coarse(scene)]
+    return [*_quick(scene), *_laminar(scene), *(_coarse(scene) if scene.pipe_names else ())]
+
+
+def _moving(scene: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Names of the pipes and rigid columns of the file, their flows at the start [kg/s] and areas [m2]."""
+    tables = ((scene.pipe_names, scene.pipe_table), (scene.column_names, scene.column_table))
+    rows = [(name, row["flow"], row["area"]) for names, table in tables for name, row in zip(names, table, strict=True)
+            if name in scene.case.links]  # fmt: skip
+    return [row[0] for row in rows], *np.array([row[1:] for row in rows]).reshape(-1, 2).T
 
 
 def _quick(scene: Any) -> list[Notice]:
-    names, pipes = scene.pipe_names, scene.pipe_table
-    speed = np.abs(pipes["flow"]) / (scene.fluid.density * pipes["area"])
-    worst = int(np.argmax(speed))
-    if speed[worst] <= QUICKEST:
+    names, flow, area = _moving(scene)
+    speed = np.abs(flow) / (scene.fluid.density * area)
+    if not (speed > QUICKEST).any():
         return []
+    worst = int(np.argmax(speed))
     text = (f"{_all(names, speed > QUICKEST)}: {speed[worst]:.4g} m/s at the start in {names[worst]}, above "
             f"{QUICKEST:g} m/s; a flow or a diameter in other units?")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), QUICKEST)]
@@ -35,17 +41,17 @@ def _quick(scene: Any) -> list[Notice]:
 
 def _laminar(scene: Any) -> list[Notice]:
     """Where the quickest flow of water in wide pipes is laminar: a flow or a viscosity in other units."""
-    names, pipes, fluid = scene.pipe_names, scene.pipe_table, scene.fluid
-    if not fluid.viscosity or not WATERY[0] <= fluid.density <= WATERY[1]:
+    (names, flow, area), fluid = _moving(scene), scene.fluid
+    if not names or not fluid.viscosity or not WATERY[0] <= fluid.density <= WATERY[1]:
         return []
-    reynolds = np.abs(pipes["flow"]) * pipes["diameter"] / (pipes["area"] * fluid.viscosity)
-    reynolds = np.where(pipes["diameter"] >= WIDE, reynolds, 0.0)
+    bore = np.sqrt(4.0 / np.pi * area)
+    reynolds = np.where(bore >= WIDE, np.abs(flow) * bore / (area * fluid.viscosity), 0.0)
     worst = int(np.argmax(reynolds))
     if not AT_REST < reynolds[worst] < LAMINAR:
         return []
-    flow = float(abs(pipes["flow"][worst]) / fluid.density)
     text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar as water hardly is in "
-            f"pipes this wide; are {flow:.4g} m3/s and a viscosity of {fluid.viscosity:.4g} Pa s right?")  # fmt: skip
+            f"pipes this wide; are {abs(flow[worst]) / fluid.density:.4g} m3/s and a viscosity of "
+            f"{fluid.viscosity:.4g} Pa s right?")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
 
 

@@ -131,7 +131,8 @@ class RunDirectory:
 
     def envelope(self) -> dict:
         """Pipe -> quantity -> float64[cells] as envelope.csv has them, empty where there is none."""
-        return _envelope(self.folder)
+        path = self.folder / "envelope.csv"
+        return read_envelope(path) if path.is_file() else {}
 
     def files(self) -> list[str]:
         """Names of the files that a reader will look for, as far as they are there; pictures come after them."""
@@ -169,17 +170,13 @@ class RunDirectory:
 
 def read_directory(folder: Path) -> tuple:
     """(summary, table(), envelope(), folder) of a run that ended; RunError where there is none."""
+    said = read_summary(folder / ENDED)
     return (
-        read_summary(folder / ENDED),
+        said,
         lambda: read_table(folder / "history.csv"),
-        lambda: _envelope(folder),
+        lambda: read_envelope(folder / "envelope.csv") if "envelope.csv" in said["files"] else {},
         folder,
     )
-
-
-def _envelope(folder: Path) -> dict:
-    path = folder / "envelope.csv"
-    return read_envelope(path) if path.is_file() else {}
 
 
 def clear(folder: Path) -> None:

@@ -61,5 +61,5 @@ def read_envelope(path: Path) -> dict:
             for row in rows:
                 pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
         return {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
-    except (ValueError, IndexError, csv.Error) as error:
-        raise RunError(f"{path} cannot be read: {error}") from None
+    except (OSError, ValueError, IndexError, csv.Error) as error:
+        raise RunError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None

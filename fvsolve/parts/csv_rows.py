@@ -18,6 +18,7 @@ from fvsolve import units
 from fvsolve.errors import did_you_mean
 from fvsolve.units import show
 
+COMMAS = "; decimal commas? part columns by ; or tabs then"
 MARKS = ("\t", ";", ",")
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 
@@ -113,8 +114,12 @@ def read_rows(path: Path) -> Rows:
     for (line, _), row in zip(lines[1:], rows, strict=True):
         if len(row) != len(header):
             count = f"{len(row)} cell{'' if len(row) == 1 else 's'} under {len(header)} header"
-            why = "; decimal commas? part columns by ; or tabs then" if len(row) > len(header) else ""
-            raise Misread(path.name, f"{count}{'' if len(header) == 1 else 's'}{why}", line)
+            raise Misread(
+                path.name, f"{count}{'' if len(header) == 1 else 's'}{COMMAS * (len(row) > len(header))}", line
+            )
+        nameless = next((cell for cell, name in zip(row, header, strict=True) if cell and not name), None)
+        if nameless is not None:
+            raise Misread(path.name, f"{show(nameless)} stands under no header{COMMAS}", line)
     return Rows(path.name, header, [line for line, _ in lines[1:]], rows)
 
 

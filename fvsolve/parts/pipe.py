@@ -16,8 +16,10 @@ MOST_CELLS = 10**8
 
 MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
 WAVES = Usual(30.0, 2000.0, "soft hoses to stiff pipes")  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
-PLASTIC = 2e8  # modulus of the softest plastic that pipes are made of, low-density polyethylene [Pa]
-THIN = 0.1  # wall over bore below which no rubber tube stands
+SOFT = (  # modulus [Pa], wall over bore below which no pipe of it stands: of the plastics SDR 26 is the thinnest
+    (2e8, 0.1, "softer than any plastic, as rubber is"),
+    (4e8, 0.04, "soft as low-density polyethylene"),
+)
 
 
 class Wall(Table):
@@ -67,11 +69,11 @@ class Pipe(Conduit, kind="pipe"):
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from super().unusual()
         wall = self.wall
-        if (
-            isinstance(wall, Wall)
-            and MODULI.least <= wall.youngs_modulus < PLASTIC
-            and wall.thickness < THIN * self.diameter
-        ):
-            text = (f"{wall.youngs_modulus:g} Pa is softer than any plastic, {PLASTIC:g} Pa, and as rubber a wall of "
-                    f"{wall.thickness:g} m is too thin for a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
-            yield ("wall", "youngs_modulus"), wall.youngs_modulus, PLASTIC, text
+        if not isinstance(wall, Wall) or wall.youngs_modulus < MODULI.least:
+            return
+        for limit, thin, what in SOFT:
+            if wall.youngs_modulus < limit and wall.thickness < thin * self.diameter:
+                text = (f"{wall.youngs_modulus:g} Pa is below {limit:g} Pa, {what}, for which a wall of "
+                        f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
+                yield ("wall", "youngs_modulus"), wall.youngs_modulus, limit, text
+                return

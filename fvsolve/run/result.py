@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.doors import AMOUNT, NUMBER, PATH, TEXT, door
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
 from fvsolve.output.column import Column
 from fvsolve.output.fields import read_series
-from fvsolve.shown import Shown
+from fvsolve.shown import Shown, kept
+from fvsolve.units import show
 
 
 class Mark(NamedTuple):
@@ -168,9 +170,12 @@ class Result(Shown):
         return Column("t", "time", self.summary["time_unit"])
 
     def __getitem__(self, probe: str) -> np.ndarray:
+        return self._table[:, 1 + self.probes.index(self._known(probe))]
+
+    def _known(self, probe: str) -> str:
         if not isinstance(probe, str) or probe not in self.units:
-            raise FvsolveError(f"no probe {probe!r}{did_you_mean(str(probe), self.units)}; see Result.probes")
-        return self._table[:, 1 + self.probes.index(probe)]
+            raise FvsolveError(f"no probe {show(probe)}{did_you_mean(str(probe), self.units)}; see Result.probes")
+        return probe
 
     def frame(self):
         """The table as a pandas DataFrame, time as index; FvsolveError where pandas is not installed."""
@@ -182,6 +187,7 @@ class Result(Shown):
         headers = [f"{name} [{unit}]" for name, unit in self.units.items()]
         return pandas.DataFrame(self._table[:, 1:].copy(), index=index, columns=headers)
 
+    @door(path=PATH)
     def plot(self, path=None):
         """The probes over time as a matplotlib Figure, also written to `path` where one is given."""
         from fvsolve.draw.plot import history_figure
@@ -196,19 +202,17 @@ class Result(Shown):
             measured=self._measured(),
             title=self.summary["title"],
         )
-        if path is not None:
-            figure.savefig(path)
-        return figure
+        return kept(figure, path)
 
+    @door(path=PATH)
     def plot_envelope(self, path=None):
         """Least and greatest head along the pipes as a matplotlib Figure, also written to `path`."""
         from fvsolve.draw.plot import envelope_figure
 
         figure = envelope_figure(self.envelope, self.summary["envelope_units"], self.summary["title"])
-        if path is not None:
-            figure.savefig(path)
-        return figure
+        return kept(figure, path)
 
+    @door(time=NUMBER, field=TEXT, path=PATH, contours=AMOUNT)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
         """Draw `field` at the frame nearest to `time` [s] (the last by default) with PyVista; its path.
 
@@ -219,6 +223,7 @@ class Result(Shown):
         t = times[-1] if time is None else min(times, key=lambda one: abs(one - time))
         return self._draw([t], field, path, ".png", contours)
 
+    @door(path=PATH, field=TEXT, contours=AMOUNT)
     def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
         """Draw all frames as `view` does, as a .gif or .mp4; its path."""
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
@@ -262,7 +267,7 @@ class Result(Shown):
 
     def column(self, probe: str) -> Column:
         """Name, dimension and unit of a probe, with the way to and from SI."""
-        return Column(probe, **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
+        return Column(self._known(probe), **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
 
     def si(self, probe: str) -> np.ndarray:
         """One probe in SI, pressures absolute: float64[rows]."""

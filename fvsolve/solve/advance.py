@@ -86,9 +86,9 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
     rows = []
     for name, value in inputs.items():
         if name not in known:
-            near = nearest(name, known)
+            near = nearest(str(name), known)
             hint = f'; did you mean "{near}"?' if near else f"; inputs are {', '.join(known)}"
-            raise FvsolveError(f'no input named "{name}"{hint}')
+            raise FvsolveError(f"no input named {show(name)}{hint}")
         one = known[name]
         found = checked(name, value, one)
         if one.node >= 0 and not linear:  # `log` and `table` read a head as it is

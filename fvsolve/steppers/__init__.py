@@ -9,8 +9,6 @@ _HOMES = {
     "Method": "tableau",
     "StabilityFunction": "analysis.stability_function",
     "analyse": "analysis.facts",
-    "by_determinants": "analysis.stability_function",
-    "by_resolvent": "analysis.stability_function",
     "global_error": "analysis.scalar",
     "integrate": "ode",
     "local_error": "analysis.scalar",

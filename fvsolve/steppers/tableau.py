@@ -16,6 +16,7 @@ from fvsolve.steppers.analysis.trees import Conditions, stage_order
 from fvsolve.steppers.collocation import collocation, extrapolated
 from fvsolve.steppers.exact.algebraic import MIXED, Algebraic
 from fvsolve.steppers.exact.expression import digits, root, value_of
+from fvsolve.units import show
 
 METHODS: dict[str, Method] = {}  # some under two names: `gauss-2` is `implicit-midpoint`
 LARGEST = 10**30  # entry
@@ -226,8 +227,12 @@ def declare(
     return method
 
 
-def method_named(name: str) -> Method:
-    """The method of that name; raises FvsolveError that suggests the nearest."""
+def method_named(name: str | Method) -> Method:
+    """The method of that name, or that one; raises FvsolveError that suggests the nearest."""
+    if isinstance(name, Method):
+        return name
+    if not isinstance(name, str):
+        raise FvsolveError(f"method = {show(name)}; wanted a name")
     if name in METHODS:
         return METHODS[name]
     near = nearest(name, METHODS)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.text import inline
-from fvsolve.doors import CALL, COUNT, PATH, TABLE, door
+from fvsolve.doors import CALL, COUNT, PATH, ROW, SERIES, TABLE, Kind, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.shown import Shown
 from fvsolve.studies.outcome import grown, refusal
@@ -75,7 +75,13 @@ class Sweep(Shown):
         return pasted(value) if name in self.keys else "" if value is None else value
 
 
-@door(vary=TABLE, set=TABLE, jobs=COUNT, out=PATH, progress=CALL)
+VARY = Kind(
+    lambda given: TABLE.holds(given) and all(ROW.holds(row) or SERIES.holds(row) for row in given.values()),
+    'a table of lists, for example {"links.main.cells": [100, 200]}',
+)
+
+
+@door(vary=VARY, set=TABLE, jobs=COUNT, out=PATH, progress=CALL)
 def sweep(
     case,
     vary: Mapping[str, Sequence[Any]],

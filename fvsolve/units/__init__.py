@@ -18,6 +18,7 @@ __all__ = [
     "wanted",
 ]  # fmt: skip
 
+LONGEST = 100  # letters of a unit
 _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
@@ -46,6 +47,10 @@ class Kinematic(float):
 
 def find(spelling: str, dimension: str, number: str = "") -> Unit:
     """The unit of that spelling, if it measures `dimension`; ValueError says what was probably meant."""
+    if len(spelling) > LONGEST:  # which pint would read for minutes
+        raise ValueError(
+            f"{show(f'{number} {spelling}'.strip())}: no unit has {len(spelling)} letters; {wanted(dimension)}"
+        )
     base = DIMENSIONS[dimension].base or dimension
     unit = UNITS.get(_plain(spelling))
     if unit is None:

@@ -61,7 +61,7 @@ def analyse(method: str | Method) -> Facts:
 
     Raises FvsolveError for a name that no method has.
     """
-    return _facts(method_named(method) if isinstance(method, str) else method)
+    return _facts(method_named(method))
 
 
 @functools.cache

@@ -5,9 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 from math import factorial
 
+from fvsolve.doors import AMOUNT, door
 from fvsolve.steppers.exact.polynomial import Polynomial
 
 
+@door(k=AMOUNT, m=AMOUNT)
 def pade(k: int, m: int) -> tuple[Polynomial, Polynomial]:
     """P^k_m: the quotient of degrees k over m that agrees with e^s in the most powers, k + m + 1 of them.
 

@@ -9,12 +9,14 @@ from fractions import Fraction
 
 import numpy as np
 
+from fvsolve.doors import Kind, door, is_array
 from fvsolve.steppers.analysis.pade import pade
 from fvsolve.steppers.analysis.trees import short
 from fvsolve.steppers.exact.polynomial import Polynomial
-from fvsolve.steppers.tableau import Method
+from fvsolve.steppers.tableau import Method, method_named
 
 NOTHING = Polynomial([])
+PLANE = Kind(lambda given: is_array(given, "fiuc", 0, 9, finite=False), "complex numbers")
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class StabilityFunction:
     denominator: Polynomial
     doubts: tuple[Polynomial, Polynomial] = (NOTHING, NOTHING)
 
+    @door(s=PLANE)
     def __call__(self, s):
         """R(s) in floating point, s a complex number or an array of them."""
         s = np.asarray(s, dtype=np.complex128)
@@ -53,8 +56,9 @@ class StabilityFunction:
         return next(((j - 1, x) for j, x in enumerate(rest) if x != 0), (last, Fraction(0)))
 
 
-def stability_function(method: Method) -> StabilityFunction:
+def stability_function(method: str | Method) -> StabilityFunction:
     """R of a method by the determinants of (26), which is (16) for explicit ones, in lowest terms."""
+    method = method_named(method)
     numerator, denominator = by_determinants(method.exact.a, method.exact.b)
     doubts = (NOTHING, NOTHING)
     if method.rounding:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.doors import NUMBER, SERIES, Kind, door, is_array
 from fvsolve.errors import FvsolveError
 
 LEAST_ROWS = 3
@@ -53,6 +54,10 @@ class Fit:
         }  # fmt: skip
 
 
+ERRORS = Kind(lambda given: is_array(given, "fiu", 1, 1, finite=False), "a row of numbers")
+
+
+@door(sizes=SERIES, errors=ERRORS, floor=NUMBER)
 def fit(sizes, errors, floor: float = 0.0) -> Fit:
     """The order p of errors ~ C sizes^p, sizes falling; errors below ten times `floor` mean nothing.
 
@@ -60,7 +65,9 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
     Raises FvsolveError for sizes that do not fall, or errors below zero.
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
-    if h.shape != e.shape or h.ndim != 1:
+    if floor < 0.0:
+        raise FvsolveError(f"floor = {floor:g}; wanted a number from 0 on")
+    if h.shape != e.shape:
         raise FvsolveError(f"{h.size} sizes and {e.size} errors; wanted one error for each size")
     if np.any(~np.isfinite(h)) or np.any(h <= 0.0) or np.any(np.diff(h) >= 0.0):
         raise FvsolveError("sizes must be positive and fall from row to row")

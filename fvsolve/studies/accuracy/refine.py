@@ -95,6 +95,10 @@ def plan(
     levels = LEVELS[refine] if levels is None else levels
     if levels < 2:
         raise FvsolveError(f"levels = {levels}; wanted 2 at least, and 3 for a fitted order")
+    if refine == "time" and cells is not None:
+        raise FvsolveError(
+            f"cells = {cells}: here steps alone are refined, cells stay; leave it out, or set the case's"
+        )
     return time_plan(case, key, levels) if refine == "time" else space_plan(case, refine, key, levels, cells)
 
 

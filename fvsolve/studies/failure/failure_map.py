@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, ROW, TABLE, door
+from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, door, is_row
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.failure.columns import Columns, columns, default_schemes
 from fvsolve.studies.failure.converged import Converged, converged
@@ -70,12 +70,18 @@ class FailureMap:
         return said | {"squares": [_plain(one) for one in self.squares]}
 
 
+KEY = Kind(
+    lambda given: is_row(given, lambda one: True) and len(given) == 2 and TEXT.holds(given[0]) and ROW.holds(given[1]),
+    'a key and its values, for example ("links.main.cells", [20, 40])',
+)
+
+
 @door(
     schemes=NAMES,
     methods=NAMES,
     courants=NUMBERS,
     steps=NUMBERS,
-    key=ROW,
+    key=KEY,
     tolerance=NUMBER,
     out=OUT,
     progress=CALL,

@@ -8,8 +8,10 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from fvsolve.doors import CALL, COMPLEX, NUMBER, POSITIVE, Kind, door, is_number, made
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary import plain
+from fvsolve.units import show
 
 MOST = 200_000  # samples of one sweep
 ROUNDING = 1e-12  # of |H|: what a float sample may be wrong by
@@ -27,6 +29,12 @@ class LineImpedance:
     time: float
     reflection: float = -1.0
 
+    def __post_init__(self) -> None:
+        for name, kind in (("z0", POSITIVE), ("time", POSITIVE), ("reflection", NUMBER)):
+            if not kind.holds(getattr(self, name)):
+                raise FvsolveError(f"LineImpedance {name} = {show(getattr(self, name))}; wanted {kind.wanted}")
+
+    @door(s=COMPLEX)
     def __call__(self, s):
         """H at complex numbers s [1/s], Re s >= 0."""
         back = self.reflection * np.exp(-2.0 * self.time * np.asarray(s))
@@ -75,6 +83,13 @@ class SweepVerdict:
         return plain(asdict(self))
 
 
+BOUND = Kind(lambda given: callable(given) or (is_number(given) and given >= 0), "a number from 0 on, or a function")
+BESIDE = Kind(lambda given: is_number(given) and given >= 0, "a number from 0 on")
+
+LEFT = Kind(lambda given: is_number(given) or str(given) == "-inf", "a finite number, or -infinity")
+
+
+@door(h=CALL, slope=BOUND, high=POSITIVE, shift=BESIDE, tolerance=POSITIVE, rightmost=LEFT)
 def sweep_positive_real(
     h: Callable, slope, high: float, shift: float = 0.0, tolerance: float = 1e-6, rightmost: float = -math.inf
 ) -> SweepVerdict:
@@ -87,8 +102,6 @@ def sweep_positive_real(
     everywhere right of it. Between two samples Re H >= (sum - slope * distance) / 2. Raises FvsolveError for a range
     or bound that is none and where H is not finite on the line.
     """
-    if not (0.0 < high < math.inf and 0.0 <= shift < math.inf):
-        raise FvsolveError(f"high = {high:g}, shift = {shift:g}: wanted a range above 0 and a line with Re s >= 0")
     if rightmost > shift:
         return SweepVerdict(False, f"a pole with Re s = {rightmost:.6g} 1/s, right of the line", math.nan, math.nan,
                             -math.inf, shift, high, 0)  # fmt: skip
@@ -110,13 +123,23 @@ def sweep_positive_real(
     return SweepVerdict(holds, _said(holds, least, worst, floor, shift, high), least, worst, floor, shift, high, len(w))
 
 
+def _each(name: str, given, shape: tuple, kind: type) -> np.ndarray:
+    """What a function gave as one number for each point; FvsolveError where it is none."""
+    try:
+        return np.broadcast_to(np.asarray(given, kind), shape)
+    except (TypeError, ValueError):
+        raise FvsolveError(f"{name} gave {show(given)} of {shape[0]} points; wanted a number for each") from None
+
+
 def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
-    found = np.broadcast_to(slope(w[:-1], w[1:]) if callable(slope) else float(slope), (len(w) - 1,))
+    given = slope(w[:-1], w[1:]) if callable(slope) else slope
+    found = _each("the slope", given, (len(w) - 1,), float)
     if not np.all(np.isfinite(found) & (found >= 0.0)):
         raise FvsolveError(f"the slope is not bounded on Re s = {shift:g} 1/s; where poles lie on it, move it right")
     return found
 
 
+@door(line=made(LineImpedance), shift=BESIDE, tolerance=POSITIVE)
 def line_positive_real(line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6) -> SweepVerdict:
     """Whether a line is positive real on Re s = shift: one period, which is all of the line. Default 1e-3 / T.
 
@@ -130,7 +153,7 @@ def line_positive_real(line: LineImpedance, shift: float | None = None, toleranc
 
 def _sampled(h: Callable, shift: float, w: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.asarray(h(shift + 1j * w), complex)
+        value = _each("H", h(shift + 1j * w), w.shape, complex)
     if not np.all(np.isfinite(value)):
         raise FvsolveError(f"H is not finite on Re s = {shift:g} 1/s; move the line to the right of its poles")
     return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -26,7 +26,7 @@ def coefficients(given, name: str) -> Polynomial:
     """
     if isinstance(given, (str, Real, Decimal, complex)) or np.ndim(given) == 0 and isinstance(given, np.ndarray):
         given = [given[()] if isinstance(given, np.ndarray) else given]
-    if not isinstance(given, Iterable):
+    if isinstance(given, (bytes, Mapping)) or not isinstance(given, Iterable):
         raise FvsolveError(f"{name} = {given!r} is no polynomial; wanted its coefficients, highest power first")
     found = [_exact(x, f"{name}[{k}]") for k, x in enumerate(given)]
     if not found:

@@ -6,6 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from fvsolve.doors import COMPLEX, MATRIX, NUMBER, POSITIVE, SERIES, door, made
+from fvsolve.errors import FvsolveError
 from fvsolve.output.summary import plain
 
 TOLERANCE = 1e-9  # of Re H / |H|: what differences and floats leave undecided
@@ -27,9 +29,14 @@ class Transfer:
     seen : bool[n]  whether H shows it
     """
 
+    @door(a=MATRIX, b=SERIES, c=SERIES, d=NUMBER, error=NUMBER)
     def __init__(self, a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float, error: float = 0.0):
         from scipy.linalg import matrix_balance, schur
 
+        sizes = (*np.shape(a), np.size(b), np.size(c))
+        if len({*sizes}) > 1:
+            said = f"A of {sizes[0]} x {sizes[1]}, {sizes[2]} numbers in B and {sizes[3]} in C"
+            raise FvsolveError(f"{said}; wanted n x n, n and n")
         self.error = float(error)
         self.a, self.b, self.c, self.d = (np.asarray(x, float) for x in (a, b, c, d))
         if self.a.size:
@@ -57,6 +64,7 @@ class Transfer:
         """H at complex numbers s : complex128[k]; infinite at a pole."""
         return self.measured(s)[0]
 
+    @door(s=COMPLEX)
     def measured(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(H, by how much rounding and the error of A may have moved it) : complex128[k], float64[k]."""
         s = np.atleast_1d(np.asarray(s, complex))
@@ -70,6 +78,7 @@ class Transfer:
         shown = np.isfinite(found)
         return np.where(shown, found, np.inf), np.where(shown, (ROUNDING + self.error) * size, np.inf)
 
+    @door(s=COMPLEX)
     def angle(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Re H / |H|, the cosine of the phase; its doubt) : float64[k] each; 1 and 0 at a pole and where H = 0."""
         value, doubt = self.measured(s)
@@ -131,6 +140,7 @@ class StateVerdict:
         return plain(found)
 
 
+@door(h=made(Transfer), tolerance=POSITIVE)
 def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdict:
     """Whether H is positive real, from the sign of Re H between all frequencies at which it can change.
 

@@ -16,7 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.doors import CALL, COUNT, NAMES, door
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.limits.grid import AdvectionLimit, limit_of
 from fvsolve.limits.symbol import WEIGHTS, Weights
 from fvsolve.model.schemes import LIMITERS
@@ -111,10 +111,14 @@ def limited_limits(
     """
     check_size(cells, steps)
     told = progress or (lambda *_: None)
-    schemes, named = names(schemes), [method_named(name) for name in names(methods) or METHODS]
+    schemes, named = names(schemes) or LIMITED, [method_named(name) for name in names(methods) or METHODS]
     implicit = [one.name for one in named if not one.explicit]
     if implicit:
         raise FvsolveError(f"{implicit[0]} is implicit: limited schemes are measured with explicit methods")
+    for name in schemes:
+        if name not in LIMITED:
+            wanted = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"
+            raise FvsolveError(f'no limited scheme named "{name}"{wanted}')
     kinds = [(name, limiter) for name in schemes for limiter in (LIMITERS if name == "muscl" else (None,))]
     pairs = [(*kind, one.name) for one in dict.fromkeys(named) for kind in kinds]
     found = []
