@@ -150,7 +150,27 @@ def led_by_lift(t, y, tables, out, k, which, standing, inertia, other, drop):
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
     before, behind = (standing, other) if ahead else (other, standing)
     still, slope = lift_speed(t, y, tables, device, before, behind, drop)
-    return lift_drop(drop, still, slope if feels(device, ahead) else 0.0, heavy)
+    slope = slope if feels(device, ahead) else 0.0
+    driving, speed = lift_drop(drop, still, slope, heavy)
+    if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables[I_SETTINGS][0]["step"] == 0.0:
+        return driving, speed
+    way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
+    root = kept_root(y, tables, out, k, which, way, sqrt(driving), slope, heavy)
+    return root * abs(root), still + slope * (root * abs(root) - drop)
+
+
+@njit
+def kept_root(y, tables, out, k, which, way, root, slope, heavy):
+    """Root of the drop that a given step keeps: of what drives both, as far as it does not resolve their exchange.
+
+    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope): M relaxes to x sqrt(G) r0 in two
+    steps at least, and not sooner than it would. What both share, x / slope + (L / A) M, does not change by it.
+    """
+    dense, column = tables[I_VALVES][which]["conductance"], tables[I_COLUMNS][k]
+    x = sqrt(conductance(tables, out, which) / dense)
+    own = way * (column["flow"] + y[column["y"]]) / sqrt(dense)
+    slow = 4.0 * tables[I_SETTINGS][0]["step"] * root * (1.0 / heavy + root * slope)
+    return root + (own - x * root) / max(x, slow)
 
 
 @njit

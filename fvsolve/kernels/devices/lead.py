@@ -12,7 +12,7 @@ from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.records import I_ARMED, I_COLUMNS, I_DEVICES, I_NODES, I_SETTINGS, I_VALVES
 from fvsolve.kernels.restrictions import head_drop
 
-LEADS, AT_MOST = 1e-4, 0.03  # lift up to which it leads its column, and at most where a given step asks for more
+LEADS = 1e-4  # lift up to which it leads its column, at least
 
 
 @njit
@@ -65,7 +65,7 @@ def led_beside(out, tables, device, yielding, speed):
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
     rate = 2.0 * root * (root * speed + yielding / sqrt(tables[I_VALVES][device["valve"]]["conductance"]))
-    return min(max(LEADS, 2.0 * tables[I_SETTINGS][0]["step"] * rate), AT_MOST)
+    return max(LEADS, 2.0 * tables[I_SETTINGS][0]["step"] * rate)
 
 
 @njit
