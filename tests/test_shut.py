@@ -99,6 +99,30 @@ def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
     assert result["X.head"][late] == pytest.approx(50.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("method", ["dormand-prince", "rodas-5p", "radau-iia-5"])
+def test_a_valve_does_so_beside_an_ideal_check_valve_that_is_shut(method, law, turned):
+    """That one is none until an event opens it: the valve leads the column all the same, and nothing opens."""
+    nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
+    column = {"type": "rigid-column", "from": "A", "to": "X", "length": 10.0, "diameter": 0.1}
+    links = {"main": column, "tap": valve("X", "B", 0.61e-3, ramp(0.5, 0.5, 1.0, 0.0))}
+    links["check"] = {"type": "check-valve", "area": 0.61e-3, "discharge_coefficient": 1.0, "from": "B", "to": "X"}
+    case = scene(nodes, links, 1.5, {"rtol": 1e-6, "method": method}, ["X.head", "main.flow"], 0.05)
+    case["fluid"]["law"] = law
+    if turned:
+        case["links"] = dict(reversed(links.items()))
+    result = fvsolve.run(case)
+    drop, full = 1000.0 * 9.80665 * 10.0, math.sqrt(2.0 * 1000.0) * 0.61e-3
+    slowed = 10.0 / (math.pi / 4 * 0.1**2) * full / 0.5
+    s = 0.5 * (slowed + math.sqrt(slowed**2 + 4.0 * drop))
+    assert result.ok and not result.marks and result.summary["events"] == []
+    assert result.extremes["X.head"].greatest == pytest.approx(
+        40.0 + s**2 / 9806.65, rel=1e-5 if law == "linear" else 1e-3
+    )
+    assert np.all(result["main.flow"][result.t > 1.001] == 0.0)
+
+
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
 @pytest.mark.parametrize("ends", [(1.0, 0.0), (0.0, 1.0), (1.0, 1e-6)], ids=["shuts", "opens", "all but shuts"])
 def test_no_ramp_of_a_valve_on_a_rigid_column_stalls_the_run(ends, exponent):

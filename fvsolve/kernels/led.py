@@ -29,7 +29,7 @@ from fvsolve.kernels.records import (
     I_VALVES,
 )
 from fvsolve.kernels.restrictions import conductance, conductance_at
-from fvsolve.kernels.rigid import far_side, gate_area, grounded, is_rigid, is_vessel, pressure_at
+from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, pressure_at
 
 NEARLY = 1e-3  # share of their full area below which valves lead their column
 LOST = 0.05  # share of the flow at which valves take the lead, more than is then missed of it
@@ -51,12 +51,11 @@ def led_at(tables, out, i):
 
 @njit
 def foreseen(tables, out, i):
-    """Whether the rate of area of node i's valves is known: schedules alone move them, or one that leads."""
+    """Whether the rate of area of node i's valves is known: schedules move them, one leads, events alone open them."""
     node = tables[I_NODES][i]
     for e in range(node["gate_count"]):
         k = tables[I_INTEGERS][node["gates"] + e]
-        shut = is_vessel(tables, k) and conductance(tables, out, k) == 0.0
-        if tables[I_VALVES][k]["device"] >= 0 and not leads(tables, k) and not shut:
+        if tables[I_VALVES][k]["device"] >= 0 and not leads(tables, k) and not holds_shut(tables, out, k):
             return False
     return True
 

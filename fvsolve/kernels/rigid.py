@@ -10,6 +10,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.clusters import solve_dense
+from fvsolve.kernels.devices.codes import CHECK_VALVE
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.records import (
     I_COLUMNS,
@@ -35,13 +36,22 @@ def is_vessel(tables, k):
 
 
 @njit
+def holds_shut(tables, out, k):
+    """Whether valve k is shut and opens by an event alone, as that of air and an ideal check valve: till then none."""
+    if conductance(tables, out, k) > 0.0:
+        return False
+    device = tables[I_VALVES][k]["device"]
+    return is_vessel(tables, k) or (device >= 0 and tables[I_DEVICES][device]["kind"] == CHECK_VALVE)
+
+
+@njit
 def gate_area(tables, out, i):
-    """(sum of the roots of the conductances of a node's valves, the same at full opening of all but an air valve)."""
+    """(sum of the roots of the conductances of a node's valves, the same at full opening of all that count)."""
     node, area, full = tables[I_NODES][i], 0.0, 0.0
     for e in range(node["gate_count"]):
         k = tables[I_INTEGERS][node["gates"] + e]
         area += sqrt(conductance(tables, out, k))
-        if not is_vessel(tables, k):
+        if not (is_vessel(tables, k) or holds_shut(tables, out, k)):
             full += sqrt(tables[I_VALVES][k]["conductance"])
     return area, full
 
