@@ -66,10 +66,10 @@ def compiling():
 def test_two_tanks_are_two_states_and_no_more():
     model = fvsolve.build(fvsolve.load(tanks()))
     assert model.state_names == ["high.mass", "low.mass"]
-    rows = {name: len(model.tables[k]) for k, name in enumerate(rec.RECORDS) if len(model.tables[k])}
+    rows = {name: len(rows) for name in rec.RECORDS if len(rows := getattr(model.tables, name))}
     assert rows == {"settings": 1, "layout": 1, "nodes": 2, "valves": 1, "schedules": 1, "probes": 1}
     assert model.new_out().size == rec.OUT_HEAD + 3 * 2 + 3  # pressure, supply, net flow; valve, conductance, drive
-    assert model.tables[rec.I_ENVELOPE].size == 0
+    assert model.tables.envelope.size == 0
 
 
 def test_two_tanks_compile_nothing_of_pipes_bodies_and_implicit_steps(compiling):

@@ -156,7 +156,6 @@ def test_its_energy_closes_and_its_bores_only_dissipate(law):
 
 
 def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
-    from fvsolve.kernels import records as rec
     from fvsolve.model.energy_ledger import Accounts
 
     model = fvsolve.build(fvsolve.load(drained(flow=0.0, low=2e5)))
@@ -165,7 +164,7 @@ def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
     y[i], y[j] = -0.01 * 0.1, 2e-4 * 0.1
     place = [one.place for one in accounts.held].index("v.inside")
     device = next(one for name, _, one in model.devices if name == "v.inside")
-    row = model.tables[rec.I_DEVICES][0]
+    row = model.tables.devices[0]
     square = device.squares(model, None, row, np.zeros(model.y_size), None)[0]
     small = sum(factor * y[k] for k, factor in square.items()) ** 2
     assert accounts.stored_at(0.0, y)[place] == pytest.approx(small, rel=0.2)

@@ -20,7 +20,6 @@ from fvsolve.draw import view
 from fvsolve.draw.view import LABELS, digits, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels import calls
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
 from fvsolve.kernels.plane.observe import observe_basins, observe_dense_flows
 from fvsolve.mesh import read, rectangle
@@ -164,7 +163,7 @@ def test_the_flow_of_a_patch_has_the_density_of_its_place():
     out, found = model.new_out(), np.zeros(2)
     node = model.node_names.index("block.hole")
     out[int(model.layout["net"]) + node] = -3.0
-    out[int(model.layout["pressure"]) + node] = 3e7 - model.tables[rec.I_NODES][node]["pressure"]
+    out[int(model.layout["pressure"]) + node] = 3e7 - model.tables.nodes[node]["pressure"]
     handle = make_handle((*model.tables, calls.empty_calls(1)))
     observe_basins(0.0, model.start, out, handle, found)
     assert found[0] == approx(-3.0 / RHO, rel=1e-14)

@@ -75,21 +75,21 @@ def wall(v0: float, cells: int, end: float, **numerics) -> dict:
 def parted(case: dict, v: np.ndarray) -> tuple[fvsolve.Model, fvsolve.State]:
     """A model and a state in which its only pipe flows at v [m/s], cell by cell."""
     model = fvsolve.build(fvsolve.load(case))
-    state, row = fvsolve.initial_state(model), model.tables[rec.I_PIPES][0]
+    state, row = fvsolve.initial_state(model), model.tables.pipes[0]
     n = row["cells"]
-    flow = model.tables[rec.I_PROFILE][row["center"] : row["center"] + n] * v
+    flow = model.tables.profile[row["center"] : row["center"] + n] * v
     state.y[:n], state.y[n : 2 * n] = flow / 2, -flow / 2
     return model, state
 
 
 def followed(model, state, times) -> tuple[np.ndarray, np.ndarray, float]:
     """(pressures of the first node, volumes of gas and vapour in the pipe, greatest remainder of mass, relative)."""
-    row, profile = model.tables[rec.I_PIPES][0], model.tables[rec.I_PROFILE]
+    row, profile = model.tables.pipes[0], model.tables.profile
     n, pressures, volumes = row["cells"], [], []
     for t in times:
         state = fvsolve.advance(model, state, float(t))
         out = model.evaluate(state.t, state.y)[1]
-        pressures.append(model.tables[rec.I_NODES][0]["pressure"] + out[model.layout["pressure"]])
+        pressures.append(model.tables.nodes[0]["pressure"] + out[model.layout["pressure"]])
         m = profile[row["center"] : row["center"] + n] + (state.y[:n] + state.y[n : 2 * n]) / row["speed"]
         volumes.append(np.sum(np.maximum(1.0 - m / (1000.0 * row["area"]), 0.0)) * row["dx"] * row["area"])
     return np.array(pressures), np.array(volumes)
@@ -203,13 +203,13 @@ def test_what_bounds_the_step_is_of_its_own_state_alone_and_no_table_is_written(
     case["nodes"]["pot"] = {"type": "chamber", "volume": 2e-3, "elevation": 15.0}
     case["links"]["neck"] = valve("hill", "pot", 1e-4)
     model = fvsolve.build(fvsolve.load(case))
-    nodes, start = model.tables[rec.I_NODES].copy(), np.zeros(model.y_size)
+    nodes, start = model.tables.nodes.copy(), np.zeros(model.y_size)
     empty = start.copy()
     empty[model.state_names.index("pot.mass")] = -1e-3
     rates = [model.evaluate(0.0, y)[1][rec.RATE] for y in (start, empty, start, empty)]
     stiff = [model.evaluate(0.0, y)[1][int(model.layout["stiffness"])] for y in (start, empty)]
     assert rates[:2] == rates[2:] and stiff[1] < 0.1 * stiff[0]
-    assert (model.tables[rec.I_NODES] == nodes).all()
+    assert (model.tables.nodes == nodes).all()
 
 
 def test_the_pattern_of_the_jacobian_holds_while_cavities_are_open():
@@ -271,6 +271,6 @@ def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
     for t in times[1:]:
         state = fvsolve.advance(model, state, float(t))
         out = model.evaluate(state.t, state.y)[1]
-        pressures.append(model.tables[rec.I_NODES][1]["pressure"] + out[model.layout["pressure"] + 1])
+        pressures.append(model.tables.nodes[1]["pressure"] + out[model.layout["pressure"] + 1])
     short = 1.0 - (times[1 + np.argmax(np.array(pressures) > 1e5)] - back) / lasts
     assert short == approx(1.03 * cells**-0.7, rel=0.5)

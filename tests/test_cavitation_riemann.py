@@ -10,7 +10,6 @@ from truth.orders import observed_order
 from truth.scenes import AMBIENT, junction, reservoir, scene, stiff_pipe
 
 import fvsolve
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.riemann import face_flux, side_at, star
 
 AIR, FLOOR = 1.2e-3, 2000.0
@@ -61,7 +60,7 @@ WATER = {**SOFT, "density": 998.2, "bulk_modulus": 2.18e9, "air_fraction": 1e-3}
 def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
     """Two hundred pairs of liquid and foam: velocity to 1e-9, in an elastic wall (nearly a closed form) to 2e-5."""
     tables = resting_pipe(4, fluid, speed, scheme="upwind", method="euler").tables
-    st, floats, pipe = tables[rec.I_SETTINGS][0], tables[rec.I_FLOATS], tables[rec.I_PIPES][0]
+    st, floats, pipe = tables.settings[0], tables.floats, tables.pipes[0]
     gas = fluid["air_fraction"] / (1 - fluid["air_fraction"]) * (AMBIENT - FLOOR)
     assert (pipe["compliance"] > 1e-10) == (speed is not None)
     law = Mixture(fluid["density"], fluid["bulk_modulus"], AMBIENT, FLOOR, gas, float(pipe["compliance"]), EXACT.area)
@@ -75,7 +74,7 @@ def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
 
 def test_the_flux_at_a_face_is_that_of_the_exact_solution_on_its_ray():
     tables = resting_pipe(4, scheme="upwind", method="euler").tables
-    st, floats, pipe = tables[rec.I_SETTINGS][0], tables[rec.I_FLOATS], tables[rec.I_PIPES][0]
+    st, floats, pipe = tables.settings[0], tables.floats, tables.pipes[0]
     for left, right in random_states(np.random.default_rng(6), EXACT, 60):
         p, v = (float(x) for x in Riemann(EXACT, left, right).solution()(np.array(0.0)))
         m = EXACT.m(p)
@@ -90,7 +89,7 @@ def riemann_run(name: str, cells: int, scheme: str, end: float):
     left, right = STATES[name]
     model = resting_pipe(cells, scheme=scheme, limiter="minmod", method="ssp-rk3", courant=0.5)
     state = fvsolve.initial_state(model)
-    row, profile = model.tables[rec.I_PIPES][0], model.tables[rec.I_PROFILE]
+    row, profile = model.tables.pipes[0], model.tables.profile
     base = profile[row["center"] : row["center"] + cells]
     half = np.arange(cells) < cells // 2
     m = np.where(half, EXACT.m(left[0]), EXACT.m(right[0]))

@@ -290,8 +290,8 @@ def test_schedules_have_the_values_that_kernels_read(schedule):
     model = model_of(load({key: value for key, value in case.items() if key != "exact"}))
     from fvsolve.exact.schedule import value
 
-    model.tables[0]["limit"] = np.inf
-    index = int(model.tables[3][model.node_names.index("gate")]["schedule"])
+    model.tables.settings[0]["limit"] = np.inf
+    index = int(model.tables.nodes[model.node_names.index("gate")]["schedule"])
     t = np.array([0.0, 0.1, 0.15, 0.2, 0.33, 0.5, 0.7])
     read = [schedule_value(model.tables, index, float(s)) / scenes.RHO for s in t]
     assert value(model.case.nodes["gate"].demand, t) == approx(read, abs=1e-14)

@@ -28,7 +28,6 @@ from truth.scenes import (
 import fvsolve
 from fvsolve.cli import main
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.kernels import records as rec
 from fvsolve.model.energy import energy_form
 from fvsolve.solve import initial_state
 from fvsolve.solve.advance import advance, hold
@@ -226,7 +225,7 @@ def test_a_case_that_names_no_scheme_is_linearised_with_the_smooth_one():
 def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_bare():
     case = scene({"a": reservoir(1e6), "b": chamber(1e-3, 1e6)}, {"v": valve("a", "b", 1e-5)}, 1.0, TIGHT)
     found = linearise(case)
-    row = found.at.model.tables[rec.I_VALVES][0]
+    row = found.at.model.tables.valves[0]
     assert row["transition"] > 0.0
     laminar = 45 / 32 * row["conductance"] / row["transition"]  # slope of the law at a drop of zero
     assert found.a[0, 0] == pytest.approx(-laminar * K / (RHO * 1e-3), rel=1e-4)

@@ -78,7 +78,7 @@ def pipe_of(n: int, start: np.ndarray, end: float) -> np.ndarray:
     nodes, numerics = {"left": reservoir(REST), "right": junction()}, {"scheme": "muscl", "method": "ssp-rk3"}
     links = {"main": stiff_pipe("left", "right", 100.0, 0.5, n, friction=NO_FRICTION)}
     model = fvsolve.build(fvsolve.load(scene(nodes, links, end, numerics | {"courant": 0.5}, (), end, fluid=FLUID)))
-    state, row = fvsolve.initial_state(model), model.tables[rec.I_PIPES][0]
+    state, row = fvsolve.initial_state(model), model.tables.pipes[0]
     c, area = row["speed"], row["area"]
     state.y[: 2 * n] = 0.5 * area * np.concatenate([c * start[0] + start[1], c * start[0] - start[1]])
     y = fvsolve.advance(model, state, end).y
@@ -103,12 +103,12 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
 def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
     """As pipes have them, walls that swell too; with stiff walls CoolProp's. The kernels' table is as good as exact."""
     model = model_of(basin(wave_speed=wave_speed) if wave_speed else basin())
-    st, floats, pool = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS], model.basins[0]
+    st, floats, pool = model.tables.settings[0], model.tables.floats, model.basins[0]
     compliance = 1 / (pool.density * pool.speed**2) - law.log_density(st, floats, REST)[1]
     pressures = np.array([-3e7, 1e6, 4.6e6, 5.9e6, 6e6, 6.1e6, 2e7, 5.9e7, 9e7, 1.5e8])
     deviations = pool.deviation(pressures - REST)
     assert pool.pressure(deviations) + REST == approx(pressures, rel=1e-12, abs=1e-3)
-    table = model.tables[rec.I_PLANE][pool.row["table"] :]
+    table = model.tables.plane[pool.row["table"] :]
     for p, r in zip(pressures, deviations, strict=True):
         held = np.log1p(r / pool.density)  # over that at rest, which is the fluid's reference
         assert law.pressure_of_log(st, floats, compliance, held) == approx(p, rel=1e-9, abs=1.0)
@@ -186,7 +186,7 @@ def test_the_pressure_of_a_patch_is_that_of_the_cells_behind(over):
     probes = ["pool.out.pressure", "pool.pressure@2,1"]
     model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, numerics, probes, 0.1, fluid=FLUID)))
     assert model.observe(0.0, model.start) == approx([REST + over] * 2, rel=1e-9)
-    own, node = model.basins[0], model.tables[rec.I_NODES][model.node_names.index("pool.out")]
+    own, node = model.basins[0], model.tables.nodes[model.node_names.index("pool.out")]
     stiffness = model.evaluate(0.0, model.start)[1][model.layout["stiffness"] + node["row"]]
     behind = 0.1 * 16 * own.mesh.area[0]  # [m3]
     assert stiffness == approx(TRUTH.c(REST + over) ** 2 / behind, rel=1e-5)

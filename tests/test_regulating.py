@@ -10,7 +10,6 @@ from truth import discs, stems
 from truth.scenes import AMBIENT, GRAVITY, RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.kernels import records as rec
 from fvsolve.steady import union
 from fvsolve.studies.energy.energy import energy
 
@@ -83,7 +82,7 @@ def network(seed: int, count: int) -> dict:
 
 def standing(case, model, name) -> str:
     """As what a valve of a solved net stands, "" where its law does not hold."""
-    link, row = case["links"][name], model.tables[rec.I_VALVES][model.valve_names.index(name)]
+    link, row = case["links"][name], model.tables.valves[model.valve_names.index(name)]
     nodes = model.checks["nodes"]
     m, g = float(row["flow"]), float(row["conductance"])
     p_i, p_j = (nodes[link[end]]["pressure"] for end in ("from", "to"))

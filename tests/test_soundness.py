@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import fvsolve
-from fvsolve.kernels import records as rec
 from fvsolve.limits.grid import advection_limit
 from fvsolve.limits.plane import plane_limit
 from fvsolve.limits.step import step_limits
@@ -252,7 +251,7 @@ def test_events_that_crowd_within_one_step_are_bounded_where_nothing_grows():
     model = model_of(chattering(1.0))
     assert "check opens and shuts without end" in result.reason and not result.ok and not said(result, "growth")
     times = [event["time"] for event in result.summary["events"]]
-    assert len(times) == MOST_IN_A_SPAN + 4 * model.tables[rec.I_ARMED].size and times[-1] - times[0] < 1.0
+    assert len(times) == MOST_IN_A_SPAN + 4 * model.tables.armed.size and times[-1] - times[0] < 1.0
     finer = fvsolve.run(chattering(0.1))
     assert finer.ok and len(finer.summary["events"]) == 3000
 

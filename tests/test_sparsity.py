@@ -13,7 +13,6 @@ from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
 from fvsolve.jit import njit
-from fvsolve.kernels import records as rec
 from fvsolve.model.sparsity import sparsity
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.signatures import function_types
@@ -195,8 +194,8 @@ def test_every_kind_solves_steps_of_a_microsecond_and_of_minutes(law, scheme):
 def masses(model) -> np.ndarray:
     """kg that a unit of each state stands for: waves dx / speed, stored masses 1, flows of columns none."""
     found = np.zeros(model.y_size)
-    for row in model.tables[rec.I_PIPES]:
+    for row in model.tables.pipes:
         found[row["y"] : row["y"] + 2 * row["cells"]] = row["dx"] / row["speed"]
-    stored = model.tables[rec.I_NODES]["y"]
+    stored = model.tables.nodes["y"]
     found[stored[stored >= 0]] = 1.0
     return found

@@ -16,7 +16,6 @@ from truth.scenes import WATER, area, junction, reservoir, scene
 import fvsolve
 from fvsolve import exact
 from fvsolve.errors import CaseError
-from fvsolve.kernels import records as rec
 from fvsolve.model import unsteady
 from fvsolve.studies.accuracy.reference import start_of
 from fvsolve.studies.accuracy.rungs import column
@@ -263,7 +262,7 @@ def test_what_it_remembers_of_the_start_is_part_of_what_could_be_had():
     without["links"]["main"]["friction"] = {"model": "quasi-steady", "roughness": 0.0}
     more = energy(with_).at_start["main"] - energy(without).at_start["main"]
     model = fvsolve.build(fvsolve.load(case))
-    row = model.tables[rec.I_PIPES][0]
+    row = model.tables.pipes[0]
     kinetic = 0.5 * row["flow"] ** 2 * 1000.0 / (WATER["density"] * row["area"])
     assert more == approx(kinetic / 3.0, rel=0.01)  # the parabola holds 4/3 of the energy of its mean
 

@@ -25,15 +25,6 @@ from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PROBES,
-    I_PROFILE,
-    I_SCRATCH,
-    I_SETTINGS,
-    I_VALVES,
     LEVEL,
     OK,
     PIPE_FLOW,
@@ -103,8 +94,8 @@ def rhs_barotropic(t, y, dydt, out, handle):
     An empty dydt asks for `out` alone, without what the pipes add to its rate.
     """
     tables = open_tables(handle)
-    st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
-    floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
+    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    floats, profile, scratch = tables.floats, tables.profile, tables.scratch
     out[STATUS], out[WHERE] = OK, -1.0
     open_scheduled(t, out, tables)
     waves_inside(y, out, tables)
@@ -132,14 +123,14 @@ def rhs_barotropic(t, y, dydt, out, handle):
 @njit
 def pipe_place(probe, which, y, out, tables):
     """(mass per length, mass flow) of a pipe at the place of a probe."""
-    pipe, at = tables[I_PIPES][which], tables[I_LAYOUT][0]["ends"] + 4 * which
+    pipe, at = tables.pipes[which], tables.layout[0]["ends"] + 4 * which
     r, l = out[at], out[at + 1]
     if probe["side"] > 0:
         r, l = out[at + 2], out[at + 3]
     if probe["side"] == 0:
         r, l = 0.0, 0.0
         for k in range(probe["count"]):
-            cell, weight = pipe["y"] + probe["cell"] + k, tables[I_FLOATS][probe["weights"] + k]
+            cell, weight = pipe["y"] + probe["cell"] + k, tables.floats[probe["weights"] + k]
             r += weight * y[cell]
             l += weight * y[cell + pipe["cells"]]
     return probe["mass"] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
@@ -156,7 +147,7 @@ def as_asked(st, floats, probe, p):
 @njit
 def valve_volume_flow(st, floats, tables, out, k):
     """Flow of a valve [m3/s] at the density upstream."""
-    layout, nodes, valve = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES][k]
+    layout, nodes, valve = tables.layout[0], tables.nodes, tables.valves[k]
     flow = out[layout["valve"] + k]
     up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
     return flow / density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
@@ -166,8 +157,8 @@ def valve_volume_flow(st, floats, tables, out, k):
 def observe_barotropic(t, y, out, handle, values):
     """Values of every probe; flows in m3/s at the density of the place, or upstream of a valve."""
     tables = open_tables(handle)
-    st, floats, layout, nodes = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_LAYOUT][0], tables[I_NODES]
-    probes = tables[I_PROBES]
+    st, floats, layout, nodes = tables.settings[0], tables.floats, tables.layout[0], tables.nodes
+    probes = tables.probes
     for k in range(probes.size):
         probe = probes[k]
         kind, i = probe["kind"], probe["index"]
@@ -178,7 +169,7 @@ def observe_barotropic(t, y, out, handle, values):
             value = tank_level(nodes[i], floats, nodes[i]["density"], y[nodes[i]["y"]])
         elif kind == PIPE_PRESSURE or kind == PIPE_FLOW:
             m, flow = pipe_place(probe, i, y, out, tables)
-            p = pressure_of_mass(st, floats, tables[I_PIPES][i], m)
+            p = pressure_of_mass(st, floats, tables.pipes[i], m)
             if kind == PIPE_PRESSURE:
                 value = as_asked(st, floats, probe, p)
             else:

@@ -7,16 +7,7 @@ from fvsolve.kernels.columns import add_led, column_rate
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.led import led_by_lift, led_end, led_flow, lone_lead
-from fvsolve.kernels.records import (
-    I_COLUMNS,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_SETTINGS,
-    I_VALVES,
-    NOT_CONVERGED,
-    STATUS,
-)
+from fvsolve.kernels.records import NOT_CONVERGED, STATUS
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.rigid import gate_area, join_given, number_rigid, rigid_space, settle_rigid
 
@@ -24,10 +15,10 @@ from fvsolve.kernels.rigid import gate_area, join_given, number_rigid, rigid_spa
 @njit
 def drive_change(tables, out, k):
     """What drives column k more than in the profile [Pa]."""
-    st, nodes, column = tables[I_SETTINGS][0], tables[I_NODES], tables[I_COLUMNS][k]
-    i, j, at = column["from_node"], column["to_node"], tables[I_LAYOUT][0]["pressure"]
+    st, nodes, column = tables.settings[0], tables.nodes, tables.columns[k]
+    i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
-    now = drive(st, tables[I_FLOATS], p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+    now = drive(st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
     return now - column["base"]
 
 
@@ -35,8 +26,8 @@ def drive_change(tables, out, k):
 def add_rates(t, y, tables, out, n):
     """Add to the right side d/dt of what columns that nothing leads bring into each of n rigid nodes [kg/s2]."""
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
-    for k in range(tables[I_COLUMNS].size):
-        a, b = int(rows[tables[I_COLUMNS][k]["from_node"]]), int(rows[tables[I_COLUMNS][k]["to_node"]])
+    for k in range(tables.columns.size):
+        a, b = int(rows[tables.columns[k]["from_node"]]), int(rows[tables.columns[k]["to_node"]])
         if led_end(tables, out, k) == 0 and (a >= 0 or b >= 0):
             rate = column_rate(t, y, tables, out, k, drive_change(tables, out, k))
             if a >= 0:
@@ -53,7 +44,7 @@ def hold_rigid_barotropic(t, y, tables, out):
     n = number_rigid(tables, out)
     if n == 0:
         return
-    pressure, moved = tables[I_LAYOUT][0]["pressure"], 1e300
+    pressure, moved = tables.layout[0]["pressure"], 1e300
     add_led(t, y, tables, out, n)
     join_given(tables, out, n)
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
@@ -79,11 +70,11 @@ def hold_rigid_barotropic(t, y, tables, out):
 def hold_columns_barotropic(t, y, dydt, out, handle):
     """Give rigid nodes their pressures, and the led end of a column its far end's enthalpy less height and inertia."""
     tables = open_tables(handle)
-    st, nodes, floats = tables[I_SETTINGS][0], tables[I_NODES], tables[I_FLOATS]
-    pressure = tables[I_LAYOUT][0]["pressure"]
+    st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
+    pressure = tables.layout[0]["pressure"]
     hold_rigid_barotropic(t, y, tables, out)
-    for k in range(tables[I_COLUMNS].size):
-        column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
+    for k in range(tables.columns.size):
+        column, end = tables.columns[k], led_end(tables, out, k)
         if end == 0:
             continue
         i, x = column["from_node"], column["to_node"]
@@ -102,10 +93,10 @@ def hold_columns_barotropic(t, y, dydt, out, handle):
 @njit
 def drive_with_lift(t, y, tables, out, k, x, which):
     """Take off the standing pressure of node x what moves column k and the valve that leads it."""
-    valve, pressure = tables[I_VALVES][which], tables[I_LAYOUT][0]["pressure"]
+    valve, pressure = tables.valves[which], tables.layout[0]["pressure"]
     still, ahead = head_drop(tables, out, which)[1], valve["from_node"] == x
     other = out[pressure + (valve["to_node"] if ahead else valve["from_node"])]
-    inertia = tables[I_COLUMNS][k]["length"] / tables[I_COLUMNS][k]["area"]
+    inertia = tables.columns[k]["length"] / tables.columns[k]["area"]
     drop = led_by_lift(t, y, tables, out, k, which, out[pressure + x], inertia, other, still)[0]
     out[pressure + x] += drop - still if ahead else still - drop
 
@@ -114,6 +105,6 @@ def drive_with_lift(t, y, tables, out, k, x, which):
 def column_rates_barotropic(t, y, dydt, out, handle):
     """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
     tables = open_tables(handle)
-    for k in range(tables[I_COLUMNS].size):
-        at = tables[I_COLUMNS][k]["y"]
+    for k in range(tables.columns.size):
+        at = tables.columns[k]["y"]
         dydt[at] = column_rate(t, y, tables, out, k, drive_change(tables, out, k))

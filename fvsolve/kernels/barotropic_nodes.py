@@ -41,16 +41,6 @@ from fvsolve.kernels.records import (
     CLUSTER,
     CURVE,
     FIXED,
-    I_CLUSTERS,
-    I_FLOATS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PROFILE,
-    I_SCRATCH,
-    I_SETTINGS,
-    I_VALVES,
     JUNCTION,
     LIFT,
     NO_SOLUTION,
@@ -75,7 +65,7 @@ def head_pressure(st, floats, head):
 @njit
 def stored_pressures_barotropic(t, y, out, tables):
     """Deviations [Pa] of given pressures, tanks and chambers."""
-    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
+    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     for i in range(nodes.size):
         node = nodes[i]
         at, kind = layout["pressure"] + i, node["kind"]
@@ -130,8 +120,8 @@ def ends_into_nodes(out, tables, slope, final):
 
     out[ends] holds what the cells say of both waves at each end; `final` puts the ends' own waves in their place.
     """
-    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
-    pipes, profile = tables[I_PIPES], tables[I_PROFILE]
+    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    pipes, profile = tables.pipes, tables.profile
     for i in range(nodes.size):
         out[layout["net"] + i], slope[i] = 0.0, 0.0
     for k in range(pipes.size):
@@ -160,7 +150,7 @@ def ends_into_nodes(out, tables, slope, final):
 @njit
 def waves_inside(y, out, tables):
     """What the cells say of both waves at both ends of every pipe, into out[ends]."""
-    st, layout, pipes, work = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES], tables[I_SCRATCH]
+    st, layout, pipes, work = tables.settings[0], tables.layout[0], tables.pipes, tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
         n, o = pipe["cells"], pipe["y"]
@@ -186,8 +176,8 @@ def drive(st, floats, p_i, z_i, p_j, z_j):
 @njit
 def valve_drive(tables, out, k):
     """(pressure that drives valve k [Pa], density upstream over that of reference)."""
-    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
-    valve = tables[I_VALVES][k]
+    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
     p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
     p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
@@ -198,12 +188,12 @@ def valve_drive(tables, out, k):
 @njit
 def valve_target(tables, out, k, g):
     """(M |M| that a valve asks for, or the flow where its law has a laminar part or is a power; its G now)."""
-    valve = tables[I_VALVES][k]
+    valve = tables.valves[k]
     drop, denser = valve_drive(tables, out, k)
     dense = g * denser
     if valve["law"] == POWER:
         dense *= denser  # it is its volume that follows the drop
-        return emitter_flow(tables[I_FLOATS], valve["data"], dense, drop, rule_of(tables, k)), dense
+        return emitter_flow(tables.floats, valve["data"], dense, drop, rule_of(tables, k)), dense
     if valve["law"] == TWO_WAY and drop < 0.0:
         dense *= valve["back"]
     if valve["transition"] > 0.0:
@@ -214,13 +204,13 @@ def valve_target(tables, out, k, g):
 @njit
 def valve_move(tables, out, k, g, m, wide):
     """a, s with dM = a + s d(p_i - p_j) for the next Newton step of valve k, which carries m [kg/s]."""
-    valve = tables[I_VALVES][k]
+    valve = tables.valves[k]
     if valve["law"] == CURVE:
         rho, drop = head_drop(tables, out, k)
         return pump_step(tables, out, k, rho, g, m, drop)
     if valve["law"] == POWER:
         drop, denser = valve_drive(tables, out, k)
-        return emitter_step(tables[I_FLOATS], valve["data"], g * denser * denser, m, drop, rule_of(tables, k))
+        return emitter_step(tables.floats, valve["data"], g * denser * denser, m, drop, rule_of(tables, k))
     target, slope = valve_target(tables, out, k, g)
     transition = transition_of(valve, slope)
     if valve["law"] == LIFT and is_lifting(tables, k):
@@ -230,8 +220,8 @@ def valve_move(tables, out, k, g, m, wide):
         return target - m, min(steepest, slope / max(abs(target) + abs(m), 1e-300))
     chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(slope))
     upstream = valve["from_node"] if target >= 0.0 else valve["to_node"]
-    if inner_row(tables[I_NODES], upstream) >= 0:  # whose density grows with its pressure
-        slope += abs(target) / tables[I_SETTINGS][0]["beta"]
+    if inner_row(tables.nodes, upstream) >= 0:  # whose density grows with its pressure
+        slope += abs(target) / tables.settings[0]["beta"]
     return (target - abs(m) * m) / chord, slope / chord
 
 
@@ -246,7 +236,7 @@ def full_flow(target, transition):
 @njit
 def valve_lift(tables, out, k, g, wide):
     """`restriction_lift` at the density upstream."""
-    valve = tables[I_VALVES][k]
+    valve = tables.valves[k]
     if valve["law"] != LIFT or not is_lifting(tables, k):
         return 0.0
     return lifting_slope(tables, out, k, full_flow(valve_target(tables, out, k, g)[0], valve["transition"]), wide)
@@ -255,8 +245,8 @@ def valve_lift(tables, out, k, g, wide):
 @njit
 def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right):
     """`assemble` with the slopes of the pipe ends."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, n = tables[I_INTEGERS], c.size
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, n = tables.integers, c.size
     matrix[:] = 0.0
     for r in range(n):
         i = integers[cluster["first_node"] + r]
@@ -288,9 +278,9 @@ def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
         balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
         side = solve_dense(matrix, right, n)
     if side == 0.0:
-        out[STATUS], out[WHERE] = NO_SOLUTION, tables[I_INTEGERS][cluster["first_node"]]
+        out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
         return 0.0
-    shorten(tables[I_SETTINGS][0]["beta"], a, right)
+    shorten(tables.settings[0]["beta"], a, right)
     return move(cluster, tables, out, m, a, s, lift, right)
 
 
@@ -310,7 +300,7 @@ def shorten(most, a, right):
 @njit
 def given_flows(t, y, out, tables):
     """Pressures of vessels, demands, and flows of valves that lie between known pressures."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
             demand = schedule_value(tables, nodes[i]["schedule"], t)
@@ -328,8 +318,8 @@ def given_flows(t, y, out, tables):
 def is_quiet(cluster, tables, out):
     """Whether pipe ends bring the nodes of a cluster exactly what they did in the profile."""
     for i in range(cluster["nodes"]):
-        node = tables[I_INTEGERS][cluster["first_node"] + i]
-        if out[tables[I_LAYOUT][0]["net"] + node] != 0.0:
+        node = tables.integers[cluster["first_node"] + i]
+        if out[tables.layout[0]["net"] + node] != 0.0:
             return False
     return True
 
@@ -337,7 +327,7 @@ def is_quiet(cluster, tables, out):
 @njit
 def node_space(tables):
     """Scratch of all clusters: (slope, c, held, group of nodes, conductance and flow of valves, the rest)."""
-    n, v, work = tables[I_NODES].size, tables[I_VALVES].size, tables[I_SCRATCH]
+    n, v, work = tables.nodes.size, tables.valves.size, tables.scratch
     g, m, rest = work[4 * n : 4 * n + v], work[4 * n + v : 4 * n + 2 * v], work[4 * n + 2 * v :]
     return (
         work[:n],
@@ -346,22 +336,22 @@ def node_space(tables):
         work[3 * n : 4 * n],
         g,
         m,
-        rest[4 * tables[I_CLUSTERS].size :],
+        rest[4 * tables.clusters.size :],
     )
 
 
 @njit
 def cluster_space(tables):
     """How far each cluster is: (whether it is done, its last change and the one before it, wide: as of `lift_of`)."""
-    n, v, many = tables[I_NODES].size, tables[I_VALVES].size, tables[I_CLUSTERS].size
-    work = tables[I_SCRATCH][4 * n + 2 * v :]
+    n, v, many = tables.nodes.size, tables.valves.size, tables.clusters.size
+    work = tables.scratch[4 * n + 2 * v :]
     return work[:many], work[many : 2 * many], work[2 * many : 3 * many], work[3 * many : 4 * many]
 
 
 @njit
 def begin_clusters(out, tables, space):
     """Flows and openings of all clusters before Newton's first step; done: as in the profile, but for pipe ends."""
-    clusters, (_, c, held, _, g, m, _), (done, moved, _, wide) = tables[I_CLUSTERS], space, cluster_space(tables)
+    clusters, (_, c, held, _, g, m, _), (done, moved, _, wide) = tables.clusters, space, cluster_space(tables)
     a, b = 0, 0
     for which in range(clusters.size):
         cluster = clusters[which]
@@ -378,7 +368,7 @@ def begin_clusters(out, tables, space):
 def step_clusters(sweep, out, tables, space):
     """A Newton step of every cluster that something reaches and that is not done."""
     clusters, (slope, c, held, _, g, m, rest), (done, moved, past, wide) = (
-        tables[I_CLUSTERS], space, cluster_space(tables),
+        tables.clusters, space, cluster_space(tables),
     )  # fmt: skip
     a, b = 0, 0
     for which in range(clusters.size):
@@ -399,7 +389,7 @@ def step_clusters(sweep, out, tables, space):
 @njit
 def settle_clusters(out, tables, space):
     """Which clusters are done, each by its own last change; returns whether one goes on."""
-    clusters, m, (done, moved, past, wide), b, on = tables[I_CLUSTERS], space[5], cluster_space(tables), 0, False
+    clusters, m, (done, moved, past, wide), b, on = tables.clusters, space[5], cluster_space(tables), 0, False
     for which in range(clusters.size):
         j = b + clusters[which]["valves"]
         if done[which] == 0.0 and settled(moved[which], past[which]):
@@ -415,7 +405,7 @@ def settle_clusters(out, tables, space):
 @njit
 def finish_clusters(out, tables, space):
     """Write the flows of all clusters' valves."""
-    clusters, (_, c, held, group, g, m, _), moved = tables[I_CLUSTERS], space, cluster_space(tables)[1]
+    clusters, (_, c, held, group, g, m, _), moved = tables.clusters, space, cluster_space(tables)[1]
     a, b = 0, 0
     for which in range(clusters.size):
         i, j = a + clusters[which]["nodes"], b + clusters[which]["valves"]

@@ -12,7 +12,6 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_CALLS, I_SPARE
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE is what event functions want to have run before them; within the
 # right-hand side, CLUSTERS closes nodes that several valves join, and the others see to rigid columns.
@@ -93,7 +92,7 @@ else:
 @njit(forceinline=True)
 def run(job, t, y, dydt, out, handle):
     """Every piece of a job that takes part in the right-hand side."""
-    calls, k = open_tables(handle)[I_CALLS], 0
+    calls, k = open_tables(handle).calls, 0
     while calls[job, k] != 0:
         call_rates(calls[job, k], t, y, dydt, out, handle)
         k += 1
@@ -108,7 +107,7 @@ def rhs_in_turn(t, y, dydt, out, handle):
 @njit
 def observe_in_turn(t, y, out, handle, values):
     """Every piece that reads probes."""
-    calls, k = open_tables(handle)[I_CALLS], 0
+    calls, k = open_tables(handle).calls, 0
     while calls[OBSERVE, k] != 0:
         call_reader(calls[OBSERVE, k], t, y, out, handle, values)
         k += 1
@@ -117,7 +116,7 @@ def observe_in_turn(t, y, out, handle, values):
 @njit
 def record_in_turn(t, y, out, handle, values):
     """Every piece that notes an accepted state, after the probes are read."""
-    calls, k = open_tables(handle)[I_CALLS], 0
+    calls, k = open_tables(handle).calls, 0
     observe_in_turn(t, y, out, handle, values)
     while calls[RECORD, k] != 0:
         call_reader(calls[RECORD, k], t, y, out, handle, values)
@@ -134,7 +133,7 @@ def close_in_turn(t, y, out, handle, g):
 def events_in_turn(t, y, handle, g):
     """Every piece of the event functions."""
     tables, k = open_tables(handle), 0
-    calls, out = tables[I_CALLS], tables[I_SPARE]
+    calls, out = tables.calls, tables.spare
     while calls[EVENTS, k] != 0:
         call_reader(calls[EVENTS, k], t, y, out, handle, g)
         k += 1
@@ -143,7 +142,7 @@ def events_in_turn(t, y, handle, g):
 @njit
 def power_in_turn(t, y, dydt, out, handle, power):
     """Every piece that fills `power`."""
-    calls, k = open_tables(handle)[I_CALLS], 0
+    calls, k = open_tables(handle).calls, 0
     while calls[POWER, k] != 0:
         call_energies(calls[POWER, k], t, y, dydt, out, handle, power)
         k += 1
@@ -152,7 +151,7 @@ def power_in_turn(t, y, dydt, out, handle, power):
 @njit
 def stored_in_turn(t, y, dydt, out, handle, stored):
     """Every piece that fills `stored`."""
-    calls, k = open_tables(handle)[I_CALLS], 0
+    calls, k = open_tables(handle).calls, 0
     while calls[STORED, k] != 0:
         call_energies(calls[STORED, k], t, y, dydt, out, handle, stored)
         k += 1

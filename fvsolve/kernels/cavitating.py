@@ -15,20 +15,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_volume
 from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.reconstruction import value_muscl
-from fvsolve.kernels.records import (
-    I_FLOATS,
-    I_LAYOUT,
-    I_MARKS,
-    I_PIPES,
-    I_PROFILE,
-    I_SCRATCH,
-    I_SETTINGS,
-    OK,
-    RATE,
-    STATUS,
-    UPWIND,
-    WHERE,
-)
+from fvsolve.kernels.records import OK, RATE, STATUS, UPWIND, WHERE
 from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.riemann import face_flux
 
@@ -151,8 +138,8 @@ def rhs_cavitating(t, y, dydt, out, handle):
     An empty dydt asks for `out` alone, without what the pipes add to its rate.
     """
     tables = open_tables(handle)
-    st, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
-    floats, profile, scratch = tables[I_FLOATS], tables[I_PROFILE], tables[I_SCRATCH]
+    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    floats, profile, scratch = tables.floats, tables.profile, tables.scratch
     out[STATUS], out[WHERE] = OK, -1.0
     open_scheduled(t, out, tables)
     for i in range(pipes.size):
@@ -183,7 +170,7 @@ def rhs_cavitating(t, y, dydt, out, handle):
 @njit
 def note_cavity(t, pipe, r, l, at, tables):
     """First place (share of the length), greatest volume [m3] and its time of cavities, into marks from `at`."""
-    st, floats, profile, marks = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_PROFILE], tables[I_MARKS]
+    st, floats, profile, marks = tables.settings[0], tables.floats, tables.profile, tables.marks
     volume, first = 0.0, -1
     for i in range(r.size):
         if r[i] + l[i] < profile[pipe["cell"] + i]:
@@ -203,7 +190,7 @@ def note_cavity(t, pipe, r, l, at, tables):
 def record_cavities(t, y, out, handle, values):
     """Cavities of all pipes after an accepted step."""
     tables = open_tables(handle)
-    pipes, at = tables[I_PIPES], tables[I_MARKS].size - 3 * tables[I_PIPES].size
+    pipes, at = tables.pipes, tables.marks.size - 3 * tables.pipes.size
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
         note_cavity(t, pipes[i], y[o : o + n], y[o + n : o + 2 * n], at + 3 * i, tables)

@@ -16,18 +16,7 @@ from fvsolve.kernels.barotropic_nodes import (
 )
 from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.mixture import mixture_enthalpy, mixture_volume
-from fvsolve.kernels.records import (
-    I_CLUSTERS,
-    I_FLOATS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PROFILE,
-    I_SCRATCH,
-    I_SETTINGS,
-    JUNCTION,
-)
+from fvsolve.kernels.records import JUNCTION
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
 
 ROUNDING = 1e-12  # of a node's pressure: the least that its gas has
@@ -92,8 +81,8 @@ def cavitating_ends(out, tables, slope, final):
     out[ends] holds pressure and velocity [Pa, m/s] that the cells say of each end; `final` puts the ends' own waves
     in their place.
     """
-    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
-    pipes = tables[I_PIPES]
+    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    pipes = tables.pipes
     for i in range(nodes.size):
         out[layout["net"] + i], slope[i] = 0.0, 0.0
     for k in range(pipes.size):
@@ -123,14 +112,14 @@ def hold_back(sweep, out, tables, before, low, high):
     A node alone in its cluster takes in less the higher its pressure is, so each step bounds its root on one side;
     after a while the bounds are halved. Others keep above the floor, and then take half steps.
     """
-    st, nodes, clusters = tables[I_SETTINGS][0], tables[I_NODES], tables[I_CLUSTERS]
-    pressure, floor, (done, moved, _, _) = tables[I_LAYOUT][0]["pressure"], st["floor"], cluster_space(tables)
+    st, nodes, clusters = tables.settings[0], tables.nodes, tables.clusters
+    pressure, floor, (done, moved, _, _) = tables.layout[0]["pressure"], st["floor"], cluster_space(tables)
     for which in range(clusters.size):
         if done[which] == 1.0 or clusters[which]["nodes"] == 0:
             continue
         moved[which] = 0.0
         for k in range(clusters[which]["nodes"]):
-            i = tables[I_INTEGERS][clusters[which]["first_node"] + k]
+            i = tables.integers[clusters[which]["first_node"] + k]
             base = nodes[i]["pressure"]
             p, q, least = base + before[i], base + out[pressure + i], floor + ROUNDING * (1e5 + base)
             if clusters[which]["nodes"] > 1:
@@ -146,19 +135,19 @@ def hold_back(sweep, out, tables, before, low, high):
 @njit
 def unbind(tables, low, high, first):
     """Forget the bounds of clusters that begin: at the first sweep, and where the wide look at lifts is over."""
-    clusters, (_, moved, _, _) = tables[I_CLUSTERS], cluster_space(tables)
+    clusters, (_, moved, _, _) = tables.clusters, cluster_space(tables)
     for which in range(clusters.size):
         if first or moved[which] == 1e300:
             for k in range(clusters[which]["nodes"]):
-                i = tables[I_INTEGERS][clusters[which]["first_node"] + k]
-                low[i], high[i] = tables[I_SETTINGS][0]["floor"], UNBOUNDED
+                i = tables.integers[clusters[which]["first_node"] + k]
+                low[i], high[i] = tables.settings[0]["floor"], UNBOUNDED
 
 
 @njit
 def close_nodes_cavitating(t, y, out, tables):
     """`close_nodes_barotropic` above the law's floor; a cluster is done when none of its pressures changes."""
-    space, n, work = node_space(tables), tables[I_NODES].size, tables[I_SCRATCH]
-    pressure, last = tables[I_LAYOUT][0]["pressure"], space[3]
+    space, n, work = node_space(tables), tables.nodes.size, tables.scratch
+    pressure, last = tables.layout[0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
@@ -178,8 +167,8 @@ def close_nodes_cavitating(t, y, out, tables):
 @njit
 def balance_junctions(out, tables):
     """What Newton has left at junctions goes to their pipe ends, by what these hold: rounding, but mass is kept."""
-    layout, nodes, pipes, profile = tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES], tables[I_PROFILE]
-    left, held, some = tables[I_SCRATCH][: nodes.size], tables[I_SCRATCH][nodes.size : 2 * nodes.size], False
+    layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
+    left, held, some = tables.scratch[: nodes.size], tables.scratch[nodes.size : 2 * nodes.size], False
     for i in range(nodes.size):
         left[i], held[i] = 0.0, 0.0
         if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:

@@ -10,20 +10,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.isolated import check_unserved, find_held, float_shut, inner_row
-from fvsolve.kernels.records import (
-    I_CLUSTERS,
-    I_COLUMNS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_SCRATCH,
-    I_VALVES,
-    NO_SOLUTION,
-    NOT_CONVERGED,
-    STATUS,
-    TWO_WAY,
-    WHERE,
-)
+from fvsolve.kernels.records import NO_SOLUTION, NOT_CONVERGED, STATUS, TWO_WAY, WHERE
 from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step, runs_back
 
 BAR = 1e5
@@ -73,16 +60,16 @@ def settled(moved, before):
 @njit
 def whole_inflows(cluster, tables, out, c):
     """c: flow into every node of a cluster from all but its valves at p' = 0; True where nothing has changed."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, quiet = tables[I_INTEGERS], True
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, quiet = tables.integers, True
     for i in range(c.size):
         node = integers[cluster["first_node"] + i]
         quiet = quiet and out[layout["net"] + node] == 0.0
         c[i] = out[layout["supply"] + node]  # exact where only valves and columns join
         if nodes[node]["admittance"] > 0.0:
             c[i] = out[layout["net"] + node]
-    for k in range(tables[I_COLUMNS].size):
-        column = tables[I_COLUMNS][k]
+    for k in range(tables.columns.size):
+        column = tables.columns[k]
         i, j = inner_of(cluster, tables, column["from_node"]), inner_of(cluster, tables, column["to_node"])
         if i >= 0 and nodes[column["from_node"]]["admittance"] == 0.0:
             c[i] -= out[layout["column"] + k]
@@ -101,8 +88,8 @@ def whole_inflows(cluster, tables, out, c):
 @njit
 def inner_of(cluster, tables, i):
     """Row of node i where it belongs to this cluster, else -1."""
-    row = inner_row(tables[I_NODES], i)
-    if row < 0 or row >= cluster["nodes"] or tables[I_INTEGERS][cluster["first_node"] + row] != i:
+    row = inner_row(tables.nodes, i)
+    if row < 0 or row >= cluster["nodes"] or tables.integers[cluster["first_node"] + row] != i:
         return -1
     return row
 
@@ -124,8 +111,8 @@ def put_valve(i, j, m, a, s, lift, n, matrix, right):
 @njit
 def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wide):
     """Linear system for the change of the pressures, with the valves' changes put in; wide: as of `lift_of`."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, n = tables[I_INTEGERS], c.size
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, n = tables.integers, c.size
     for i in range(matrix.size):
         matrix[i] = 0.0
     for i in range(n):
@@ -153,8 +140,8 @@ def move(cluster, tables, out, m, a, s, lift, right):
 
     What the rounding of pressures does to a flow is no change, and no flow counts as less than that at 1 Pa.
     """
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    integers, scale, vague, moved, most = tables[I_INTEGERS], 1e-300, 0.0, 0.0, 0.0
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, scale, vague, moved, most = tables.integers, 1e-300, 0.0, 0.0, 0.0
     for i in range(right.size):
         node = integers[cluster["first_node"] + i]
         out[layout["pressure"] + node] += right[i]
@@ -178,8 +165,8 @@ def move(cluster, tables, out, m, a, s, lift, right):
 @njit
 def prepare(cluster, tables, out, g, m):
     """Conductances and first flows of a cluster's valves; True where none has changed and no pressure beside it."""
-    layout, valves = tables[I_LAYOUT][0], tables[I_VALVES]
-    integers, quiet = tables[I_INTEGERS], True
+    layout, valves = tables.layout[0], tables.valves
+    integers, quiet = tables.integers, True
     for i in range(cluster["nodes"]):
         out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
     for e in range(g.size):
@@ -197,8 +184,8 @@ def prepare(cluster, tables, out, g, m):
 @njit
 def close_cluster(out, tables, which):
     """Pressures of one cluster's nodes and flows of its valves; it starts from the profile, so the rhs stays pure."""
-    integers, cluster = tables[I_INTEGERS], tables[I_CLUSTERS][which]
-    n, k, work = cluster["nodes"], cluster["valves"], tables[I_SCRATCH]
+    integers, cluster = tables.integers, tables.clusters[which]
+    n, k, work = cluster["nodes"], cluster["valves"], tables.scratch
     at = n * n + 4 * n
     matrix, right, c = work[: n * n], work[n * n : n * n + n], work[n * n + n : n * n + 2 * n]
     held, group = work[n * n + 2 * n : n * n + 3 * n], work[n * n + 3 * n : at]
@@ -232,7 +219,7 @@ def close_cluster(out, tables, which):
 def any_back(cluster, tables, m):
     """Whether a valve of a cluster that the pressure before it lifts carries its flow backwards."""
     for e in range(m.size):
-        if runs_back(tables, tables[I_INTEGERS][cluster["first_valve"] + e], m[e]):
+        if runs_back(tables, tables.integers[cluster["first_valve"] + e], m[e]):
             return True
     return False
 
@@ -243,7 +230,7 @@ def let_fall(cluster, tables, g, m):
     met a system that is no longer positive: lower lifts would lack even more."""
     some = False
     for e in range(m.size):
-        if g[e] > 0.0 and runs_back(tables, tables[I_INTEGERS][cluster["first_valve"] + e], m[e]):
+        if g[e] > 0.0 and runs_back(tables, tables.integers[cluster["first_valve"] + e], m[e]):
             g[e], some = 0.0, True
     return some
 
@@ -260,8 +247,8 @@ def shut_out(cluster, tables, g, m, held):
 @njit
 def is_held(cluster, tables, e, held):
     """Whether valve e of a cluster lies between held nodes or known pressures."""
-    valve = tables[I_VALVES][tables[I_INTEGERS][cluster["first_valve"] + e]]
-    i, j = inner_row(tables[I_NODES], valve["from_node"]), inner_row(tables[I_NODES], valve["to_node"])
+    valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
+    i, j = inner_row(tables.nodes, valve["from_node"]), inner_row(tables.nodes, valve["to_node"])
     return (i < 0 or held[i] > 0.0) and (j < 0 or held[j] > 0.0)
 
 
@@ -273,13 +260,13 @@ def finish(cluster, tables, out, g, m, c, held, group, moved):
     """
     scale = 1e-300
     for e in range(m.size):
-        k = tables[I_INTEGERS][cluster["first_valve"] + e]
-        if abs(m[e]) <= ROUNDING * sqrt(tables[I_VALVES][k]["conductance"]):  # of its flow at 1 Pa
+        k = tables.integers[cluster["first_valve"] + e]
+        if abs(m[e]) <= ROUNDING * sqrt(tables.valves[k]["conductance"]):  # of its flow at 1 Pa
             m[e] = 0.0
-        out[tables[I_LAYOUT][0]["valve"] + k] = m[e]
-        scale = max(scale, abs(tables[I_VALVES][k]["flow"]), sqrt(tables[I_VALVES][k]["conductance"]))
+        out[tables.layout[0]["valve"] + k] = m[e]
+        scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
     if moved > UNSETTLED:
-        out[STATUS], out[WHERE] = NOT_CONVERGED, tables[I_INTEGERS][cluster["first_node"]]
+        out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
     for i in range(held.size):
         if held[i] == 0.0:
             float_shut(cluster, tables, out, g, held, group)
@@ -291,5 +278,5 @@ def finish(cluster, tables, out, g, m, c, held, group, moved):
 def close_clusters(t, y, dydt, out, handle):
     """Pressures of the nodes of all clusters and flows of their valves."""
     tables = open_tables(handle)
-    for which in range(tables[I_CLUSTERS].size):
+    for which in range(tables.clusters.size):
         close_cluster(out, tables, which)

@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.led import lead_columns, led_end, led_flow, led_rate, lone_lead
-from fvsolve.kernels.records import CLOSING, I_COLUMNS, I_INTEGERS, I_LAYOUT, I_NODES, I_VALVES, RATE
+from fvsolve.kernels.records import CLOSING, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.rigid import (
     add_pushes,
@@ -21,7 +21,7 @@ from fvsolve.kernels.rigid import (
 def column_inflows(t, y, dydt, out, handle):
     """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
     tables = open_tables(handle)
-    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
+    layout, columns = tables.layout[0], tables.columns
     lead_columns(tables, out)
     for k in range(columns.size):
         column, end = columns[k], led_end(tables, out, k)
@@ -39,10 +39,10 @@ def add_led(t, y, tables, out, n):
     """given <- d/dt of what led columns bring into each of n rigid nodes [kg/s2]."""
     rows, _, _, _, _, given = rigid_space(tables, n)
     given[:] = 0.0
-    for k in range(tables[I_COLUMNS].size):
+    for k in range(tables.columns.size):
         end = led_end(tables, out, k)
         if end != 0:
-            i = tables[I_COLUMNS][k]["from_node"] if end == 1 else tables[I_COLUMNS][k]["to_node"]
+            i = tables.columns[k]["from_node"] if end == 1 else tables.columns[k]["to_node"]
             if rows[i] >= 0.0:
                 given[int(rows[i])] -= led_flow(t, y, tables, out, k, end, True)[1]
 
@@ -60,7 +60,7 @@ def hold_rigid(t, y, tables, out):
     settle_rigid(tables, out, n)
     for i in range(rows.size):
         if rows[i] >= 0.0:
-            out[tables[I_LAYOUT][0]["pressure"] + i] = right[int(rows[i])]
+            out[tables.layout[0]["pressure"] + i] = right[int(rows[i])]
 
 
 @njit
@@ -70,12 +70,12 @@ def hold_columns(t, y, dydt, out, handle):
     One that stands has that of its far end and the weight between; a flow over next to no area would say nothing of it.
     """
     tables = open_tables(handle)
-    pressure = tables[I_LAYOUT][0]["pressure"]
+    pressure = tables.layout[0]["pressure"]
     hold_rigid(t, y, tables, out)
-    for k in range(tables[I_COLUMNS].size):
+    for k in range(tables.columns.size):
         end = led_end(tables, out, k)
         if end != 0:
-            x = tables[I_COLUMNS][k]["to_node"] if end == 1 else tables[I_COLUMNS][k]["from_node"]
+            x = tables.columns[k]["to_node"] if end == 1 else tables.columns[k]["from_node"]
             out[pressure + x] = led_flow(t, y, tables, out, k, end, True)[2]
 
 
@@ -83,7 +83,7 @@ def hold_columns(t, y, dydt, out, handle):
 def column_rates(t, y, dydt, out, handle):
     """d/dt of the flow in rigid columns under the linear law."""
     tables = open_tables(handle)
-    columns, pressure = tables[I_COLUMNS], tables[I_LAYOUT][0]["pressure"]
+    columns, pressure = tables.columns, tables.layout[0]["pressure"]
     for k in range(columns.size):
         column = columns[k]
         change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]]
@@ -96,11 +96,11 @@ def column_rate(t, y, tables, out, k, change):
 
     Where one leads it from its seat, the pressure beside that tells.
     """
-    column, end = tables[I_COLUMNS][k], led_end(tables, out, k)
+    column, end = tables.columns[k], led_end(tables, out, k)
     x = column["to_node"] if end == 1 else column["from_node"]
     if end != 0 and (lone_lead(tables, x) < 0 or gate_area(tables, out, x)[0] == 0.0):
         return end * led_rate(t, y, tables, out, k, end)
-    pull = column_drag(column, out[tables[I_LAYOUT][0]["column"] + k])
+    pull = column_drag(column, out[tables.layout[0]["column"] + k])
     return column["area"] / column["length"] * (change + column["offset"]) - (pull - column["drag"])
 
 
@@ -112,14 +112,14 @@ def quickest_column(t, y, dydt, out, handle):
     """
     tables = open_tables(handle)
     out[CLOSING] = 0.0
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
-    for k in range(tables[I_COLUMNS].size):
-        column = tables[I_COLUMNS][k]
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    for k in range(tables.columns.size):
+        column = tables.columns[k]
         for side in range(2):
             i = column["to_node"] if side == 1 else column["from_node"]
             slope = 0.0
             for e in range(nodes[i]["gate_count"]):
-                which = tables[I_INTEGERS][nodes[i]["gates"] + e]
+                which = tables.integers[nodes[i]["gates"] + e]
                 drop = valves[which]["drop"] + out[layout["pressure"] + valves[which]["from_node"]]
                 drop -= out[layout["pressure"] + valves[which]["to_node"]]
                 slope += restriction_slope(tables, out, which, drop)

@@ -10,7 +10,6 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_VALVES
 
 LEAST_DROP = 10.0  # drop above `least` below which the cubic holds [Pa]
 EVENTS = 4  # of an outlet: it shuts, it opens; it gives all that is asked, or less
@@ -23,7 +22,7 @@ NO_END = 1e300  # as the most that is asked
 @njit(forceinline=True)
 def rule_of(tables, k):
     """The rule that restriction k follows until its next event."""
-    armed, at = tables[I_ARMED], tables[I_VALVES][k]["event"]
+    armed, at = tables.armed, tables.valves[k]["event"]
     if armed[at] > 0.0:
         return SHUT
     return FULL if armed[at + 2] > 0.0 else PART if armed[at + 3] > 0.0 else FREE
@@ -41,7 +40,7 @@ def bent(floats, at, drop, rule):
 @njit
 def emitter_events(tables, k, drop, g):
     """g: until restriction k shuts, or opens; until it gives all that is asked, or less [Pa]."""
-    valve, floats, armed = tables[I_VALVES][k], tables[I_FLOATS], tables[I_ARMED]
+    valve, floats, armed = tables.valves[k], tables.floats, tables.armed
     at, event = valve["data"], valve["event"]
     above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
     if most < NO_END:

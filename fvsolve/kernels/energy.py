@@ -19,26 +19,7 @@ from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanics import between, contact, motion
 from fvsolve.kernels.pipes import family_of
-from fvsolve.kernels.records import (
-    CHAMBER,
-    I_ARMED,
-    I_BODIES,
-    I_BRACES,
-    I_COLUMNS,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PISTONS,
-    I_SETTINGS,
-    I_STOPS,
-    I_VALVES,
-    MUSCL,
-    SHORT,
-    TANK,
-    UPWIND,
-    WENO5,
-)
+from fvsolve.kernels.records import CHAMBER, MUSCL, SHORT, TANK, UPWIND, WENO5
 from fvsolve.kernels.rigid import column_drag
 from fvsolve.kernels.tanks import tank_level
 
@@ -89,14 +70,14 @@ def at_point(c, width, i, point):
 @njit(forceinline=True)
 def gauge(tables, out, i):
     """p - p_ambient of node i [Pa]."""
-    start = tables[I_NODES][i]["pressure"] - tables[I_SETTINGS][0]["ambient"]
-    return start + out[tables[I_LAYOUT][0]["pressure"] + i]
+    start = tables.nodes[i]["pressure"] - tables.settings[0]["ambient"]
+    return start + out[tables.layout[0]["pressure"] + i]
 
 
 @njit(forceinline=True)
 def potential(tables, out, i):
     """P = p - p_ambient + rho g z of node i [Pa]."""
-    return gauge(tables, out, i) + lift(tables[I_SETTINGS][0], tables[I_NODES][i])
+    return gauge(tables, out, i) + lift(tables.settings[0], tables.nodes[i])
 
 
 @njit(forceinline=True)
@@ -142,8 +123,8 @@ def pipe_energy(st, pipe, start, r, l, rows):
 def power_linear(t, y, dydt, out, handle, power):
     """Fill `power` from a state, its rates and what the rhs wrote beside them."""
     tables = open_tables(handle)
-    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
-    valves, columns, per = tables[I_VALVES], tables[I_COLUMNS], 1.0 / tables[I_SETTINGS][0]["rho"]
+    st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
+    valves, columns, per = tables.valves, tables.columns, 1.0 / tables.settings[0]["rho"]
     at = 0
     for i in range(nodes.size):
         p = potential(tables, out, i) * per
@@ -183,8 +164,8 @@ def power_linear(t, y, dydt, out, handle, power):
 @njit
 def power_bodies(t, y, dydt, out, tables, power, at):
     """Rows of bodies, braces and stops from row `at` on; returns the row behind them."""
-    layout, bodies, braces, stops = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_BRACES], tables[I_STOPS]
-    armed = tables[I_ARMED]
+    layout, bodies, braces, stops = tables.layout[0], tables.bodies, tables.braces, tables.stops
+    armed = tables.armed
     for i in range(bodies.size):
         power[at] = 0.0
         if bodies[i]["y"] >= 0:
@@ -224,7 +205,7 @@ def moving_side(tables, piston, side):
 @njit
 def power_pistons(y, dydt, out, tables, power, at):
     """Rows of pistons, and of storage in their chambers: V p^2 / (2 beta) and the height of the mass."""
-    st, layout, nodes, pistons = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PISTONS]
+    st, layout, nodes, pistons = tables.settings[0], tables.layout[0], tables.nodes, tables.pistons
     per = 1.0 / st["rho"]
     for k in range(pistons.size):
         piston = pistons[k]
@@ -249,8 +230,8 @@ def power_pistons(y, dydt, out, tables, power, at):
 def stored_linear(t, y, dydt, out, handle, stored):
     """Fill `stored`, changes since the profile [J]."""
     tables = open_tables(handle)
-    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
-    columns, pistons, per = tables[I_COLUMNS], tables[I_PISTONS], 1.0 / tables[I_SETTINGS][0]["rho"]
+    st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
+    columns, pistons, per = tables.columns, tables.pistons, 1.0 / tables.settings[0]["rho"]
     for i in range(nodes.size):
         node = nodes[i]
         stored[i] = 0.0
@@ -258,7 +239,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
             change, p0 = out[layout["pressure"] + i], node["pressure"] - st["ambient"]
             stored[i] = per * y[node["y"]] * (p0 + 0.5 * change + lift(st, node))
         elif node["kind"] == TANK:
-            stored[i] = tank_energy(st, tables[I_FLOATS], node, st["rho"], y[node["y"]])
+            stored[i] = tank_energy(st, tables.floats, node, st["rho"], y[node["y"]])
     for k in range(pistons.size):
         piston = pistons[k]
         x = between(tables, y, piston["case"], piston["rod"])[0]
@@ -316,7 +297,7 @@ def level_moment(floats, shape, rows, level):
 @njit
 def stored_bodies(y, tables, stored, at):
     """Rows of bodies, braces and stops from row `at` on."""
-    bodies, braces, stops = tables[I_BODIES], tables[I_BRACES], tables[I_STOPS]
+    bodies, braces, stops = tables.bodies, tables.braces, tables.stops
     for i in range(bodies.size):
         stored[at] = 0.0
         if bodies[i]["y"] >= 0:

@@ -29,24 +29,7 @@ from fvsolve.kernels.energy import (
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanics import between, leak_flow
-from fvsolve.kernels.records import (
-    CHAMBER,
-    I_BODIES,
-    I_BRACES,
-    I_COLUMNS,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PISTONS,
-    I_PROFILE,
-    I_SETTINGS,
-    I_STOPS,
-    I_VALVES,
-    JUNCTION,
-    LAW_LINEAR,
-    TANK,
-)
+from fvsolve.kernels.records import CHAMBER, JUNCTION, LAW_LINEAR, TANK
 from fvsolve.kernels.rigid import column_drag
 
 EMPTY = 1e-6  # of what a pipe holds: the least that counts as a mass
@@ -70,8 +53,8 @@ def head_at(st, floats, node, p):
 @njit
 def total_head(tables, out, i):
     """H = h(p) - h(p_ambient) + g z of node i [J/kg]."""
-    st, node = tables[I_SETTINGS][0], tables[I_NODES][i]
-    h = height_of(st, tables[I_FLOATS], node["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + i])
+    st, node = tables.settings[0], tables.nodes[i]
+    h = height_of(st, tables.floats, node["pressure"] + out[tables.layout[0]["pressure"] + i])
     return h + st["gravity"] * (node["elevation"] - st["datum"])
 
 
@@ -147,8 +130,8 @@ def jets(profile, pipe, out, end, nodes):
 def power_barotropic(t, y, dydt, out, handle, power):
     """Fill `power` from a state, its rates and what the rhs wrote beside them."""
     tables = open_tables(handle)
-    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
-    valves, columns, floats, profile = tables[I_VALVES], tables[I_COLUMNS], tables[I_FLOATS], tables[I_PROFILE]
+    st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
+    valves, columns, floats, profile = tables.valves, tables.columns, tables.floats, tables.profile
     at = 0
     for i in range(nodes.size):
         head = total_head(tables, out, i)
@@ -181,15 +164,15 @@ def power_barotropic(t, y, dydt, out, handle, power):
         power[at + 2] = size * own * dydt[column["y"]]
         at += COLUMN
     power_bodies(t, y, dydt, out, tables, power, at)
-    at += BODY * tables[I_BODIES].size + BRACE * tables[I_BRACES].size + STOP * tables[I_STOPS].size
+    at += BODY * tables.bodies.size + BRACE * tables.braces.size + STOP * tables.stops.size
     power_pistons_barotropic(y, dydt, out, tables, power, at)
 
 
 @njit
 def power_pistons_barotropic(y, dydt, out, tables, power, at):
     """Rows of pistons, and of storage in their chambers, H dm - (p - p_ambient) dV."""
-    nodes, pistons = tables[I_NODES], tables[I_PISTONS]
-    pressure = tables[I_LAYOUT][0]["pressure"]
+    nodes, pistons = tables.nodes, tables.pistons
+    pressure = tables.layout[0]["pressure"]
     for k in range(pistons.size):
         piston = pistons[k]
         speed = between(tables, y, piston["case"], piston["rod"])[1]
@@ -216,8 +199,8 @@ def vessel_energy(st, floats, node, mass, volume, p):
 def stored_barotropic(t, y, dydt, out, handle, stored):
     """Fill `stored`, changes since the profile [J]."""
     tables = open_tables(handle)
-    st, layout, nodes, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_PIPES]
-    columns, pistons, floats = tables[I_COLUMNS], tables[I_PISTONS], tables[I_FLOATS]
+    st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
+    columns, pistons, floats = tables.columns, tables.pistons, tables.floats
     for i in range(nodes.size):
         node = nodes[i]
         stored[i], p0 = 0.0, node["pressure"]
@@ -241,7 +224,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
         pipe = pipes[k]
         n, o, z = pipe["cells"], pipe["y"], nodes[pipe["from_node"]]["elevation"] - st["datum"]
         pipe_energy_barotropic(
-            st, floats, tables[I_PROFILE], pipe, z, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2]
+            st, floats, tables.profile, pipe, z, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2]
         )
         at += 2
     for k in range(columns.size):

@@ -9,16 +9,16 @@ import os
 
 import numpy as np
 
-from fvsolve.kernels.records import table_types
+from fvsolve.kernels.records import Called, table_types
 
 if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
     from numba.core import cgutils, types
-    from numba.core.imputils import lower_builtin
-    from numba.core.typing.templates import AbstractTemplate, infer, signature
+    from numba.core.imputils import lower_getattr_generic
+    from numba.core.typing.templates import AttributeTemplate, infer_getattr
     from numba.extending import intrinsic, models, register_model
 
     class Tables(types.Opaque):
-        """What `open_tables` gives: a bare address, whose items are the tables."""
+        """What `open_tables` gives: a bare address, whose attributes are the tables."""
 
         def __init__(self) -> None:
             super().__init__("Tables")
@@ -31,7 +31,7 @@ if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
 
     @intrinsic
     def open_tables(typingctx, handle):
-        """The tables behind a handle, uncounted; `tables[I_NODES]` loads one."""
+        """The tables behind a handle, uncounted; `tables.nodes` loads one."""
         from numba.np.arrayobj import make_array
 
         def generate(context, builder, kind, args):
@@ -40,27 +40,25 @@ if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
 
         return Tables()(handle), generate
 
-    @infer
-    class TableItem(AbstractTemplate):
-        """The type of `tables[constant]`."""
+    @infer_getattr
+    class TableOf(AttributeTemplate):
+        """The type of `tables.name`."""
 
-        key = "static_getitem"
+        key = Tables
 
-        def generic(self, args, kws):
-            if isinstance(args[0], Tables):
-                return signature(table_types()[args[1]], *args)
-            return None
+        def generic_resolve(self, kind, name):
+            return getattr(table_types(), name, None)
 
-    @lower_builtin("static_getitem", Tables, types.IntegerLiteral)
-    def load_table(context, builder, kind, args):
+    @lower_getattr_generic(Tables)
+    def load_table(context, builder, kind, value, name):
         """The array whose address, rows and columns are three words of the handle; they never change."""
         from numba.np.arrayobj import make_array, populate_array
 
-        member, word = kind.return_type, context.get_value_type(types.intp)
-        base = builder.bitcast(args[0], word.as_pointer())
+        member, word = getattr(table_types(), name), context.get_value_type(types.intp)
+        base, first = builder.bitcast(value, word.as_pointer()), 3 * Called._fields.index(name)
 
         def entry(i):
-            loaded = builder.load(cgutils.gep_inbounds(builder, base, 3 * args[1] + i))
+            loaded = builder.load(cgutils.gep_inbounds(builder, base, first + i))
             loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
             return loaded
 
@@ -78,9 +76,9 @@ if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
         return array._getvalue()
 else:
 
-    def make_handle(tables: tuple) -> tuple:
+    def make_handle(tables: tuple) -> Called:
         """The tables themselves: without compiling there is nothing to copy."""
-        return tables
+        return Called(*tables, *[None] * (len(Called._fields) - len(tables)))
 
     def open_tables(handle):
         """The tables behind a handle."""

@@ -7,17 +7,7 @@ sum of sqrt|dP| over the shut valves, each with the sign of its drop. P = p + rh
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import (
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_SETTINGS,
-    I_VALVES,
-    JUNCTION,
-    NO_SOLUTION,
-    STATUS,
-    WHERE,
-)
+from fvsolve.kernels.records import JUNCTION, NO_SOLUTION, STATUS, WHERE
 
 ASKED = 1e-9  # flow, relative, that a node which nothing can serve may ask for: rounding
 
@@ -31,7 +21,7 @@ def inner_row(nodes, i):
 @njit
 def find_held(cluster, tables, g, held):
     """held[i] = 1 where open valves lead from node i of a cluster to a pipe or to a known pressure, else 0."""
-    nodes, valves, integers = tables[I_NODES], tables[I_VALVES], tables[I_INTEGERS]
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(held.size):
         held[i] = 1.0 if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0 else 0.0
     for _ in range(held.size):
@@ -52,15 +42,15 @@ def find_held(cluster, tables, g, held):
 @njit
 def potential(tables, out, i):
     """P = p + rho g z of a node [Pa]."""
-    node, settings = tables[I_NODES][i], tables[I_SETTINGS][0]
+    node, settings = tables.nodes[i], tables.settings[0]
     lift = settings["rho"] * settings["gravity"] * node["elevation"]
-    return node["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + i] + lift
+    return node["pressure"] + out[tables.layout[0]["pressure"] + i] + lift
 
 
 @njit
 def leak_balance(cluster, tables, out, g, group, which, level):
     """(sum of sqrt|dP| into a group of nodes at potential `level`, least and greatest potential around it)."""
-    nodes, valves, integers = tables[I_NODES], tables[I_VALVES], tables[I_INTEGERS]
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     total, low, high = 0.0, 1e300, -1e300
     for e in range(g.size):
         valve = valves[integers[cluster["first_valve"] + e]]
@@ -78,7 +68,7 @@ def leak_balance(cluster, tables, out, g, group, which, level):
 @njit
 def group_open(cluster, tables, g, group):
     """Number the nodes that open valves join alike."""
-    nodes, valves, integers = tables[I_NODES], tables[I_VALVES], tables[I_INTEGERS]
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
     for i in range(group.size):
         group[i] = i
     for _ in range(group.size):
@@ -92,7 +82,7 @@ def group_open(cluster, tables, g, group):
 @njit
 def float_shut(cluster, tables, out, g, held, group):
     """Pressures of the nodes of a cluster that are not held, by bisection, group by group until none moves."""
-    layout, integers = tables[I_LAYOUT][0], tables[I_INTEGERS]
+    layout, integers = tables.layout[0], tables.integers
     group_open(cluster, tables, g, group)
     for _ in range(200):
         moved = 0.0
@@ -129,4 +119,4 @@ def check_unserved(cluster, tables, out, c, held, group, scale):
             if group[i] == which:
                 total += c[i]
         if held[which] == 0.0 and group[which] == which and abs(total) > ASKED * scale:
-            out[STATUS], out[WHERE] = NO_SOLUTION, tables[I_INTEGERS][cluster["first_node"] + which]
+            out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"] + which]

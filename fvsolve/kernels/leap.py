@@ -9,14 +9,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.calls import RHS, run
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.observer import note, observe_linear, record_nodes
-from fvsolve.kernels.records import (
-    I_ENVELOPE,
-    I_LAYOUT,
-    I_PIPES,
-    I_SCRATCH,
-    NOT_FINITE,
-    STATUS,
-)
+from fvsolve.kernels.records import NOT_FINITE, STATUS
 
 BLOCK = 512
 
@@ -42,7 +35,7 @@ def leap_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
 @njit
 def leap_block(t, h, pipe, which, at, r, l, r_new, l_new, tables):
     """`leap_cells` from cell `at` of a pipe, and its envelope at t; returns zero where all cells are finite."""
-    e, a, b = tables[I_ENVELOPE], pipe["cell"] + at, pipe["cell"] + at + r_new.size
+    e, a, b = tables.envelope, pipe["cell"] + at, pipe["cell"] + at + r_new.size
     k, half, base = pipe["speed"] / pipe["dx"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
     low, high = leap_cells(h, k, pipe["flow"], half, base, r, l, r_new, l_new, e[0, a:b], e[2, a:b])
     return note(t, r_new, l_new, a, low, high, which, tables) if low + high > 0 else 0
@@ -55,10 +48,10 @@ def leap_linear(t, h, y, y_new, out, handle, values):
     For scenes whose states are pipes alone, without friction or with a given factor. STATUS tells what is not finite.
     """
     tables = open_tables(handle)
-    pipes, pad, bad = tables[I_PIPES], tables[I_SCRATCH][:4], 0
+    pipes, pad, bad = tables.pipes, tables.scratch[:4], 0
     for which in range(pipes.size):
         pipe = pipes[which]
-        n, o, ends = pipe["cells"], pipe["y"], tables[I_LAYOUT][0]["ends"] + 4 * which
+        n, o, ends = pipe["cells"], pipe["y"], tables.layout[0]["ends"] + 4 * which
         r, l, r_new, l_new = y[o : o + n], y[o + n : o + 2 * n], y_new[o : o + n], y_new[o + n : o + 2 * n]
         for side in range(2):  # the cells at the ends, whose neighbours are nodes
             i = side * (n - 1)

@@ -18,16 +18,6 @@ from fvsolve.kernels.devices.codes import CHECK_DISC, REDUCING
 from fvsolve.kernels.devices.disc import disc_speed
 from fvsolve.kernels.devices.lead import is_disc, leads
 from fvsolve.kernels.devices.regulator import stem_speed
-from fvsolve.kernels.records import (
-    I_COLUMNS,
-    I_DEVICES,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_SCRATCH,
-    I_SETTINGS,
-    I_VALVES,
-)
 from fvsolve.kernels.restrictions import conductance, conductance_at
 from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, pressure_at
 
@@ -40,7 +30,7 @@ INSTANT = 1e-7  # over which the rate of an area is measured [s]
 @njit
 def led_at(tables, out, i):
     """Whether node i is the end of one column whose every valve is all but shut or leads, and asks for nothing."""
-    node = tables[I_NODES][i]
+    node = tables.nodes[i]
     if node["gates"] < 0 or node["columns"] > 1:
         return False
     if node["gate_count"] == 1 and lone_lead(tables, i) >= 0:
@@ -52,10 +42,10 @@ def led_at(tables, out, i):
 @njit
 def foreseen(tables, out, i):
     """Whether the rate of area of node i's valves is known: schedules move them, one leads, events alone open them."""
-    node = tables[I_NODES][i]
+    node = tables.nodes[i]
     for e in range(node["gate_count"]):
-        k = tables[I_INTEGERS][node["gates"] + e]
-        if tables[I_VALVES][k]["device"] >= 0 and not leads(tables, k) and not holds_shut(tables, out, k):
+        k = tables.integers[node["gates"] + e]
+        if tables.valves[k]["device"] >= 0 and not leads(tables, k) and not holds_shut(tables, out, k):
             return False
     return True
 
@@ -63,7 +53,7 @@ def foreseen(tables, out, i):
 @njit
 def led_side(tables, out, k):
     """1 or -1 where valves lead column k at its `to` or `from` end, else 0; something must hold a rigid far end."""
-    column, marks = tables[I_COLUMNS][k], tables[I_SCRATCH][: tables[I_NODES].size]
+    column, marks = tables.columns[k], tables.scratch[: tables.nodes.size]
     for side in (1, -1):
         x, i = column["to_node"], column["from_node"]
         if side < 0:
@@ -76,7 +66,7 @@ def led_side(tables, out, k):
 @njit
 def lead_columns(tables, out):
     """Which columns their valves lead, into out[led]."""
-    at, many = tables[I_LAYOUT][0]["led"], tables[I_COLUMNS].size
+    at, many = tables.layout[0]["led"], tables.columns.size
     out[at : at + many] = 0.0
     for k in range(many):
         out[at + k] = led_side(tables, out, k)
@@ -85,13 +75,13 @@ def lead_columns(tables, out):
 @njit
 def led_end(tables, out, k):
     """1 or -1 where valves lead column k at its `to` or `from` end, else 0."""
-    return int(out[tables[I_LAYOUT][0]["led"] + k])
+    return int(out[tables.layout[0]["led"] + k])
 
 
 @njit
 def standing_pressure(y, tables, out, k, end, solved):
     """(p' of the led end of column k at which nothing drives it, fall of it per d/dt of its flow [Pa s2/kg])."""
-    column = tables[I_COLUMNS][k]
+    column = tables.columns[k]
     p, softness = far_side(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
     return p + end * (column["offset"] + column["drag"] * inertia), inertia + softness
@@ -137,21 +127,21 @@ def lift_drop(drop, still, slope, heavy):
 @njit
 def lone_lead(tables, i):
     """The valve that alone holds the column of node i and leads it from its seat; -1 for none."""
-    k = tables[I_INTEGERS][tables[I_NODES][i]["gates"]]
+    k = tables.integers[tables.nodes[i]["gates"]]
     return k if leads(tables, k) else -1
 
 
 @njit
 def led_by_lift(t, y, tables, out, k, which, standing, inertia, other, drop):
     """(drop across the valve `which` that leads column k, dx/dt), at p' beside it and a drop where nothing moves."""
-    valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
-    device, heavy = tables[I_DEVICES][valve["device"]], inertia * sqrt(valve["conductance"])
+    valve, column = tables.valves[which], tables.columns[k]
+    device, heavy = tables.devices[valve["device"]], inertia * sqrt(valve["conductance"])
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
     before, behind = (standing, other) if ahead else (other, standing)
     still, slope = lift_speed(t, y, tables, device, before, behind, drop)
     slope = slope if feels(device, ahead) else 0.0
     driving, speed = lift_drop(drop, still, slope, heavy)
-    if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables[I_SETTINGS][0]["step"] == 0.0:
+    if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables.settings[0]["step"] == 0.0:
         return driving, speed
     way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
     root = kept_root(y, tables, out, k, which, way, sqrt(driving), slope, heavy)
@@ -165,17 +155,17 @@ def kept_root(y, tables, out, k, which, way, root, slope, heavy):
     r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope): M relaxes to x sqrt(G) r0 in two
     steps at least, and not sooner than it would. What both share, x / slope + (L / A) M, does not change by it.
     """
-    dense, column = tables[I_VALVES][which]["conductance"], tables[I_COLUMNS][k]
+    dense, column = tables.valves[which]["conductance"], tables.columns[k]
     x = sqrt(conductance(tables, out, which) / dense)
     own = way * (column["flow"] + y[column["y"]]) / sqrt(dense)
-    slow = 4.0 * tables[I_SETTINGS][0]["step"] * root * (1.0 / heavy + root * slope)
+    slow = 4.0 * tables.settings[0]["step"] * root * (1.0 / heavy + root * slope)
     return root + (own - x * root) / max(x, slow)
 
 
 @njit
 def led_from_rest(t, y, tables, out, k, end, which, solved):
     """`led_flow` of a column that one valve leads from its seat."""
-    valve, column = tables[I_VALVES][which], tables[I_COLUMNS][k]
+    valve, column = tables.valves[which], tables.columns[k]
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
     standing, inertia = standing_pressure(y, tables, out, k, end, solved)
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
@@ -190,8 +180,8 @@ def led_from_rest(t, y, tables, out, k, end, which, solved):
 def gate_flow(t, tables, out, x, p, solved):
     """(flow out of node x through its valves at p', its rate as their areas change, d rate / dp)."""
     flow, rate, rise = 0.0, 0.0, 0.0
-    for e in range(tables[I_NODES][x]["gate_count"]):
-        which = tables[I_INTEGERS][tables[I_NODES][x]["gates"] + e]
+    for e in range(tables.nodes[x]["gate_count"]):
+        which = tables.integers[tables.nodes[x]["gates"] + e]
         drop = p - level_behind(tables, out, x, which, solved)
         root = sqrt(drop) if drop >= 0.0 else -sqrt(-drop)
         later = sqrt(conductance_at(t + INSTANT, tables, out, which))
@@ -205,7 +195,7 @@ def gate_flow(t, tables, out, x, p, solved):
 @njit
 def level_behind(tables, out, x, which, solved):
     """p' of node x at which nothing flows through its valve `which`."""
-    valve = tables[I_VALVES][which]
+    valve = tables.valves[which]
     side = 1.0 if valve["from_node"] == x else -1.0
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
     return other - side * valve["drop"]
@@ -215,8 +205,8 @@ def level_behind(tables, out, x, which, solved):
 def levels_behind(tables, out, x, solved):
     """(least, greatest) of `level_behind` of all valves of node x."""
     least, most = 1e300, -1e300
-    for e in range(tables[I_NODES][x]["gate_count"]):
-        level = level_behind(tables, out, x, tables[I_INTEGERS][tables[I_NODES][x]["gates"] + e], solved)
+    for e in range(tables.nodes[x]["gate_count"]):
+        level = level_behind(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
         least, most = min(least, level), max(most, level)
     return least, most
 
@@ -289,7 +279,7 @@ def led_rate(t, y, tables, out, k, end):
     The state misses what was lost when they took the lead, about a hundredth: below LOST of it, it fades, not turns.
     """
     flow, rate, _ = led_flow(t, y, tables, out, k, end, True)
-    column = tables[I_COLUMNS][k]
+    column = tables.columns[k]
     if rate * flow >= 0.0:
         return rate
     area, full = gate_area(tables, out, column["to_node"] if end == 1 else column["from_node"])
@@ -300,7 +290,7 @@ def led_rate(t, y, tables, out, k, end):
 @njit
 def led_flow(t, y, tables, out, k, end, solved):
     """(flow out of column k through the valves that lead it, its rate, p' of that end)."""
-    column, limit = tables[I_COLUMNS][k], tables[I_SETTINGS][0]["limit"]
+    column, limit = tables.columns[k], tables.settings[0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
     if lone_lead(tables, x) >= 0:
         return led_from_rest(t, y, tables, out, k, end, lone_lead(tables, x), solved)

@@ -5,7 +5,7 @@ from fvsolve.kernels.calls import BRAKE, MOVE, run
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.nodes import close_nodes
-from fvsolve.kernels.records import I_SETTINGS, OK, RATE, STATUS, WHERE
+from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
 from fvsolve.kernels.restrictions import open_scheduled
 
 
@@ -30,4 +30,4 @@ def rhs_alone(t, y, dydt, out, handle):
     """Of a scene of basins that no link joins: nothing flows between nodes."""
     tables = open_tables(handle)
     clear_net(out, tables)
-    out[STATUS], out[WHERE], out[RATE] = OK, -1.0, tables[I_SETTINGS][0]["rate"]
+    out[STATUS], out[WHERE], out[RATE] = OK, -1.0, tables.settings[0]["rate"]

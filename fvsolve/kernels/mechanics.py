@@ -13,20 +13,6 @@ from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import (
     FORCE,
-    I_ARMED,
-    I_BODIES,
-    I_BRACES,
-    I_COLUMNS,
-    I_FLOATS,
-    I_LAYOUT,
-    I_MARKS,
-    I_NODES,
-    I_PIPES,
-    I_PISTONS,
-    I_PROBES,
-    I_SCRATCH,
-    I_SETTINGS,
-    I_STOPS,
     LAW_LINEAR,
     NO_VOLUME,
     PISTON_POSITION,
@@ -51,8 +37,8 @@ def motion(body, y):
 @njit(forceinline=True)
 def between(tables, y, i, j):
     """(change of the distance from body i to body j, its rate)."""
-    x_i, v_i = motion(tables[I_BODIES][i], y)
-    x_j, v_j = motion(tables[I_BODIES][j], y)
+    x_i, v_i = motion(tables.bodies[i], y)
+    x_j, v_j = motion(tables.bodies[j], y)
     return x_j - x_i, v_j - v_i
 
 
@@ -68,17 +54,17 @@ def contact(stiffness, damping, depth, speed):
 @njit
 def leak_flow(tables, piston, p_a, p_b):
     """Mass flow from A to B past the piston [kg/s], at the density upstream."""
-    st = tables[I_SETTINGS][0]
+    st = tables.settings[0]
     rho = st["rho"]
     if st["law"] != LAW_LINEAR:
-        rho = density(st, tables[I_FLOATS], max(p_a, p_b))
+        rho = density(st, tables.floats, max(p_a, p_b))
     return rho * piston["leakage"] * (p_a - p_b)
 
 
 @njit
 def chamber_state(tables, node, volume, excess):
     """(deviation of pressure [Pa], stiffness [Pa/kg]) of a moving chamber of `volume` now."""
-    st, floats = tables[I_SETTINGS][0], tables[I_FLOATS]
+    st, floats = tables.settings[0], tables.floats
     if st["law"] == LAW_LINEAR:
         stiffness = node["stiffness"] * node["volume"] / volume
         return stiffness * excess, stiffness
@@ -93,7 +79,7 @@ def chamber_state(tables, node, volume, excess):
 def chambers(t, y, dydt, out, handle):
     """Pressures and stiffness of moving chambers, and the flow that the piston and its leak take from each."""
     tables = open_tables(handle)
-    layout, nodes, pistons = tables[I_LAYOUT][0], tables[I_NODES], tables[I_PISTONS]
+    layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
     for k in range(pistons.size):
         piston = pistons[k]
         x, speed = between(tables, y, piston["case"], piston["rod"])
@@ -117,7 +103,7 @@ def chambers(t, y, dydt, out, handle):
 @njit(forceinline=True)
 def push(out, tables, k, i, j, change, start):
     """Book push k, `start` at the start and changed by `change`, on body j forward and on body i back."""
-    layout = tables[I_LAYOUT][0]
+    layout = tables.layout[0]
     out[layout["push"] + k] = start + change
     out[layout["net_force"] + i] -= change
     out[layout["net_force"] + j] += change
@@ -126,8 +112,8 @@ def push(out, tables, k, i, j, change, start):
 @njit
 def forces(t, y, out, tables):
     """Net force on every body; what was balanced at the start and has not changed adds no bit."""
-    layout, bodies, braces = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_BRACES]
-    stops, pistons, armed = tables[I_STOPS], tables[I_PISTONS], tables[I_ARMED]
+    layout, bodies, braces = tables.layout[0], tables.bodies, tables.braces
+    stops, pistons, armed = tables.stops, tables.pistons, tables.armed
     for i in range(bodies.size):
         out[layout["net_force"] + i] = bodies[i]["force"]
     for k in range(braces.size):
@@ -160,7 +146,7 @@ def forces(t, y, out, tables):
 @njit(forceinline=True)
 def load(tables, i, j, stiffness, damping):
     """Add to what holds and brakes two bodies, per mass [1/s2, 1/s], in scratch."""
-    bodies, work = tables[I_BODIES], tables[I_SCRATCH]
+    bodies, work = tables.bodies, tables.scratch
     lightness = bodies[i]["lightness"] + bodies[j]["lightness"]
     for body in (i, j):
         work[2 * body] += lightness * stiffness
@@ -170,9 +156,9 @@ def load(tables, i, j, stiffness, damping):
 @njit
 def mechanical_rate(out, tables):
     """Greatest rate of a body [1/s], c / 2 + sqrt(c^2 / 4 + k) with all springs k, fluid ones too, and dampers c."""
-    layout, nodes, bodies = tables[I_LAYOUT][0], tables[I_NODES], tables[I_BODIES]
-    braces, stops, pistons = tables[I_BRACES], tables[I_STOPS], tables[I_PISTONS]
-    armed, work = tables[I_ARMED], tables[I_SCRATCH]
+    layout, nodes, bodies = tables.layout[0], tables.nodes, tables.bodies
+    braces, stops, pistons = tables.braces, tables.stops, tables.pistons
+    armed, work = tables.armed, tables.scratch
     for i in range(2 * bodies.size):
         work[i] = 0.0
     for k in range(braces.size):
@@ -199,11 +185,11 @@ def mechanical_rate(out, tables):
 def finish_bodies(t, y, dydt, out, handle):
     """Forces, d/dt of positions and velocities, the rate; status where a piston has used up its chamber."""
     tables = open_tables(handle)
-    layout, nodes, bodies = tables[I_LAYOUT][0], tables[I_NODES], tables[I_BODIES]
+    layout, nodes, bodies = tables.layout[0], tables.nodes, tables.bodies
     forces(t, y, out, tables)
     out[RATE] = max(out[RATE], mechanical_rate(out, tables))
-    for k in range(tables[I_PISTONS].size):
-        for i in (tables[I_PISTONS][k]["a"], tables[I_PISTONS][k]["b"]):
+    for k in range(tables.pistons.size):
+        for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
             if not out[layout["stiffness"] + nodes[i]["row"]] > 0.0:
                 out[STATUS], out[WHERE] = NO_VOLUME, i
     if dydt.size == 0:
@@ -219,7 +205,7 @@ def finish_bodies(t, y, dydt, out, handle):
 def observe_bodies(t, y, out, handle, values):
     """Values of the probes that read bodies and what pushes them."""
     tables = open_tables(handle)
-    layout, bodies, pistons, probes = tables[I_LAYOUT][0], tables[I_BODIES], tables[I_PISTONS], tables[I_PROBES]
+    layout, bodies, pistons, probes = tables.layout[0], tables.bodies, tables.pistons, tables.probes
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
         if kind == POSITION:
@@ -238,8 +224,8 @@ def observe_bodies(t, y, out, handle, values):
 def record_bodies(t, y, out, handle, values):
     """The first time that a piston is beyond its stroke."""
     tables = open_tables(handle)
-    marks, pistons = tables[I_MARKS], tables[I_PISTONS]
-    first = tables[I_PIPES].size + 3 * tables[I_NODES].size + tables[I_COLUMNS].size
+    marks, pistons = tables.marks, tables.pistons
+    first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size
     for k in range(pistons.size):
         piston, at = pistons[k], first + k
         x = piston["position"] + between(tables, y, piston["case"], piston["rod"])[0]
@@ -251,7 +237,7 @@ def record_bodies(t, y, out, handle, values):
 def body_events(t, y, out, handle, g):
     """The room that is left before each side of a stop."""
     tables = open_tables(handle)
-    stops = tables[I_STOPS]
+    stops = tables.stops
     first = g.size - 2 * stops.size
     for k in range(stops.size):
         x, _ = between(tables, y, stops[k]["from_body"], stops[k]["to_body"])

@@ -6,27 +6,7 @@ and elsewhere it is the mean of all that flows in. A pipe's end also exchanges g
 
 from fvsolve.jit import njit
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.records import (
-    CHAMBER,
-    FIXED,
-    FLAT,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PROFILE,
-    I_SCALARS,
-    I_SCRATCH,
-    I_SETTINGS,
-    I_VALVES,
-    JUNCTION,
-    MINMOD,
-    PATCH,
-    RATE,
-    TANK,
-    UPWIND,
-    VAN_LEER,
-)
+from fvsolve.kernels.records import CHAMBER, FIXED, FLAT, JUNCTION, MINMOD, PATCH, RATE, TANK, UPWIND, VAN_LEER
 from fvsolve.kernels.schedules import schedule_value
 
 ROUNDS, SAME = 10000, 4e-16  # of flow that runs in a circle without volume, which is mixed by iteration
@@ -46,28 +26,28 @@ def limited(limiter, a, b):
 @njit(forceinline=True)
 def end_flow(out, tables, p, right):
     """Mass flow of pipe p at its `from` (0) or `to` (1) end, along it [kg/s]."""
-    at = tables[I_LAYOUT][0]["ends"] + 4 * p + 2 * right
-    return tables[I_PIPES][p]["flow"] + (out[at] - out[at + 1])
+    at = tables.layout[0]["ends"] + 4 * p + 2 * right
+    return tables.pipes[p]["flow"] + (out[at] - out[at + 1])
 
 
 @njit(forceinline=True)
 def cell_mass(y, tables, p, i):
     """Mass per length in cell i of pipe p [kg/m]."""
-    pipe = tables[I_PIPES][p]
+    pipe = tables.pipes[p]
     waves = y[pipe["y"] + i] + y[pipe["y"] + pipe["cells"] + i]
-    return tables[I_PROFILE][pipe["center"] + i] + waves * (1.0 / pipe["speed"])
+    return tables.profile[pipe["center"] + i] + waves * (1.0 / pipe["speed"])
 
 
 @njit(forceinline=True)
 def cell_value(y, tables, q, p, i):
     """Value of scalar q in cell i of pipe p."""
-    return y[tables[I_SCALARS][q]["y"] + tables[I_PIPES][p]["cell"] + i] / cell_mass(y, tables, p, i)
+    return y[tables.scalars[q]["y"] + tables.pipes[p]["cell"] + i] / cell_mass(y, tables, p, i)
 
 
 @njit(forceinline=True)
 def end_cell(tables, p, right, k):
     """Number of the k-th cell from an end of pipe p, the last one again where there are fewer."""
-    n = tables[I_PIPES][p]["cells"]
+    n = tables.pipes[p]["cells"]
     k = min(k, n - 1)
     return n - 1 - k if right == 1 else k
 
@@ -81,8 +61,8 @@ def bounded(value, scalar):
 @njit
 def leaving_values(y, out, tables, q):
     """Value with which water leaves each pipe by each end: along a limited slope, never beyond what can be."""
-    st, scalar, at = tables[I_SETTINGS][0], tables[I_SCALARS][q], tables[I_LAYOUT][0]["edge"]
-    pipes, limiter = tables[I_PIPES], st["limiter"]
+    st, scalar, at = tables.settings[0], tables.scalars[q], tables.layout[0]["edge"]
+    pipes, limiter = tables.pipes, st["limiter"]
     for p in range(pipes.size):
         for right in range(2):
             a = cell_value(y, tables, q, p, end_cell(tables, p, right, 0))
@@ -100,7 +80,7 @@ def leaving_values(y, out, tables, q):
 @njit(forceinline=True)
 def end_conductance(y, tables, q, p, right):
     """g = 2 D m / dx of an end of pipe p [kg/s]."""
-    scalar, pipe = tables[I_SCALARS][q], tables[I_PIPES][p]
+    scalar, pipe = tables.scalars[q], tables.pipes[p]
     if scalar["diffusivity"] == 0.0:
         return 0.0
     return 2.0 * scalar["diffusivity"] * cell_mass(y, tables, p, end_cell(tables, p, right, 0)) / pipe["dx"]
@@ -109,7 +89,7 @@ def end_conductance(y, tables, q, p, right):
 @njit
 def arrivals(y, out, tables, q, amount, weight, beside, count):
     """What pipes bring to every node, and with what weight; sum and number of the values beside it."""
-    pipes, edge = tables[I_PIPES], tables[I_LAYOUT][0]["edge"]
+    pipes, edge = tables.pipes, tables.layout[0]["edge"]
     for i in range(amount.size):
         amount[i] = weight[i] = beside[i] = count[i] = 0.0
     for p in range(pipes.size):
@@ -130,8 +110,8 @@ def arrivals(y, out, tables, q, amount, weight, beside, count):
 @njit(forceinline=True)
 def given_value(t, tables, q, i):
     """Value of what flows in from outside at node i."""
-    scalar, kind = tables[I_SCALARS][q], tables[I_NODES][i]["kind"]
-    place = tables[I_INTEGERS][scalar["places"] + i]
+    scalar, kind = tables.scalars[q], tables.nodes[i]["kind"]
+    place = tables.integers[scalar["places"] + i]
     return schedule_value(tables, place, t) if place >= 0 and not stores(kind) else scalar["initial"]
 
 
@@ -144,17 +124,17 @@ def stores(kind):
 @njit(forceinline=True)
 def mixes(y, out, tables, i):
     """Whether node i has the value of what flows in now: it has no volume, or is dry."""
-    node = tables[I_NODES][i]
+    node = tables.nodes[i]
     if not stores(node["kind"]):
         return node["kind"] == JUNCTION
     dry = node["mass"] + y[node["y"]] <= DAMP * node["density"] * node["area"]
-    return dry or out[tables[I_LAYOUT][0]["supply"] + i] > 0.0
+    return dry or out[tables.layout[0]["supply"] + i] > 0.0
 
 
 @njit
 def start_values(t, y, out, tables, q, amount, weight, beside, count):
     """Values of all places as far as they do not hang on other nodes."""
-    nodes, layout, scalar = tables[I_NODES], tables[I_LAYOUT][0], tables[I_SCALARS][q]
+    nodes, layout, scalar = tables.nodes, tables.layout[0], tables.scalars[q]
     at = layout["value"] + q * nodes.size
     for i in range(nodes.size):
         kind = nodes[i]["kind"]
@@ -168,13 +148,13 @@ def start_values(t, y, out, tables, q, amount, weight, beside, count):
             out[at + i] = beside[i] / count[i] if count[i] > 0.0 else scalar["initial"]
         elif kind != PATCH:  # whose basin has set it
             mass = nodes[i]["mass"] + y[nodes[i]["y"]]
-            out[at + i] = bounded(y[tables[I_INTEGERS][scalar["places"] + i]] / mass, scalar)
+            out[at + i] = bounded(y[tables.integers[scalar["places"] + i]] / mass, scalar)
 
 
 @njit
 def mix(t, y, out, tables, q):
     """Value of scalar q at every node; nodes without volume in the order of the flow, until nothing changes."""
-    nodes, valves, layout, scratch = tables[I_NODES], tables[I_VALVES], tables[I_LAYOUT][0], tables[I_SCRATCH]
+    nodes, valves, layout, scratch = tables.nodes, tables.valves, tables.layout[0], tables.scratch
     n, at = nodes.size, layout["value"] + q * nodes.size
     amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
     arrivals(y, out, tables, q, amount, weight, total, share)
@@ -200,13 +180,13 @@ def mix(t, y, out, tables, q):
     for i in range(n):
         if stores(nodes[i]["kind"]):
             mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], SHALLOW * nodes[i]["density"] * nodes[i]["area"])
-            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables[I_SCALARS][q]["decay"])
+            out[RATE] = max(out[RATE], share[i] / mass + 0.5 * tables.scalars[q]["decay"])
 
 
 @njit(forceinline=True)
 def lose(out, tables, q, k, lost):
     """Book what decays of scalar q, `lost` [kg/s] of its k-th state or states."""
-    scalar, at = tables[I_SCALARS][q], tables[I_LAYOUT][0]["loss"] + tables[I_SCALARS][q]["loss"]
+    scalar, at = tables.scalars[q], tables.layout[0]["loss"] + tables.scalars[q]["loss"]
     if scalar["losses"] == 1:
         out[at] -= lost
     elif scalar["losses"] > 1:
@@ -216,8 +196,8 @@ def lose(out, tables, q, k, lost):
 @njit
 def exchange(t, y, dydt, out, tables, q):
     """Amounts of scalar q through the ends of pipes and into nodes, rates of what stores, and the ledger."""
-    nodes, pipes, valves, layout = tables[I_NODES], tables[I_PIPES], tables[I_VALVES], tables[I_LAYOUT][0]
-    scalar, n = tables[I_SCALARS][q], nodes.size
+    nodes, pipes, valves, layout = tables.nodes, tables.pipes, tables.valves, tables.layout[0]
+    scalar, n = tables.scalars[q], nodes.size
     value, brought, gain = layout["value"] + q * n, layout["brought"] + q * n, layout["gain"] + q * n
     for i in range(n):
         out[brought + i] = 0.0
@@ -245,7 +225,7 @@ def exchange(t, y, dydt, out, tables, q):
         else:
             out[gain + i] = supply * out[value + i]
         if stores(kind) and dydt.size > 0:
-            at = tables[I_INTEGERS][scalar["places"] + i]
+            at = tables.integers[scalar["places"] + i]
             fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
             dydt[at] = out[brought + i] + out[gain + i] - fades
             lose(out, tables, q, at - scalar["y"], fades)

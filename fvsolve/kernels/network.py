@@ -11,44 +11,23 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
 from fvsolve.kernels.nodes import close_nodes
 from fvsolve.kernels.pipes import family_of, pipe_rates
-from fvsolve.kernels.records import (
-    CHAMBER,
-    FIXED,
-    I_ARMED,
-    I_COLUMNS,
-    I_DEVICES,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PISTONS,
-    I_SCRATCH,
-    I_SETTINGS,
-    I_VALVES,
-    JUNCTION,
-    MOVING,
-    OK,
-    PATCH,
-    RATE,
-    STATUS,
-    TANK,
-    WHERE,
-)
+from fvsolve.kernels.records import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, STATUS, TANK, WHERE
 from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 
 
 @njit(forceinline=True)
 def clear_net(out, tables):
     """Zero in out[net], to which links then add what they carry into their nodes."""
-    net = tables[I_LAYOUT][0]["net"]
-    for i in range(tables[I_NODES].size):
+    net = tables.layout[0]["net"]
+    for i in range(tables.nodes.size):
         out[net + i] = 0.0
 
 
 @njit(forceinline=True)
 def waves_out(y, out, tables):
     """Outgoing waves of all pipes into out[ends], and what they carry into their nodes into out[net]."""
-    settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
-    scratch = tables[I_SCRATCH]
+    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    scratch = tables.scratch
     clear_net(out, tables)
     for i in range(pipes.size):
         pipe = pipes[i]
@@ -66,7 +45,7 @@ def waves_out(y, out, tables):
 @njit(forceinline=True)
 def waves_in(out, tables):
     """Waves that the nodes send back: incoming = Y p' - outgoing."""
-    layout, pipes = tables[I_LAYOUT][0], tables[I_PIPES]
+    layout, pipes = tables.layout[0], tables.pipes
     for i in range(pipes.size):
         pipe = pipes[i]
         at = layout["ends"] + 4 * i
@@ -79,8 +58,8 @@ def waves_in(out, tables):
 @njit(forceinline=True)
 def net_flows(out, tables):
     """Net flow into every node from its links [kg/s], total, profile included."""
-    layout, pipes, nodes = tables[I_LAYOUT][0], tables[I_PIPES], tables[I_NODES]
-    valves, columns = tables[I_VALVES], tables[I_COLUMNS]
+    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
+    valves, columns = tables.valves, tables.columns
     net = layout["net"]
     for i in range(nodes.size):
         out[net + i] = nodes[i]["inflow"]
@@ -96,8 +75,8 @@ def net_flows(out, tables):
         change = out[layout["column"] + k] - columns[k]["flow"]
         out[net + columns[k]["from_node"]] -= change
         out[net + columns[k]["to_node"]] += change
-    for k in range(tables[I_PISTONS].size):
-        for i in (tables[I_PISTONS][k]["a"], tables[I_PISTONS][k]["b"]):
+    for k in range(tables.pistons.size):
+        for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
             out[net + i] -= out[layout["swept"] + nodes[i]["row"]]
 
 
@@ -113,7 +92,7 @@ def stiffness_of(nodes, layout, out, i):
 @njit(forceinline=True)
 def stored_rates(y, dydt, out, tables):
     """d/dt of stored masses; what reservoirs give, full tanks spill, dry ones are asked for is supply."""
-    layout, nodes, armed = tables[I_LAYOUT][0], tables[I_NODES], tables[I_ARMED]
+    layout, nodes, armed = tables.layout[0], tables.nodes, tables.armed
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
         if kind == JUNCTION or kind == PATCH:
@@ -133,8 +112,8 @@ def stored_rates(y, dydt, out, tables):
 @njit(forceinline=True)
 def quickest_node(out, tables):
     """Greatest rate of waves over cells, and of stored masses against the pipes that touch them [1/s]."""
-    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
-    rate = tables[I_SETTINGS][0]["rate"]
+    layout, nodes = tables.layout[0], tables.nodes
+    rate = tables.settings[0]["rate"]
     for i in range(nodes.size):
         if nodes[i]["kind"] != FIXED and nodes[i]["kind"] != JUNCTION:
             rate = max(rate, stiffness_of(nodes, layout, out, i) * nodes[i]["admittance"])
@@ -145,7 +124,7 @@ def quickest_node(out, tables):
 def quickest_valve(t, y, dydt, out, handle):
     """Let steps see how quickly stored masses answer through valves."""
     tables = open_tables(handle)
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     rate = out[RATE]
     for k in range(valves.size):
         valve = valves[k]
@@ -157,7 +136,7 @@ def quickest_valve(t, y, dydt, out, handle):
         if nodes[j]["kind"] == PATCH and drop <= 0.0:
             stiff_j *= out[layout["had"] + nodes[j]["row"]]
         stiff = stiff_i + stiff_j
-        if valve["device"] >= 0 and tables[I_DEVICES][valve["device"]]["row"] >= 0:
+        if valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0:
             continue  # the gate of a vessel, which says itself how quick it is
         if stiff > 0.0:
             g = conductance(tables, out, k)
@@ -181,7 +160,7 @@ def quickest_valve(t, y, dydt, out, handle):
 def rhs_linear(t, y, dydt, out, handle):
     """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch. An empty dydt asks for `out` alone."""
     tables = open_tables(handle)
-    settings, layout, pipes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES]
+    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     out[STATUS], out[WHERE] = OK, -1.0
     open_scheduled(t, out, tables)
     waves_out(y, out, tables)
@@ -206,7 +185,7 @@ def rhs_linear(t, y, dydt, out, handle):
             out[at + 1],
             out[at + 2],
             out[at + 3],
-            tables[I_SCRATCH],
+            tables.scratch,
             dydt[o : o + n],
             dydt[o + n : o + 2 * n],
         )

@@ -7,19 +7,7 @@ Y = area / speed. A node without storage makes these and the flows of its other 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLUSTERS, HOLD, INFLOWS, run
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import (
-    ALONE,
-    CHAMBER,
-    CLUSTER,
-    FIXED,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_SETTINGS,
-    I_VALVES,
-    JUNCTION,
-    TANK,
-)
+from fvsolve.kernels.records import ALONE, CHAMBER, CLUSTER, FIXED, JUNCTION, TANK
 from fvsolve.kernels.restrictions import conductance
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
@@ -34,14 +22,14 @@ from fvsolve.kernels.valves import (
 @njit(forceinline=True)
 def stored_pressures(t, y, out, tables):
     """Deviations [Pa] of given pressures, tanks and chambers."""
-    settings, layout, nodes = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES]
+    settings, layout, nodes = tables.settings[0], tables.layout[0], tables.nodes
     for i in range(nodes.size):
         node = nodes[i]
         at = layout["pressure"] + i
         if node["kind"] == FIXED:
             out[at] = schedule_value(tables, node["schedule"], t) - node["pressure"]
         elif node["kind"] == TANK:
-            level = tank_level(node, tables[I_FLOATS], settings["rho"], y[node["y"]])
+            level = tank_level(node, tables.floats, settings["rho"], y[node["y"]])
             out[at] = settings["rho"] * settings["gravity"] * (level - node["level"])
         elif node["kind"] == CHAMBER:
             out[at] = node["stiffness"] * y[node["y"]]
@@ -50,7 +38,7 @@ def stored_pressures(t, y, out, tables):
 @njit(forceinline=True)
 def junction_flows(t, out, tables):
     """Change of flow into each node without storage at p' = 0, less its demand; kept in out[net]."""
-    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
+    layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
             demand = schedule_value(tables, nodes[i]["schedule"], t)
@@ -61,7 +49,7 @@ def junction_flows(t, out, tables):
 @njit(forceinline=True)
 def close_alone(out, tables):
     """Nodes that no valve touches: p' = (sum of what arrives) / Y."""
-    layout, nodes = tables[I_LAYOUT][0], tables[I_NODES]
+    layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["solve"] == ALONE:
             out[layout["pressure"] + i] = out[layout["net"] + i] / nodes[i]["admittance"]
@@ -78,7 +66,7 @@ def side_of(out, layout, nodes, i):
 @njit(forceinline=True)
 def close_single(out, tables):
     """Valves with at most one node without storage at each end, that no other valve touches: closed roots."""
-    layout, nodes, valves = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES]
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for k in range(valves.size):
         valve = valves[k]
         if valve["solve"] == CLUSTER:

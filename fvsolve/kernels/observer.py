@@ -6,18 +6,6 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM, base_mass, limit_events, near
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
-    I_ARMED,
-    I_DEVICES,
-    I_ENVELOPE,
-    I_EXTREMES,
-    I_FLOATS,
-    I_LAYOUT,
-    I_MARKS,
-    I_NODES,
-    I_PIPES,
-    I_PROBES,
-    I_PROFILE,
-    I_SETTINGS,
     LEVEL,
     PIPE_FLOW,
     PIPE_PRESSURE,
@@ -38,7 +26,7 @@ STOP_HERE = -2.0  # in out[WHERE]: the run is to end
 @njit(forceinline=True)
 def wave_sum(probe, pipe, sign, which, y, out, tables):
     """r + l or r - l of a pipe at a place: at an end from the node, inside from a polynomial over cells."""
-    at = tables[I_LAYOUT][0]["ends"] + 4 * which
+    at = tables.layout[0]["ends"] + 4 * which
     if probe["side"] < 0:
         return out[at] + sign * out[at + 1]
     if probe["side"] > 0:
@@ -46,7 +34,7 @@ def wave_sum(probe, pipe, sign, which, y, out, tables):
     total, n = 0.0, pipe["cells"]
     for k in range(probe["count"]):
         cell = pipe["y"] + probe["cell"] + k
-        total += tables[I_FLOATS][probe["weights"] + k] * (y[cell] + sign * y[cell + n])
+        total += tables.floats[probe["weights"] + k] * (y[cell] + sign * y[cell + n])
     return total
 
 
@@ -54,7 +42,7 @@ def wave_sum(probe, pipe, sign, which, y, out, tables):
 def observe_linear(t, y, out, handle, values):
     """values[k] = scale * quantity + offset of every probe."""
     tables = open_tables(handle)
-    layout, probes = tables[I_LAYOUT][0], tables[I_PROBES]
+    layout, probes = tables.layout[0], tables.probes
     for k in range(probes.size):
         probe = probes[k]
         kind, i = probe["kind"], probe["index"]
@@ -62,13 +50,13 @@ def observe_linear(t, y, out, handle, values):
         if kind == PRESSURE:
             value = out[layout["pressure"] + i]
         elif kind == LEVEL:
-            node = tables[I_NODES][i]
-            value = tank_level(node, tables[I_FLOATS], tables[I_SETTINGS][0]["rho"], y[node["y"]])
+            node = tables.nodes[i]
+            value = tank_level(node, tables.floats, tables.settings[0]["rho"], y[node["y"]])
         elif kind == PIPE_PRESSURE:
-            pipe = tables[I_PIPES][i]
+            pipe = tables.pipes[i]
             value = wave_sum(probe, pipe, 1.0, i, y, out, tables)
         elif kind == PIPE_FLOW:
-            pipe = tables[I_PIPES][i]
+            pipe = tables.pipes[i]
             value = pipe["flow"] + wave_sum(probe, pipe, -1.0, i, y, out, tables)
         elif kind == VALVE_FLOW:
             value = out[layout["valve"] + i]
@@ -76,7 +64,7 @@ def observe_linear(t, y, out, handle, values):
             value = out[layout["column"] + i]
         elif kind == SPOOL_FLOW:
             for e in range(4):
-                value += tables[I_FLOATS][probe["weights"] + e] * out[layout["valve"] + i + e]
+                value += tables.floats[probe["weights"] + e] * out[layout["valve"] + i + e]
         values[k] = probe["scale"] * value + probe["offset"]
 
 
@@ -141,7 +129,7 @@ def note(t, r, l, at, low, high, which, tables):
 
     Returns zero where all values are finite.
     """
-    e, profile, marks = tables[I_ENVELOPE], tables[I_PROFILE], tables[I_MARKS]
+    e, profile, marks = tables.envelope, tables.profile, tables.marks
     b, bad = at + r.size, 0
     if low > 0:
         bad += widen_low(t, r, l, e[0, at:b], e[1, at:b])
@@ -156,7 +144,7 @@ def note(t, r, l, at, low, high, which, tables):
 @njit
 def record_pipe(t, r, l, pipe, which, tables):
     """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
-    start, at, envelope = 0, pipe["cell"], tables[I_ENVELOPE]
+    start, at, envelope = 0, pipe["cell"], tables.envelope
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
@@ -170,7 +158,7 @@ def record_pipe(t, r, l, pipe, which, tables):
 def record_pipes(t, y, out, handle, values):
     """Envelopes of pipes, and when they first fall below vapour pressure, after every accepted step."""
     tables = open_tables(handle)
-    pipes = tables[I_PIPES]
+    pipes = tables.pipes
     for i in range(pipes.size):
         n, o = pipes[i]["cells"], pipes[i]["y"]
         record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
@@ -183,8 +171,8 @@ def record_nodes(t, y, out, handle, values):
     marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
     """
     tables = open_tables(handle)
-    pipes, nodes, extremes = tables[I_PIPES], tables[I_NODES], tables[I_EXTREMES]
-    marks, layout, vapor = tables[I_MARKS], tables[I_LAYOUT][0], tables[I_SETTINGS][0]["vapor"]
+    pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
+    marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
     for k in range(values.size):
         widen(extremes, k, t, values[k])
     for i in range(nodes.size):
@@ -195,7 +183,7 @@ def record_nodes(t, y, out, handle, values):
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
                 marks[at] = t
-    if tables[I_SETTINGS][0]["stop_below"] == 1:
+    if tables.settings[0]["stop_below"] == 1:
         for i in range(pipes.size + nodes.size):
             if marks[i] == marks[i]:
                 out[WHERE] = STOP_HERE
@@ -205,7 +193,7 @@ def record_nodes(t, y, out, handle, values):
 def tank_events(t, y, out, handle, g):
     """Event functions of the bottom and the rim of tanks; at either nodes are closed, as what flows then counts."""
     tables = open_tables(handle)
-    nodes, armed, closed = tables[I_NODES], tables[I_ARMED], tables[I_DEVICES].size > 0  # whose events have done so
+    nodes, armed, closed = tables.nodes, tables.armed, tables.devices.size > 0  # whose events have done so
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK:
             node, k = nodes[i], EVENTS * nodes[i]["row"]
@@ -214,6 +202,6 @@ def tank_events(t, y, out, handle, g):
             if not closed and (near(node, stored) or near(node, room)):
                 run(CLOSE, t, y, y[:0], out, handle)
                 closed = True
-            net = out[tables[I_LAYOUT][0]["net"] + i]
+            net = out[tables.layout[0]["net"] + i]
             limit_events(node, armed, g, k + BOTTOM, stored, net)
             limit_events(node, armed, g, k + RIM, room, -net)

@@ -3,14 +3,14 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.emitters import emitter_events
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_LAYOUT, I_NODES, I_VALVES, POWER
+from fvsolve.kernels.records import POWER
 
 
 @njit
 def outlet_events(t, y, out, handle, g):
     """Event functions of all outlets, from closed nodes; what is outside lies on the level of its place."""
     tables = open_tables(handle)
-    nodes, valves, pressure = tables[I_NODES], tables[I_VALVES], tables[I_LAYOUT][0]["pressure"]
+    nodes, valves, pressure = tables.nodes, tables.valves, tables.layout[0]["pressure"]
     for k in range(valves.size):
         i, j = valves[k]["from_node"], valves[k]["to_node"]
         if valves[k]["law"] == POWER:

@@ -3,7 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.reconstruction import faces
-from fvsolve.kernels.records import I_PIPES, I_SCRATCH, I_SETTINGS, OK, RATE, STATUS, WHERE
+from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
 
 
 @njit
@@ -13,7 +13,7 @@ def rhs_periodic(t, y, dydt, out, handle):
     scratch : float64[2 n + 7]  window of values, then faces
     """
     tables = open_tables(handle)
-    settings, scratch, n = tables[I_SETTINGS][0], tables[I_SCRATCH], y.size
+    settings, scratch, n = tables.settings[0], tables.scratch, y.size
     out[RATE], out[STATUS], out[WHERE] = 1.0, OK, -1.0
     if dydt.size == 0:
         return
@@ -22,6 +22,6 @@ def rhs_periodic(t, y, dydt, out, handle):
         p[j + 3] = y[j]
     for g in range(3):
         p[g], p[n + 3 + g] = y[n - 3 + g], y[g]
-    faces(settings, settings["scheme"], tables[I_PIPES][0]["noise"], 0, p, f)
+    faces(settings, settings["scheme"], tables.pipes[0]["noise"], 0, p, f)
     for j in range(n):
         dydt[j] = f[j] - f[j + 1]

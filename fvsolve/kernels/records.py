@@ -1,10 +1,11 @@
 """The one fixed record type of each table that a model is made of. Knows layouts; knows no laws.
 
-A model is the tuple `tables` of these arrays, in the order of `TABLES`. The tuple's type is part of every
-compiled signature, so it is fixed here once and a new scene compiles nothing.
+A model's `tables` are these arrays by name, `tables.nodes[i]["mass"]` in Python as in compiled code. Their types are
+part of every compiled signature, so they are fixed here once and a new scene compiles nothing.
 """
 
 import functools
+from collections import namedtuple
 
 import numpy as np
 
@@ -425,46 +426,16 @@ RECORDS = {
 }
 ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare", "plane")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
-TABLES = (*RECORDS, *ARRAYS, *MATRICES)
-(
-    I_SETTINGS,
-    I_LAYOUT,
-    I_PIPES,
-    I_NODES,
-    I_VALVES,
-    I_COLUMNS,
-    I_CLUSTERS,
-    I_SCHEDULES,
-    I_PROBES,
-    I_BODIES,
-    I_BRACES,
-    I_STOPS,
-    I_PISTONS,
-    I_DEVICES,
-    I_BASINS,
-    I_PATCHES,
-    I_SCALARS,
-    I_INTEGERS,
-    I_FLOATS,
-    I_PROFILE,
-    I_SCRATCH,
-    I_MARKS,
-    I_ARMED,
-    I_SPARE,
-    I_PLANE,
-    I_PIECES,
-    I_ENVELOPE,
-    I_EXTREMES,
-    I_CALLS,
-) = range(len(TABLES) + 1)  # the last, int64[:, :], holds addresses of functions: a handle has it, a model does not
+Tables = namedtuple("Tables", (*RECORDS, *ARRAYS, *MATRICES))
+Called = namedtuple("Called", (*Tables._fields, "calls"))  # with addresses of functions, int64[:, :]: behind a handle
 
 
 @functools.cache
-def table_types() -> tuple:
-    """Numba's types of the members of `tables`."""
+def table_types() -> Called:
+    """Numba's types of the tables behind a handle."""
     from numba import from_dtype, types
 
     records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
     flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
     matrices = [types.Array(types.float64, 2, "C") for _ in MATRICES]
-    return (*records, *flats, *matrices, types.Array(types.int64, 2, "C"))
+    return Called(*records, *flats, *matrices, types.Array(types.int64, 2, "C"))

@@ -6,27 +6,14 @@ from fvsolve.jit import njit
 from fvsolve.kernels.curves import curve_step
 from fvsolve.kernels.density import density, enthalpy
 from fvsolve.kernels.emitters import emitter_slope, emitter_step, rule_of
-from fvsolve.kernels.records import (
-    CURVE,
-    I_ARMED,
-    I_DEVICES,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_SETTINGS,
-    I_VALVES,
-    LAW_LINEAR,
-    LIFT,
-    POWER,
-    TWO_WAY,
-)
+from fvsolve.kernels.records import CURVE, LAW_LINEAR, LIFT, POWER, TWO_WAY
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of, valve_conductance, valve_step
 
 
 @njit(forceinline=True)
 def open_scheduled(t, out, tables):
     """Conductances of the restrictions that no device opens and shuts, into out[conductance]."""
-    valves, at = tables[I_VALVES], tables[I_LAYOUT][0]["conductance"]
+    valves, at = tables.valves, tables.layout[0]["conductance"]
     for k in range(valves.size):
         if valves[k]["device"] < 0:
             out[at + k] = valve_conductance(tables, k, t)
@@ -35,13 +22,13 @@ def open_scheduled(t, out, tables):
 @njit(forceinline=True)
 def conductance(tables, out, k):
     """Conductance of restriction k now, 0 where it is shut [kg2/s2/Pa]."""
-    return out[tables[I_LAYOUT][0]["conductance"] + k]
+    return out[tables.layout[0]["conductance"] + k]
 
 
 @njit
 def conductance_at(t, tables, out, k):
     """The same at another time near by; what a device does is not foreseen."""
-    return valve_conductance(tables, k, t) if tables[I_VALVES][k]["device"] < 0 else conductance(tables, out, k)
+    return valve_conductance(tables, k, t) if tables.valves[k]["device"] < 0 else conductance(tables, out, k)
 
 
 @njit
@@ -50,11 +37,11 @@ def restriction_step(tables, out, k, g, m, drop, wide):
 
     g : its conductance now, above zero. wide : as of `lift_of`.
     """
-    valve = tables[I_VALVES][k]
+    valve = tables.valves[k]
     if valve["law"] == POWER:
-        return emitter_step(tables[I_FLOATS], valve["data"], g, m, drop, rule_of(tables, k))
+        return emitter_step(tables.floats, valve["data"], g, m, drop, rule_of(tables, k))
     if valve["law"] == CURVE:
-        rho = tables[I_SETTINGS][0]["rho"]
+        rho = tables.settings[0]["rho"]
         return pump_step(tables, out, k, rho, g, m, drop)
     if valve["law"] == LIFT and is_lifting(tables, k):
         return lifting_step(tables, out, k, flow_at_drop(g, transition_of(valve, g), drop), g, m, wide)
@@ -66,15 +53,15 @@ def restriction_step(tables, out, k, g, m, drop, wide):
 @njit
 def pump_step(tables, out, k, rho, g, m, drop):
     """The same of a pump whose fluid has the density rho [kg/m3]."""
-    at, speed = tables[I_VALVES][k]["data"], out[tables[I_LAYOUT][0]["drive"] + k]
-    return curve_step(tables[I_FLOATS], at, speed, rho, rho * tables[I_SETTINGS][0]["gravity"], g, m, drop)
+    at, speed = tables.valves[k]["data"], out[tables.layout[0]["drive"] + k]
+    return curve_step(tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop)
 
 
 @njit
 def head_drop(tables, out, k):
     """(density at its `from` end [kg/m3], that times what heads fall by along restriction k [J/kg]): [Pa] as a drop."""
-    st, layout, nodes, floats = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_NODES], tables[I_FLOATS]
-    valve = tables[I_VALVES][k]
+    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
     p_i, p_j = out[layout["pressure"] + i], out[layout["pressure"] + j]
     if st["law"] == LAW_LINEAR:
@@ -88,12 +75,12 @@ def head_drop(tables, out, k):
 @njit
 def restriction_slope(tables, out, k, drop):
     """d flow / d drop of restriction k at a drop [kg/s/Pa]."""
-    valve, g = tables[I_VALVES][k], conductance(tables, out, k)
+    valve, g = tables.valves[k], conductance(tables, out, k)
     if valve["law"] == POWER:
-        return emitter_slope(tables[I_FLOATS], valve["data"], g, drop, rule_of(tables, k))
+        return emitter_slope(tables.floats, valve["data"], g, drop, rule_of(tables, k))
     if valve["law"] == CURVE:
-        m = out[tables[I_LAYOUT][0]["valve"] + k]
-        return pump_step(tables, out, k, tables[I_SETTINGS][0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
+        m = out[tables.layout[0]["valve"] + k]
+        return pump_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
     if valve["law"] == LIFT and is_lifting(tables, k):
         x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, transition_of(valve, g), drop)
         return x * flow_slope(g, transition_of(valve, g), drop) + max(full, 0.0) * lift_rise(tables, k)
@@ -105,22 +92,22 @@ def restriction_slope(tables, out, k, drop):
 @njit
 def is_lifting(tables, k):
     """Whether a valve that the pressure before it lifts is between shut and fully open."""
-    armed, at = tables[I_ARMED], tables[I_DEVICES][tables[I_VALVES][k]["device"]]["event"]
+    armed, at = tables.armed, tables.devices[tables.valves[k]["device"]]["event"]
     return armed[at] == 0.0 and armed[at + 2] == 0.0
 
 
 @njit
 def pressure_lift(tables, out, k):
     """Lift x of such a valve, linear in the pressure before it and not held between 0 and 1."""
-    floats, valve = tables[I_FLOATS], tables[I_VALVES][k]
-    change = out[tables[I_LAYOUT][0]["pressure"] + valve["from_node"]]
+    floats, valve = tables.floats, tables.valves[k]
+    change = out[tables.layout[0]["pressure"] + valve["from_node"]]
     return floats[valve["data"]] + change / floats[valve["data"] + 1]
 
 
 @njit
 def lift_rise(tables, k):
     """Lift of such a valve over the pressure before it [1/Pa]."""
-    return 1.0 / tables[I_FLOATS][tables[I_VALVES][k]["data"] + 1]
+    return 1.0 / tables.floats[tables.valves[k]["data"] + 1]
 
 
 @njit
@@ -139,7 +126,7 @@ def lift_of(tables, out, k, full, wide):
 @njit
 def lifting_step(tables, out, k, full, g, m, wide):
     """a, s of the flow x `full` of a lifting valve: of the root the chord as in `valve_step`, backwards its slope."""
-    x, transition = lift_of(tables, out, k, full, wide), transition_of(tables[I_VALVES][k], g)
+    x, transition = lift_of(tables, out, k, full, wide), transition_of(tables.valves[k], g)
     if x <= 0.0:
         return x * full - m, 0.0
     near = x * abs(full) if full < 0.0 and not wide else abs(m)
@@ -160,7 +147,7 @@ def lifting_slope(tables, out, k, full, wide):
 @njit
 def restriction_lift(tables, out, k, g, drop, wide):
     """The same of restriction k at a drop; none of other laws. A Newton step adds it times the change before it."""
-    valve = tables[I_VALVES][k]
+    valve = tables.valves[k]
     if valve["law"] != LIFT or not is_lifting(tables, k):
         return 0.0
     return lifting_slope(tables, out, k, flow_at_drop(g, transition_of(valve, g), drop), wide)
@@ -169,4 +156,4 @@ def restriction_lift(tables, out, k, g, drop, wide):
 @njit
 def runs_back(tables, k, m):
     """Whether restriction k is such a valve and carries its flow m backwards."""
-    return m < 0.0 and tables[I_VALVES][k]["law"] == LIFT and is_lifting(tables, k)
+    return m < 0.0 and tables.valves[k]["law"] == LIFT and is_lifting(tables, k)

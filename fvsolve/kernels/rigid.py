@@ -12,27 +12,15 @@ from fvsolve.jit import njit
 from fvsolve.kernels.clusters import solve_dense
 from fvsolve.kernels.devices.codes import CHECK_VALVE
 from fvsolve.kernels.friction import drag
-from fvsolve.kernels.records import (
-    I_COLUMNS,
-    I_DEVICES,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_SCRATCH,
-    I_VALVES,
-    JUNCTION,
-    NO_SOLUTION,
-    STATUS,
-    WHERE,
-)
+from fvsolve.kernels.records import JUNCTION, NO_SOLUTION, STATUS, WHERE
 from fvsolve.kernels.restrictions import conductance
 
 
 @njit
 def is_vessel(tables, k):
     """Whether valve k is the way into the chamber of an air valve."""
-    device = tables[I_VALVES][k]["device"]
-    return device >= 0 and tables[I_DEVICES][device]["row"] >= 0
+    device = tables.valves[k]["device"]
+    return device >= 0 and tables.devices[device]["row"] >= 0
 
 
 @njit
@@ -40,26 +28,26 @@ def holds_shut(tables, out, k):
     """Whether valve k is shut and opens by an event alone, as that of air and an ideal check valve: till then none."""
     if conductance(tables, out, k) > 0.0:
         return False
-    device = tables[I_VALVES][k]["device"]
-    return is_vessel(tables, k) or (device >= 0 and tables[I_DEVICES][device]["kind"] == CHECK_VALVE)
+    device = tables.valves[k]["device"]
+    return is_vessel(tables, k) or (device >= 0 and tables.devices[device]["kind"] == CHECK_VALVE)
 
 
 @njit
 def gate_area(tables, out, i):
     """(sum of the roots of the conductances of a node's valves, the same at full opening of all that count)."""
-    node, area, full = tables[I_NODES][i], 0.0, 0.0
+    node, area, full = tables.nodes[i], 0.0, 0.0
     for e in range(node["gate_count"]):
-        k = tables[I_INTEGERS][node["gates"] + e]
+        k = tables.integers[node["gates"] + e]
         area += sqrt(conductance(tables, out, k))
         if not (is_vessel(tables, k) or holds_shut(tables, out, k)):
-            full += sqrt(tables[I_VALVES][k]["conductance"])
+            full += sqrt(tables.valves[k]["conductance"])
     return area, full
 
 
 @njit
 def is_rigid(tables, out, i):
     """Whether columns meet at node i, two at least, and nothing else flows there."""
-    node = tables[I_NODES][i]
+    node = tables.nodes[i]
     return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
 
 
@@ -73,7 +61,7 @@ def column_drag(column, flow):
 @njit
 def pressure_at(tables, out, i, extra, solved):
     """p' of node i; of a junction, until nodes are `solved`, a guess from what its pipes and `extra` [kg/s] bring."""
-    layout, node = tables[I_LAYOUT][0], tables[I_NODES][i]
+    layout, node = tables.layout[0], tables.nodes[i]
     if node["kind"] != JUNCTION or solved:
         return out[layout["pressure"] + i]
     return (out[layout["net"] + i] + extra) / node["admittance"] if node["admittance"] > 0.0 else 0.0
@@ -82,7 +70,7 @@ def pressure_at(tables, out, i, extra, solved):
 @njit
 def grounded(tables, out, i, k, seen):
     """Whether columns that nothing leads, but for k, join rigid node i to one that is not; seen[]: what they join."""
-    columns, led = tables[I_COLUMNS], tables[I_LAYOUT][0]["led"]
+    columns, led = tables.columns, tables.layout[0]["led"]
     seen[:] = 0.0
     seen[i], grown = 1.0, True
     while grown:
@@ -112,7 +100,7 @@ def is_pinned(tables, out, i, seen):
 @njit
 def rigid_space(tables, n):
     """Scratch : (row of each node, marks of nodes, matrix, right side, pinned, given)."""
-    many, work = tables[I_NODES].size, tables[I_SCRATCH]
+    many, work = tables.nodes.size, tables.scratch
     at = 2 * many + n * n
     right, pinned, given = work[at : at + n], work[at + n : at + 2 * n], work[at + 2 * n : at + 3 * n]
     return work[:many], work[many : 2 * many], work[2 * many : at], right, pinned, given
@@ -121,8 +109,8 @@ def rigid_space(tables, n):
 @njit
 def number_rigid(tables, out):
     """Number the rigid nodes in scratch, -1 for others; returns how many there are."""
-    rows, n = tables[I_SCRATCH], 0
-    for i in range(tables[I_NODES].size):
+    rows, n = tables.scratch, 0
+    for i in range(tables.nodes.size):
         rows[i] = -1.0
         if is_rigid(tables, out, i):
             rows[i] = n
@@ -134,7 +122,7 @@ def number_rigid(tables, out):
 def join(tables, out, n, k):
     """Matrix of n numbered rigid nodes, sum of A / L of their columns [m] but for those that are led and k."""
     rows, seen, matrix, right, pinned, _ = rigid_space(tables, n)
-    columns, led = tables[I_COLUMNS], tables[I_LAYOUT][0]["led"]
+    columns, led = tables.columns, tables.layout[0]["led"]
     matrix[:], right[:] = 0.0, 0.0
     for j in range(columns.size):
         if j == k or out[led + j] != 0.0:
@@ -188,7 +176,7 @@ def meet(tables, out):
         return
     join(tables, out, n, -1)
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
-    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
+    layout, columns = tables.layout[0], tables.columns
     add_sums(tables, out, rows, right)
     for r in range(n):
         right[r] *= 1.0 - pinned[r]
@@ -206,9 +194,9 @@ def meet(tables, out):
 @njit
 def gate_inflow(tables, i):
     """What the valves of a node bring into it in the profile [kg/s]."""
-    node, valves, total = tables[I_NODES][i], tables[I_VALVES], 0.0
+    node, valves, total = tables.nodes[i], tables.valves, 0.0
     for e in range(node["gate_count"]):
-        k = tables[I_INTEGERS][node["gates"] + e]
+        k = tables.integers[node["gates"] + e]
         total += valves[k]["flow"] if valves[k]["to_node"] == i else -valves[k]["flow"]
     return total
 
@@ -216,7 +204,7 @@ def gate_inflow(tables, i):
 @njit
 def add_sums(tables, out, rows, right):
     """Add to right[] what columns bring into rigid nodes [kg/s]: to the bit nothing where all is as at the start."""
-    nodes, columns, at = tables[I_NODES], tables[I_COLUMNS], tables[I_LAYOUT][0]["column"]
+    nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
     for i in range(rows.size):
         if rows[i] >= 0.0:
             right[int(rows[i])] += nodes[i]["inflow"] - gate_inflow(tables, i)
@@ -236,7 +224,7 @@ def add_pushes(y, tables, out, n, skip, solved):
     But for those that are led and `skip`; until nodes are `solved`, by states and guesses.
     """
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
-    layout, columns = tables[I_LAYOUT][0], tables[I_COLUMNS]
+    layout, columns = tables.layout[0], tables.columns
     for k in range(columns.size):
         column = columns[k]
         i, j = column["from_node"], column["to_node"]
@@ -262,7 +250,7 @@ def far_side(y, tables, out, k, end, solved):
 
     end : 1 or -1, its `to` or `from` end is the near one.
     """
-    column = tables[I_COLUMNS][k]
+    column = tables.columns[k]
     i = column["from_node"] if end == 1 else column["to_node"]
     if not is_rigid(tables, out, i):
         return pressure_at(tables, out, i, end * column["flow"], solved), 0.0

@@ -9,24 +9,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
 from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, limited, lose, mix
-from fvsolve.kernels.records import (
-    FLAT,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_PIPES,
-    I_PROBES,
-    I_PROFILE,
-    I_SCALARS,
-    I_SCRATCH,
-    I_SETTINGS,
-    MINMOD,
-    NODE_SCALAR,
-    PIPE_SCALAR,
-    RATE,
-    UPWIND,
-    VAN_LEER,
-)
+from fvsolve.kernels.records import FLAT, MINMOD, NODE_SCALAR, PIPE_SCALAR, RATE, UPWIND, VAN_LEER
 
 
 @njit
@@ -112,9 +95,9 @@ def greatest_velocity(m, flow):
 @njit
 def carry_in_pipe(y, dydt, out, tables, p):
     """Rates of all scalars in pipe p; what decays goes to the ledger, the greatest rate to out[RATE]."""
-    st, layout, pipe, scratch = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_PIPES][p], tables[I_SCRATCH]
+    st, layout, pipe, scratch = tables.settings[0], tables.layout[0], tables.pipes[p], tables.scratch
     n, o, dx = pipe["cells"], pipe["y"], pipe["dx"]
-    base, r, l = tables[I_PROFILE][pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
+    base, r, l = tables.profile[pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
     m, flow, c, d, f = (
         scratch[:n], scratch[n : 2 * n + 1], scratch[2 * n + 1 : 3 * n + 1], scratch[3 * n + 1 : 4 * n + 1],
         scratch[4 * n + 1 : 5 * n + 2],
@@ -123,10 +106,10 @@ def carry_in_pipe(y, dydt, out, tables, p):
     first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
     face_flows(first, last, dx / pipe["speed"], dydt[o : o + n], dydt[o + n : o + 2 * n], flow)
     quick = greatest_velocity(m, flow) / dx
-    nodes, limiter = tables[I_NODES].size, st["limiter"]
-    for q in range(tables[I_SCALARS].size):
-        scalar = tables[I_SCALARS][q]
-        at, ends = scalar["y"] + pipe["cell"], 2 * (q * tables[I_PIPES].size + p)
+    nodes, limiter = tables.nodes.size, st["limiter"]
+    for q in range(tables.scalars.size):
+        scalar = tables.scalars[q]
+        at, ends = scalar["y"] + pipe["cell"], 2 * (q * tables.pipes.size + p)
         s, ds = y[at : at + n], dydt[at : at + n]
         values(s, m, c)
         for i in range(n):
@@ -159,16 +142,16 @@ def carry_in_pipe(y, dydt, out, tables, p):
 def clear_losses(t, y, dydt, out, handle):
     """No scalar has lost anything yet."""
     tables = open_tables(handle)
-    for q in range(tables[I_SCALARS].size):
-        if tables[I_SCALARS][q]["losses"] > 0:
-            out[tables[I_LAYOUT][0]["loss"] + tables[I_SCALARS][q]["loss"]] = 0.0
+    for q in range(tables.scalars.size):
+        if tables.scalars[q]["losses"] > 0:
+            out[tables.layout[0]["loss"] + tables.scalars[q]["loss"]] = 0.0
 
 
 @njit
 def leave_pipes(t, y, dydt, out, handle):
     """Values with which water leaves all pipes."""
     tables = open_tables(handle)
-    for q in range(tables[I_SCALARS].size):
+    for q in range(tables.scalars.size):
         leaving_values(y, out, tables, q)
 
 
@@ -176,7 +159,7 @@ def leave_pipes(t, y, dydt, out, handle):
 def mix_scalars(t, y, dydt, out, handle):
     """Values at all nodes and what links bring there; rates of what nodes store, where rates are asked for."""
     tables = open_tables(handle)
-    for q in range(tables[I_SCALARS].size):
+    for q in range(tables.scalars.size):
         mix(t, y, out, tables, q)
         exchange(t, y, dydt, out, tables, q)
 
@@ -185,7 +168,7 @@ def mix_scalars(t, y, dydt, out, handle):
 def carry_in_pipes(t, y, dydt, out, handle):
     """Rates of all amounts in pipes, where rates are asked for."""
     tables = open_tables(handle)
-    for p in range(tables[I_PIPES].size if dydt.size > 0 else 0):
+    for p in range(tables.pipes.size if dydt.size > 0 else 0):
         carry_in_pipe(y, dydt, out, tables, p)
 
 
@@ -193,9 +176,9 @@ def carry_in_pipes(t, y, dydt, out, handle):
 def observe_scalars(t, y, out, handle, values):
     """values[k] of every probe of a scalar: at a node, at a pipe's end, or between the centres of two cells."""
     tables = open_tables(handle)
-    layout, pipes, nodes = tables[I_LAYOUT][0], tables[I_PIPES], tables[I_NODES].size
-    for k in range(tables[I_PROBES].size):
-        probe = tables[I_PROBES][k]
+    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
         q, i = probe["scalar"], probe["index"]
         if probe["kind"] == NODE_SCALAR:
             values[k] = out[layout["value"] + q * nodes + i]
@@ -211,6 +194,6 @@ def observe_scalars(t, y, out, handle, values):
             for j in range(probe["count"]):
                 c = probe["cell"] + j
                 w = y[pipes[i]["y"] + c] + y[pipes[i]["y"] + pipes[i]["cells"] + c]
-                m = tables[I_PROFILE][pipes[i]["center"] + c] + w / pipes[i]["speed"]
-                s = y[tables[I_SCALARS][q]["y"] + pipes[i]["cell"] + c]
-                values[k] += tables[I_FLOATS][probe["weights"] + j] * s / m
+                m = tables.profile[pipes[i]["center"] + c] + w / pipes[i]["speed"]
+                s = y[tables.scalars[q]["y"] + pipes[i]["cell"] + c]
+                values[k] += tables.floats[probe["weights"] + j] * s / m

@@ -1,7 +1,6 @@
 """Values of schedules at a time. Knows pieces of polynomials and powers; knows no units."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import I_PIECES, I_SCHEDULES, I_SETTINGS
 
 
 @njit(forceinline=True)
@@ -31,9 +30,9 @@ def piece_value(pieces, row, t):
 @njit(forceinline=True)
 def schedule_value(tables, index, t):
     """Value of schedule `index` at t [s], right-continuous, but its left limit from settings.limit on."""
-    limit = tables[I_SETTINGS][0]["limit"]
-    record = tables[I_SCHEDULES][index]
-    pieces = tables[I_PIECES]
+    limit = tables.settings[0]["limit"]
+    record = tables.schedules[index]
+    pieces = tables.pieces
     if record["pieces"] == 1:
         return piece_value(pieces, record["first"], t)
     row = piece_at(pieces, record["first"], record["pieces"], t, limit)

@@ -6,7 +6,6 @@ M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equati
 from math import exp, log, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import I_FLOATS, I_VALVES
 from fvsolve.kernels.schedules import schedule_value
 
 LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
@@ -32,9 +31,9 @@ def relative_area(kind, floats, table, size, opening):
 @njit(forceinline=True)
 def valve_conductance(tables, index, t):
     """G = 2 rho (Cd A)^2 at time t [kg2/s2/Pa]."""
-    valve = tables[I_VALVES][index]
+    valve = tables.valves[index]
     opening = schedule_value(tables, valve["schedule"], t)
-    area = relative_area(valve["characteristic"], tables[I_FLOATS], valve["table"], valve["table_size"], opening)
+    area = relative_area(valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening)
     return valve["conductance"] * area * area
 
 

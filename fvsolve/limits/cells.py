@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag_slope
 from fvsolve.limits.symbol import symbol, weights_of
 from fvsolve.model.schemes import FROZEN_AS
@@ -29,7 +28,7 @@ def rubbed(model) -> Modes:
     """Waves of pipes against friction, at the flow of the start."""
     scheme, found = model.case.numerics.scheme, []
     weights = weights_of(FROZEN_AS.get(scheme, scheme))
-    for mesh, row, q in zip(model.pipes, model.tables[rec.I_PIPES], model.wave_rates, strict=True):
+    for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = slope(row)
         if g > 0.0:
             z = symbol(weights, PHASES * (1.0 - 0.5 / mesh.cells))  # between ends no wave is quite two cells long
@@ -40,8 +39,8 @@ def rubbed(model) -> Modes:
 
 def remembered(model) -> Modes:
     """Unsteady friction: its quickest term, with the gain of all of them and the wall's friction."""
-    found, floats = [], model.tables[rec.I_FLOATS]
-    for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
+    found, floats = [], model.tables.floats
+    for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["terms"] > 0:
             gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
             found.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
@@ -57,7 +56,7 @@ def carried(model) -> Modes:
     """Scalars in pipes, at the flow of the start."""
     found, rho = [], model.case.properties.density
     for name, scalar in model.case.scalars.items():
-        for mesh, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
+        for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
             q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
             s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * SHORT - scalar.decay
             found.append((f"{mesh.name}.{name}", s))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
-
 FAR = 1e3  # times as much again for states that are driven by more than waves: contents, bodies, what is carried
 DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # keys of nodes that are schedules
 
@@ -14,7 +12,7 @@ def drives(model) -> np.ndarray:
     """The largest of what drives each state of pipes and basins; of others what is small, times FAR : float64[n]."""
     found, linear = FAR * model.scale, model.case.properties
     pressure, flow = given(model)
-    pipes = model.tables[rec.I_PIPES]
+    pipes = model.tables.pipes
     flow = max([flow, *np.abs(pipes["flow"])])
     if len(pipes):
         pressure = max(pressure, flow / float(pipes["admittance"].min()))
@@ -34,7 +32,7 @@ def drives(model) -> np.ndarray:
 def given(model) -> tuple[float, float]:
     """Range of pressures [Pa] and greatest mass flow [kg/s] that the start and schedules of nodes bring."""
     rho, gravity = model.case.properties.density, model.case.gravity
-    at_start = model.tables[rec.I_NODES]["pressure"]
+    at_start = model.tables.nodes["pressure"]
     pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
     for node in model.case.nodes.values():
         for key, kind in DRIVES.items():
@@ -56,7 +54,7 @@ def lumped(model) -> np.ndarray:
 def spreads(model, share: float = 1.0) -> np.ndarray:
     """What vessels hold more or less over the range of pressures; a share of what is small elsewhere : float64[n]."""
     found, spread = share * model.scale, given(model)[0]
-    for row in model.tables[rec.I_NODES]:
+    for row in model.tables.nodes:
         if row["y"] >= 0 and row["stiffness"] > 0.0 and spread > 0.0:
             found[row["y"]] = spread / row["stiffness"]
     return found

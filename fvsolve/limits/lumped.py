@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.limits.cells import Modes, cell_modes, rubbed
 from fvsolve.limits.drives import lumped, spreads
 from fvsolve.steppers.analysis.stability_function import stability_function
@@ -91,7 +90,7 @@ def own_modes(model) -> Modes:
     which = lumped(model)
     if not 0 < which.size <= MOST:
         return []
-    t, y, width, armed = model.case.numerics.start, model.start, SHARE * spreads(model), model.tables[rec.I_ARMED]
+    t, y, width, armed = model.case.numerics.start, model.start, SHARE * spreads(model), model.tables.armed
     kept, out, j = armed.copy(), model.new_out(), np.zeros((which.size, which.size))
     model.evaluate(t, y)  # which sets what holds there
 

@@ -68,7 +68,7 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
 
 def first_step(model) -> float:
     """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
-    numerics, armed = model.case.numerics, model.tables[rec.I_ARMED]
+    numerics, armed = model.case.numerics, model.tables.armed
     if numerics.step is not None:
         return numerics.step
     kept = armed.copy()
@@ -100,7 +100,7 @@ def pipe_rooms(model, method: str) -> list[Room]:
     if numerics.step is not None:
         courant = numerics.step * waves
     else:
-        courant = numerics.courant * waves / (waves * model.tables[rec.I_PIPES]["quicker"]).max()
+        courant = numerics.courant * waves / (waves * model.tables.pipes["quicker"]).max()
     cells = np.array([pipe.cells for pipe in model.pipes])
     long = cells >= (FIFTH if numerics.scheme == "weno5" else LONG)  # at whose ends it is of a lower order where rough
     rooms = [room for k in np.flatnonzero(~long) if (room := short_pipe(model, method, int(k), float(courant[k])))]
@@ -146,7 +146,7 @@ def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
 
 def returned(model, k: int) -> tuple[float, ...]:
     """Products of what both ends of pipe k reflect of a pressure; with what else joins them unknown, two for each."""
-    row, nodes, valves = model.tables[rec.I_PIPES][k], model.tables[rec.I_NODES], model.tables[rec.I_VALVES]
+    row, nodes, valves = model.tables.pipes[k], model.tables.nodes, model.tables.valves
     ends = []
     for i in (row["from_node"], row["to_node"]):
         plain = nodes[i]["kind"] == rec.JUNCTION
@@ -159,7 +159,7 @@ def returned(model, k: int) -> tuple[float, ...]:
 def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
     """All basins, water's Courant numbers by parts of a cell as its steps count them."""
     numerics, rooms = model.case.numerics, []
-    for basin, row in zip(model.basins, model.tables[rec.I_BASINS], strict=True):
+    for basin, row in zip(model.basins, model.tables.basins, strict=True):
         rate, share = basin.pace(model.start)
         parts = float(row["unsplit"]) or 1.0
         rate = max(rate, rates.get(basin.name, 0.0))

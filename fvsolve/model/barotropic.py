@@ -19,7 +19,7 @@ class BarotropicStart(Start):
 
     def __init__(self, scene) -> None:
         super().__init__(scene)
-        self.st, self.floats = scene.tables[rec.I_SETTINGS][0], scene.tables[rec.I_FLOATS]
+        self.st, self.floats = scene.tables.settings[0], scene.tables.floats
         self.rho, self.g = scene.fluid.density, self.case.gravity
         self.jets = {name: self.jet(row, *2 * [self.rho * float(row["area"])]) for name, row in
                      zip(scene.pipe_names, self.pipes, strict=True)}  # fmt: skip
@@ -157,7 +157,7 @@ class BarotropicStart(Start):
         return faces, centers
 
     def fill_pipes(self) -> None:
-        profile, self.driven = self.scene.tables[rec.I_PROFILE], {}
+        profile, self.driven = self.scene.tables.profile, {}
         for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
             flow = row["flow"] = float(self.pipe_flow[k])
             row["drag"] = self.pipe_drop(row)
@@ -194,7 +194,7 @@ class BarotropicStart(Start):
     def mass_at(self, k: int, fraction: float) -> float:
         """Mass per length of the profile at a fraction of pipe k, linear between faces and centres."""
         row, mesh = self.pipes[k], self.scene.meshes[k]
-        profile, n = self.scene.tables[rec.I_PROFILE], mesh.cells
+        profile, n = self.scene.tables.profile, mesh.cells
         both = np.empty(2 * n + 1)
         both[0::2], both[1::2] = (
             profile[row["face"] : row["face"] + n + 1],
@@ -222,7 +222,7 @@ class BarotropicStart(Start):
         return float(self.valves[k]["conductance"]) * rho / self.rho, drop
 
     def fill_valves(self) -> None:
-        out = np.zeros(int(self.scene.tables[rec.I_LAYOUT][0]["size"]))
+        out = np.zeros(int(self.scene.tables.layout[0]["size"]))
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]

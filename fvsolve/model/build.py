@@ -363,7 +363,7 @@ class Scene:
         envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
         for array in (envelope, extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
-        self.tables = (
+        self.tables = rec.Tables(
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,
             self.device_table, self.basin_table, self.patch_table, self.scalar_table,

@@ -33,14 +33,14 @@ def checks(model) -> dict[str, Any]:
     nodes = {
         name: {"elevation": row["elevation"].item(), "pressure": row["pressure"].item(),
                "head": float(model.head(row["pressure"], row["elevation"]))}
-        for name, row in zip(model.node_names, model.tables[rec.I_NODES], strict=True)
+        for name, row in zip(model.node_names, model.tables.nodes, strict=True)
     }  # fmt: skip
     bodies = {
         name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
-        for name, row in zip(model.body_names, model.tables[rec.I_BODIES], strict=False)
+        for name, row in zip(model.body_names, model.tables.bodies, strict=False)
     }
     pipes, remembered = {}, model.steady["unsteady"]
-    for k, (mesh, row) in enumerate(zip(model.pipes, model.tables[rec.I_PIPES], strict=True)):
+    for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
         law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
@@ -119,7 +119,7 @@ def start_speed(model, k: int) -> float:
         return mesh.wave_speed
     from fvsolve.kernels.density import local_speed
 
-    st, floats, row = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS], model.tables[rec.I_PIPES][k]
+    st, floats, row = model.tables.settings[0], model.tables.floats, model.tables.pipes[k]
     pressures = model.cell_pressure(k, np.zeros(mesh.cells))
     return mesh.cells / sum(1.0 / local_speed(st, floats, row, float(p)) for p in pressures)
 
@@ -149,7 +149,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if numerics.rtol is not None:
         return None, f"error control, rtol = {numerics.rtol:g}"
     if method_named(numerics.method).explicit:
-        own = model.wave_rates * model.tables[rec.I_PIPES]["quicker"]
+        own = model.wave_rates * model.tables.pipes["quicker"]
         own = np.maximum(own, [model.steady["unsteady"].get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
         rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
     else:  # waves alone: implicit steps cope with the rest
@@ -157,7 +157,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if not rate > 0.0:
         return None, "nothing limits it"
     if model.case.fluid.law != "linear" and len(own):
-        own = own * (1.0 + LOCAL) + velocities(model) / model.tables[rec.I_PIPES]["dx"]
+        own = own * (1.0 + LOCAL) + velocities(model) / model.tables.pipes["dx"]
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name
         return numerics.courant / rate, f"links.{name}: its cells have the shortest travel time"
@@ -173,7 +173,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
 
 def quick_valve(model, rate: float) -> tuple[str, float]:
     """The valve between two places that store without which the greatest rate is least, and that rate [1/s]."""
-    valves, found, least = model.tables[rec.I_VALVES], "", rate * (1 - QUICKER)
+    valves, found, least = model.tables.valves, "", rate * (1 - QUICKER)
     start = model.case.numerics.start
     for k in np.flatnonzero((valves["solve"] == rec.ALONE) & (valves["device"] < 0))[:MOST_TRIED]:
         size, valves["conductance"][k] = float(valves["conductance"][k]), 0.0
@@ -188,13 +188,13 @@ def quick_valve(model, rate: float) -> tuple[str, float]:
 
 def velocities(model) -> np.ndarray:
     """Of the flow in all pipes at the start, without sign : float64[pipes] [m/s]."""
-    pipes = model.tables[rec.I_PIPES]
+    pipes = model.tables.pipes
     return np.abs(pipes["flow"] / (model.case.properties.density * pipes["area"]))
 
 
 def quick_parts(model) -> str:
     """What may have a rate of its own beside the pipes: what stores, rigid columns, bodies."""
-    stores = [name for name, row in zip(model.node_names, model.tables[rec.I_NODES], strict=True)
+    stores = [name for name, row in zip(model.node_names, model.tables.nodes, strict=True)
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
     found = [*(basin.name for basin in model.basins), *stores, *model.column_names, *model.body_names]
     return found[0] if len(found) == 1 else f"one of {listing(found)}"

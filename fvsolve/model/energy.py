@@ -153,21 +153,21 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
     y = np.zeros(model.y_size) if y is None else y
     tables, rho = model.tables, model.case.properties.density
     found = np.zeros(model.y_size)
-    for row in tables[rec.I_PIPES]:
+    for row in tables.pipes:
         found[row["y"] : row["y"] + 2 * row["cells"]] = row["dx"] / (rho * row["area"])
-        shares = memory_shares(tables[rec.I_FLOATS], row)
+        shares = memory_shares(tables.floats, row)
         kept = slice(row["memory"], row["memory"] + shares.size * row["cells"])
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
     for basin in model.basins:
         basin.of(found)[:] = basin_weights(basin, basin.of(y))
         for q, amount in enumerate(basin.amounts(found) if basin.scalars else ()):
             amount[:] = CARRIED * 0.5 * basin.mesh.area / typical(model, q) ** 2
-    for row in tables[rec.I_NODES]:
+    for row in tables.nodes:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             found[row["y"]] = stiffness(model, row) / (2.0 * rho)
-    for row in tables[rec.I_COLUMNS]:
+    for row in tables.columns:
         found[row["y"]] = row["length"] / (2.0 * rho * row["area"])
-    for row in tables[rec.I_BODIES]:
+    for row in tables.bodies:
         if row["y"] >= 0:
             found[int(row["y"]) + 1] = 0.5 / row["lightness"]
     weigh_scalars(model, found)
@@ -177,13 +177,13 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
 def weigh_scalars(model, found: np.ndarray) -> None:
     """Weights of amounts in pipes, and in nodes that store, from those of the mass there."""
     tables, rho = model.tables, model.case.properties.density
-    for q, scalar in enumerate(tables[rec.I_SCALARS]):
+    for q, scalar in enumerate(tables.scalars):
         share = CARRIED / typical(model, q) ** 2
-        for row in tables[rec.I_PIPES]:
+        for row in tables.pipes:
             cells = slice(scalar["y"] + row["cell"], scalar["y"] + row["cell"] + row["cells"])
             found[cells] = share * row["dx"] * row["speed"] ** 2 / (rho * row["area"])
-        places = tables[rec.I_INTEGERS][scalar["places"] :]
-        for place, node in zip(places, tables[rec.I_NODES], strict=False):
+        places = tables.integers[scalar["places"] :]
+        for place, node in zip(places, tables.nodes, strict=False):
             if node["kind"] in (rec.TANK, rec.CHAMBER):
                 found[place] = share * found[node["y"]]
 
@@ -197,10 +197,10 @@ def held(model, y: np.ndarray):
     """(name, row of L) of springs and of stops in touch."""
     tables, links = model.tables, model.case.links
     springs = [name for name, link in links.items() if link.kind == "spring"]
-    for name, row in zip(springs, tables[rec.I_BRACES], strict=False):
+    for name, row in zip(springs, tables.braces, strict=False):
         yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
     stops = [name for name, link in links.items() if link.kind == "end-stop"]
-    for name, row in zip(stops, tables[rec.I_STOPS], strict=True):
+    for name, row in zip(stops, tables.stops, strict=True):
         x = distance(model, y, row["from_body"], row["to_body"])
         if row["below"] + x < 0.0 or x > row["above"]:
             yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
@@ -211,14 +211,14 @@ def of_devices(model, y: np.ndarray):
     if not model.devices:
         return
     out = model.evaluate(model.case.numerics.start, y)[1]
-    for (name, part, device), row in zip(model.devices, model.tables[rec.I_DEVICES], strict=True):
+    for (name, part, device), row in zip(model.devices, model.tables.devices, strict=True):
         for square in device.squares(model, part, row, y, out):
             yield name, square
 
 
 def swept(model, y: np.ndarray):
     """(state, row of L) of moving chambers at y: with less room the same excess e [kg] is more pressure."""
-    nodes, pistons = model.tables[rec.I_NODES], model.tables[rec.I_PISTONS]
+    nodes, pistons = model.tables.nodes, model.tables.pistons
     per_mass = model.evaluate(model.case.numerics.start, y)[1][model.layout["stiffness"] :] if len(pistons) else []
     for row in pistons:
         bodies = row["case"], row["rod"]
@@ -234,13 +234,13 @@ def swept(model, y: np.ndarray):
 
 def travel(model, i: int, j: int, factor: float) -> dict[int, float]:
     """Row of `factor` times (x_j - x_i), of those of the two bodies that can move."""
-    places = model.tables[rec.I_BODIES]["y"]
+    places = model.tables.bodies["y"]
     return {int(places[k]): sign * factor for k, sign in ((i, -1.0), (j, 1.0)) if places[k] >= 0 and i != j}
 
 
 def distance(model, y: np.ndarray, i: int, j: int) -> float:
     """By how much body j has moved away from body i since the start [m]."""
-    places = model.tables[rec.I_BODIES]["y"]
+    places = model.tables.bodies["y"]
     back, forth = (float(y[places[k]]) if places[k] >= 0 else 0.0 for k in (i, j))
     return forth - back
 
@@ -248,6 +248,6 @@ def distance(model, y: np.ndarray, i: int, j: int) -> float:
 def stiffness(model, row) -> float:
     """Pressure per stored mass [Pa/kg] of a node that stores, at its profile."""
     if row["kind"] == rec.TANK and row["shape"] >= 0:
-        floats, at, n = model.tables[rec.I_FLOATS], int(row["shape"]), int(row["shapes"])
+        floats, at, n = model.tables.floats, int(row["shape"]), int(row["shapes"])
         return float(model.case.gravity / np.interp(row["level"], floats[at : at + n], floats[at + n : at + 2 * n]))
     return float(row["stiffness"])

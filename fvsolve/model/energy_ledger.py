@@ -37,7 +37,7 @@ class Accounts:
         self.held: list[Account] = []  # of stored energy: rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
         self.powers = self.stores = 0
-        nodes = model.tables[rec.I_NODES]
+        nodes = model.tables.nodes
         kinds = [place.kind for place in case.places.values()]
         for i, name in enumerate(model.node_names):
             self.node(name, kinds[i], int(nodes[i]["kind"]))
@@ -104,8 +104,8 @@ class Accounts:
 
     def mechanics(self) -> None:
         model, tables = self.model, self.model.tables
-        names = [*model.body_names, *[""] * (len(tables[rec.I_BODIES]) - len(model.body_names))]
-        for name, row in zip(names, tables[rec.I_BODIES], strict=True):
+        names = [*model.body_names, *[""] * (len(tables.bodies) - len(model.body_names))]
+        for name, row in zip(names, tables.bodies, strict=True):
             at = self.take(1)
             self.hold(name, "mass", at if row["y"] >= 0 else None)
         of = {kind: [name for name, link in model.case.links.items() if link.kind == kind]

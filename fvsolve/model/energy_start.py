@@ -24,36 +24,36 @@ def available(model: Model) -> dict[str, float]:
     P = p - p_ambient + rho g z, z from the datum in the settings: there, or as near to it as it can, the surface of a
     tank would stand.
     """
-    tables, nodes, found = model.tables, model.tables[rec.I_NODES], {}
-    datum = float(tables[rec.I_SETTINGS][0]["datum"])
+    tables, nodes, found = model.tables, model.tables.nodes, {}
+    datum = float(tables.settings[0]["datum"])
     vessels = vessels_above(model)
     for name, row in zip(model.node_names, nodes, strict=True):
         if row["y"] >= 0 and row["kind"] != rec.VESSEL:
             found[name] = tank_above(model, row) if row["kind"] == rec.TANK else vessels(row)
-    for (name, part, device), row in zip(model.devices, tables[rec.I_DEVICES], strict=True):
+    for (name, part, device), row in zip(model.devices, tables.devices, strict=True):
         if above := device.above(model, part, row):
             found[name] = above
     for k, pipe in enumerate(model.pipes):
         found[pipe.name] = pipe_above(model, k) + memory_above(model, k)
-    for name, row in zip(model.column_names, tables[rec.I_COLUMNS], strict=True):
+    for name, row in zip(model.column_names, tables.columns, strict=True):
         found[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
-    for name, row in zip(model.body_names, tables[rec.I_BODIES], strict=False):
+    for name, row in zip(model.body_names, tables.bodies, strict=False):
         if row["y"] >= 0:
             found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:
         found[basin.name] = basin_above(basin, basin.of(model.start), datum)
     springs = [name for name, link in model.case.links.items() if link.kind == "spring"]
-    for name, row in zip(springs, tables[rec.I_BRACES], strict=False):
+    for name, row in zip(springs, tables.braces, strict=False):
         found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
     stops = [name for name, link in model.case.links.items() if link.kind == "end-stop"]
-    for name, row in zip(stops, tables[rec.I_STOPS], strict=True):
+    for name, row in zip(stops, tables.stops, strict=True):
         found[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
     return {name: float(value) for name, value in found.items()}
 
 
 def vessels_above(model: Model):
     """energy(node row) of a chamber at the start above that at P = 0 [J]."""
-    st, floats = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS]
+    st, floats = model.tables.settings[0], model.tables.floats
     if st["law"] == rec.LAW_LINEAR:
         return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
     from fvsolve.kernels.density import density, enthalpy, pressure_of_enthalpy
@@ -72,22 +72,22 @@ def vessels_above(model: Model):
 
 def potential(model: Model, row) -> float:
     """P of a node at the start under the linear law [Pa]."""
-    st = model.tables[rec.I_SETTINGS][0]
+    st = model.tables.settings[0]
     height = float(row["elevation"] - st["datum"])
     return float(row["pressure"]) - model.case.ambient_pressure + float(st["rho"] * st["gravity"]) * height
 
 
 def pipe_above(model: Model, k: int) -> float:
     """Energy of pipe k at the start above that at P = 0 and rest [J]."""
-    row, pipe, st = model.tables[rec.I_PIPES][k], model.pipes[k], model.tables[rec.I_SETTINGS][0]
+    row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
     if st["law"] == rec.LAW_LINEAR:
-        p, flow = potential(model, model.tables[rec.I_NODES][row["from_node"]]), row["flow"] / row["area"]
+        p, flow = potential(model, model.tables.nodes[row["from_node"]]), row["flow"] / row["area"]
         q = p - row["drag"] / row["area"] * pipe.length
         square = (p * p + p * q + q * q) / (3.0 * row["speed"] ** 2) + flow * flow
         return float(0.5 * pipe.length * row["area"] / st["rho"] * square)
     from fvsolve.kernels.density import enthalpy, mass_of_pressure, pressure_of_enthalpy, pressure_of_mass, thrust
 
-    floats, profile = model.tables[rec.I_FLOATS], model.tables[rec.I_PROFILE]
+    floats, profile = model.tables.floats, model.tables.profile
     base, total = enthalpy(st, floats, float(st["ambient"])), 0.0
     for i, z in enumerate(pipe.elevation):
         height, m = float(st["gravity"] * (z - st["datum"])), float(profile[row["center"] + i])
@@ -102,10 +102,10 @@ def pipe_above(model: Model, k: int) -> float:
 
 def memory_above(model: Model, k: int) -> float:
     """What unsteady friction of pipe k remembers of the flow of the start [J]."""
-    row, pipe, st = model.tables[rec.I_PIPES][k], model.pipes[k], model.tables[rec.I_SETTINGS][0]
-    share, full, square = float(memory_shares(model.tables[rec.I_FLOATS], row).sum()), st["rho"] * row["area"], 1.0
+    row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
+    share, full, square = float(memory_shares(model.tables.floats, row).sum()), st["rho"] * row["area"], 1.0
     if st["law"] != rec.LAW_LINEAR:  # the velocity is remembered
-        square = np.mean((full / model.tables[rec.I_PROFILE][row["center"] + np.arange(pipe.cells)]) ** 2)
+        square = np.mean((full / model.tables.profile[row["center"] + np.arange(pipe.cells)]) ** 2)
     return float(0.5 * share * square * row["flow"] ** 2 * pipe.length / full)
 
 
@@ -114,7 +114,7 @@ def tank_above(model: Model, row) -> float:
     from fvsolve.kernels.energy import tank_energy
     from fvsolve.kernels.tanks import tank_level
 
-    st, floats = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS]
+    st, floats = model.tables.settings[0], model.tables.floats
     rho, target = float(row["density"]), float(st["datum"] - row["elevation"])
     low = -float(row["mass"])
     if target <= 0.0:

@@ -83,13 +83,13 @@ def given_time(t: Any) -> float:
 class Model(Shown):
     """A case made ready; frozen.
 
-    tables : the arrays that kernels read, in the order of `kernels.records.TABLES`
+    tables : the arrays that kernels read, by name
     scale : float64[n]  what counts as a small deviation of each state is measured against
     breaks : (time [s], whether a value jumps), rising, inside the run
     """
 
     case: Case
-    tables: tuple
+    tables: rec.Tables
     state_names: list[str]
     scale: np.ndarray
     breaks: list[tuple[float, bool]]
@@ -143,7 +143,7 @@ class Model(Shown):
     @property
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses in a second, for every pipe [1/s]."""
-        pipes = self.tables[rec.I_PIPES]
+        pipes = self.tables.pipes
         return pipes["speed"] / pipes["dx"]
 
     @property
@@ -152,7 +152,7 @@ class Model(Shown):
         found = float(self.wave_rates.max(initial=0.0))
         if not self.basins:
             return found
-        armed = self.tables[rec.I_ARMED]
+        armed = self.tables.armed
         kept = armed.copy()
         rate = self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]
         armed[:] = kept
@@ -161,7 +161,7 @@ class Model(Shown):
     @property
     def unsteady(self) -> bool:
         """Whether the friction of a pipe remembers the past of its flow."""
-        return bool(self.tables[rec.I_PIPES]["terms"].any())
+        return bool(self.tables.pipes["terms"].any())
 
     @cached_property
     def functions(self):
@@ -169,22 +169,22 @@ class Model(Shown):
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.rooms import Scene
 
-        kinds = tuple(int(kind) for kind in np.unique(self.tables[rec.I_DEVICES]["kind"]))
-        law, many = self.case.fluid.law, [len(table) > 0 for table in self.tables]
-        there = [many[at] for at in (rec.I_CLUSTERS, rec.I_COLUMNS, rec.I_BODIES)]
-        basins = tuple(int(kind) for kind in np.unique(self.tables[rec.I_BASINS]["kind"]))
-        spread, valves = bool(self.tables[rec.I_SCALARS]["diffusivity"].any()), many[rec.I_VALVES]
-        patches = (self.tables[rec.I_NODES]["kind"] == rec.PATCH).all()
+        kinds = tuple(int(kind) for kind in np.unique(self.tables.devices["kind"]))
+        law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))
+        there = [many.clusters, many.columns, many.bodies]
+        basins = tuple(int(kind) for kind in np.unique(self.tables.basins["kind"]))
+        spread, valves = bool(self.tables.scalars["diffusivity"].any()), many.valves
+        patches = (self.tables.nodes["kind"] == rec.PATCH).all()
         alone = bool(basins and patches) and not (self.cells or valves or kinds or any(there))
-        outlets = bool((self.tables[rec.I_VALVES]["law"] == rec.POWER).any())
-        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many[rec.I_SCALARS],
+        outlets = bool((self.tables.valves["law"] == rec.POWER).any())
+        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many.scalars,
                       self.case.numerics.scheme in FIFTH, spread, valves, alone, outlets)  # fmt: skip
         return functions(scene)
 
     @property
     def layout(self):
         """Offsets of what the rhs writes beside dydt."""
-        return self.tables[rec.I_LAYOUT][0]
+        return self.tables.layout[0]
 
     @cached_property
     def handle(self):
@@ -223,7 +223,7 @@ class Model(Shown):
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
         """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there."""
-        armed = self.tables[rec.I_ARMED]
+        armed = self.tables.armed
         kept = armed.copy()
         armed[:] = 0.0
         found = self.evaluate(t, y)[0]
@@ -236,7 +236,7 @@ class Model(Shown):
         limit = given_numbers("limit", limit)
         if limit.ndim or np.isnan(limit):
             raise FvsolveError(f"limit = {show(limit)} is no time; wanted a number of seconds, or infinity")
-        self.tables[rec.I_SETTINGS][0]["limit"] = limit
+        self.tables.settings[0]["limit"] = limit
         dydt, out = np.zeros(self.y_size), self.new_out()
         self.arm(t, y)
         self.functions.rhs(t, y, dydt, out, self.handle)
@@ -245,7 +245,7 @@ class Model(Shown):
     def arm(self, t: float, y: np.ndarray) -> None:
         """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
         t, y = self.given(t, y)
-        armed, g = self.tables[rec.I_ARMED], np.zeros(self.tables[rec.I_ARMED].size)
+        armed, g = self.tables.armed, np.zeros(self.tables.armed.size)
         for _ in range(3 + 2 * len(self.events)):
             self.functions.events(t, y, self.handle, g)
             changed = np.any((g <= 0.0) != (armed > 0.0))
@@ -285,13 +285,13 @@ class Model(Shown):
         ):
             raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; wanted a number for each cell of one of "
                                f"{len(self.pipes)} pipes, counted from 0")  # fmt: skip
-        row = self.tables[rec.I_PIPES][k]
+        row = self.tables.pipes[k]
         if self.case.fluid.law == "linear":
             return self.profiles[k] + waves / row["admittance"]
         from fvsolve.kernels.density import pressure_of_mass
 
-        st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
-        masses = self.tables[rec.I_PROFILE][row["center"] + np.arange(len(waves))] + waves / row["speed"]
+        st, floats = self.tables.settings[0], self.tables.floats
+        masses = self.tables.profile[row["center"] + np.arange(len(waves))] + waves / row["speed"]
         return np.array([pressure_of_mass(st, floats, row, float(m)) for m in masses])
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
@@ -302,7 +302,7 @@ class Model(Shown):
             return (pressure - ambient) / (self.case.properties.density * gravity) + elevation
         from fvsolve.kernels.density import enthalpy
 
-        st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
+        st, floats = self.tables.settings[0], self.tables.floats
         base = enthalpy(st, floats, float(ambient))
         h = np.array([enthalpy(st, floats, float(p)) - base for p in np.ravel(pressure)])
         return h.reshape(np.shape(pressure)) / gravity + elevation
@@ -310,7 +310,7 @@ class Model(Shown):
     @property
     def cavitates(self) -> bool:
         """Whether the density law knows cavities: it has a floor."""
-        return bool(self.tables[rec.I_SETTINGS][0]["floor"] > 0.0)
+        return bool(self.tables.settings[0]["floor"] > 0.0)
 
     @property
     def reference(self) -> float:
@@ -321,7 +321,7 @@ class Model(Shown):
         """Density [kg/m3] at pressures, under all laws but linear."""
         from fvsolve.kernels.density import density
 
-        st, floats = self.tables[rec.I_SETTINGS][0], self.tables[rec.I_FLOATS]
+        st, floats = self.tables.settings[0], self.tables.floats
         return np.array([density(st, floats, float(p)) for p in np.atleast_1d(given_numbers("pressure", pressure))])
 
     def swollen(self, row, pressure: np.ndarray) -> np.ndarray:
@@ -331,7 +331,7 @@ class Model(Shown):
         if not isinstance(row, np.void):
             raise FvsolveError(f"row = {show(row)} is no pipe; wanted a row of the table of pipes")
         pressures = np.atleast_1d(given_numbers("pressure", pressure))
-        return np.array([wall_area(self.tables[rec.I_SETTINGS][0], row, float(p)) for p in pressures])
+        return np.array([wall_area(self.tables.settings[0], row, float(p)) for p in pressures])
 
     def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it."""
@@ -341,20 +341,20 @@ class Model(Shown):
         found, rho = {}, self.case.properties.density
         linear = self.case.fluid.law == "linear"
         for k, pipe in enumerate(self.pipes):
-            row = self.tables[rec.I_PIPES][k]
+            row = self.tables.pipes[k]
             n, o = pipe.cells, row["y"]
             cells = row["cell"] + np.arange(n)
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
             swollen = row["area"] if linear else self.swollen(row, pressure)
             flow = mass_flow / (rho if linear else self.density(pressure))
-            low, high = (self.cell_pressure(k, self.tables[rec.I_ENVELOPE][i, cells]) for i in (0, 2))
+            low, high = (self.cell_pressure(k, self.tables.envelope[i, cells]) for i in (0, 2))
             found[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / swollen,
                 "flow": flow, "least_pressure": np.minimum(low, pressure),
                 "greatest_pressure": np.maximum(high, pressure), **pipe_values(self, k, y),
             }  # fmt: skip
-        nodes = self.tables[rec.I_NODES]
+        nodes = self.tables.nodes
         at = int(self.layout["pressure"])
         for basin in self.basins:
             found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
@@ -372,15 +372,15 @@ class Model(Shown):
         y = self.sized(y)
         fluid, initial, change = self.case.properties, 0.0, 0.0
         for k, pipe in enumerate(self.pipes):
-            row = self.tables[rec.I_PIPES][k]
+            row = self.tables.pipes[k]
             o, n = row["y"], pipe.cells
             if fluid.law == "linear":
                 strain = (self.profiles[k] - fluid.pressure) / (fluid.density * row["speed"] ** 2)
                 initial += float(np.sum(fluid.density * row["area"] * row["dx"] * (1 + strain)))
             else:
-                initial += float(np.sum(self.tables[rec.I_PROFILE][row["center"] + np.arange(n)])) * row["dx"]
+                initial += float(np.sum(self.tables.profile[row["center"] + np.arange(n)])) * row["dx"]
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
-        for row in self.tables[rec.I_NODES]:
+        for row in self.tables.nodes:
             if row["y"] >= 0:
                 initial += float(row["mass"])
                 change += float(y[row["y"]])
@@ -389,8 +389,8 @@ class Model(Shown):
             for own, start in zip(basin.of(y)[:1], basin.of(self.start)[:1], strict=True):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
-        for row in self.tables[rec.I_PISTONS]:  # what moving chambers hold is their excess and what was swept
-            places = self.tables[rec.I_BODIES][[row["case"], row["rod"]]]["y"]
+        for row in self.tables.pistons:  # what moving chambers hold is their excess and what was swept
+            places = self.tables.bodies[[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
             change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
         return initial, change

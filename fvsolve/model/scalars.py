@@ -60,7 +60,7 @@ def bounds(case, name: str) -> tuple[float, float]:
 
 def settle_scalars(scene) -> None:
     """Masses of the profile per length, and sizes that states are measured against, once the profile is known."""
-    profile, rho = scene.tables[rec.I_PROFILE], scene.fluid.density
+    profile, rho = scene.tables.profile, scene.fluid.density
     for k, row in enumerate(scene.pipe_table if len(scene.case.scalars) else ()):
         strain = (scene.profiles[k] - scene.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
@@ -83,7 +83,7 @@ def places_of(scene, row) -> np.ndarray:
 
 def start_amounts(scene, found: np.ndarray) -> None:
     """Amounts of all scalars at the start, into the state."""
-    case, profile = scene.case, scene.tables[rec.I_PROFILE]
+    case, profile = scene.case, scene.tables.profile
     for row, (name, scalar) in zip(scene.scalar_table, case.scalars.items(), strict=True):
         for pipe, mesh in zip(scene.pipe_table, scene.meshes, strict=True):
             cells = np.arange(mesh.cells)
@@ -97,19 +97,17 @@ def start_amounts(scene, found: np.ndarray) -> None:
 
 def amounts(model) -> np.ndarray:
     """Places of all amounts in the state."""
-    count = model.cells + int(np.isin(model.tables[rec.I_NODES]["kind"], STORES).sum())
-    return np.concatenate(
-        [np.zeros(0, dtype=int), *(row["y"] + np.arange(count) for row in model.tables[rec.I_SCALARS])]
-    )
+    count = model.cells + int(np.isin(model.tables.nodes["kind"], STORES).sum())
+    return np.concatenate([np.zeros(0, dtype=int), *(row["y"] + np.arange(count) for row in model.tables.scalars)])
 
 
 def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
     """Values of all scalars in the cells of pipe k."""
-    pipe, found = model.tables[rec.I_PIPES][k], {}
+    pipe, found = model.tables.pipes[k], {}
     n, o = int(pipe["cells"]), int(pipe["y"])
-    for row, name in zip(model.tables[rec.I_SCALARS], model.case.scalars, strict=True):
+    for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
         base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
-        mass = model.tables[rec.I_PROFILE][base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
+        mass = model.tables.profile[base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
         found[name] = y[at : at + n] / mass
     return found
 
@@ -122,13 +120,13 @@ def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
 
 def amount(model, q: int, y: np.ndarray) -> float:
     """Amount of scalar q in all pipes, nodes and basins [kg, times its unit]."""
-    pipes, nodes, row = model.tables[rec.I_PIPES], model.tables[rec.I_NODES], model.tables[rec.I_SCALARS][q]
+    pipes, nodes, row = model.tables.pipes, model.tables.nodes, model.tables.scalars[q]
     total = 0.0
     for pipe in pipes:
         at = int(row["y"] + pipe["cell"])
         total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
     total += sum(float(np.sum(basin.held() * basin.amounts(y)[q])) for basin in model.basins)
-    places = model.tables[rec.I_INTEGERS][row["places"] : row["places"] + len(nodes)]
+    places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
     return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
 
 
@@ -138,7 +136,7 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
     ledger : float64[2, m]  what came in, and, negative, what went out
     """
     found, n = {}, len(model.node_names)
-    for q, (name, row) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
+    for q, (name, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
         both = ledger[:, n + q * n : n + (q + 1) * n]
         lost = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
         decayed = -float(np.sum(lost[:, : row["losses"]]))

@@ -64,18 +64,18 @@ class Couplings:
     def __init__(self, model) -> None:
         tables = model.tables
         self.size = model.y_size
-        self.nodes, self.pipes = tables[rec.I_NODES], tables[rec.I_PIPES]
-        self.valves, self.columns = tables[rec.I_VALVES], tables[rec.I_COLUMNS]
-        settings = tables[rec.I_SETTINGS][0]
+        self.nodes, self.pipes = tables.nodes, tables.pipes
+        self.valves, self.columns = tables.valves, tables.columns
+        settings = tables.settings[0]
         self.linear = settings["law"] == rec.LAW_LINEAR
         self.upwind = settings["scheme"] == rec.UPWIND
         self.reach = reach_of(settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
-        self.bodies, self.pistons = tables[rec.I_BODIES]["y"], tables[rec.I_PISTONS]
-        self.braces = [*tables[rec.I_BRACES], *tables[rec.I_STOPS]]
-        self.devices = tables[rec.I_DEVICES]
-        self.basins, self.integers = model.basins, tables[rec.I_INTEGERS]
-        self.patches = {int(row["node"]): row for row in tables[rec.I_PATCHES]}
+        self.bodies, self.pistons = tables.bodies["y"], tables.pistons
+        self.braces = [*tables.braces, *tables.stops]
+        self.devices = tables.devices
+        self.basins, self.integers = model.basins, tables.integers
+        self.patches = {int(row["node"]): row for row in tables.patches}
         self.sets = self.pressures()  # of each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:

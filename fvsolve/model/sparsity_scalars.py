@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.model.basins import pattern
 from fvsolve.model.scalars import STORES
 from fvsolve.model.sparsity import Pairs, ends_of, every, states
@@ -19,11 +18,11 @@ class Carriage:
     """Couplings of one scalar, on top of those of the model that carries it."""
 
     def __init__(self, couplings, model, q: int) -> None:
-        self.of, self.row = couplings, model.tables[rec.I_SCALARS][q]
+        self.of, self.row = couplings, model.tables.scalars[q]
         self.q, of, nodes = q, couplings, len(couplings.nodes)
         self.ledger = of.size + nodes * (1 + q)
-        self.loss = of.size + nodes * (1 + len(model.tables[rec.I_SCALARS])) + self.row["loss"]
-        self.places = model.tables[rec.I_INTEGERS][self.row["places"] : self.row["places"] + nodes]
+        self.loss = of.size + nodes * (1 + len(model.tables.scalars)) + self.row["loss"]
+        self.places = model.tables.integers[self.row["places"] : self.row["places"] + nodes]
         self.stores = np.isin(of.nodes["kind"], STORES)
         self.wide = max(NEAR, of.reach.behind, of.reach.ahead)
         self.through = [[] for _ in range(nodes)]  # of each node, what sets flows there, and values at ends of pipes
@@ -138,5 +137,5 @@ class Carriage:
 
 def scalar_pairs(couplings, model) -> Iterator[Pairs]:
     """Couplings of all scalars of a model."""
-    for q in range(len(model.tables[rec.I_SCALARS])):
+    for q in range(len(model.tables.scalars)):
         yield from Carriage(couplings, model, q).pairs()

@@ -56,7 +56,7 @@ class Start:
         self.columns, self.valves, self.pistons = scene.column_table, scene.valve_table, scene.piston_table
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
-        scene.tables[rec.I_SETTINGS][0]["limit"] = self.t
+        scene.tables.settings[0]["limit"] = self.t
         self.weight = scene.fluid.density * self.case.gravity
         sizes = [
             1e-9,
@@ -238,7 +238,7 @@ class Start:
 
     def outlet_edge(self, k: int, g: float) -> Edge:
         """A way out, M = f(drop), with its own chord as slope."""
-        row, floats, denser, wider = self.valves[k], self.scene.tables[rec.I_FLOATS], *self.dense_of.get(k, (1.0, 1.0))
+        row, floats, denser, wider = self.valves[k], self.scene.tables.floats, *self.dense_of.get(k, (1.0, 1.0))
         i, j, at = int(row["from_node"]), int(row["to_node"]), int(row["data"])
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
@@ -357,7 +357,7 @@ class Start:
 
     def fill_pipes(self) -> None:
         """Straight lines between the pressures of the ends; what friction does not hold of them drives the flow."""
-        profile, self.driven = self.scene.tables[rec.I_PROFILE], {}
+        profile, self.driven = self.scene.tables.profile, {}
         for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
             row["flow"] = self.pipe_flow[k]
             row["drag"] = self.pipe_drop(row)
@@ -413,7 +413,7 @@ class Start:
 
     def fill_outlet(self, row, flow: float) -> None:
         """The drop at which a way out carries its flow exactly; none where its flow does not obey its law."""
-        floats, at, g = self.scene.tables[rec.I_FLOATS], int(row["data"]), float(row["open"])
+        floats, at, g = self.scene.tables.floats, int(row["data"]), float(row["open"])
         asked = emitter_flow(floats, at, g, float(row["drop"]), FREE)
         if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
             row["open"] = 0.0

@@ -11,8 +11,6 @@ import math
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
-
 ACCURACY = 1e-4
 LAMINAR = 2000.0  # Reynolds number of the start below which Zielke's function is taken
 QUICKEST = 1.9  # decay of the quickest term over the time that a wave takes through a cell
@@ -128,7 +126,7 @@ def reserve(scene, row) -> None:
 
 def add_terms(scene) -> dict[str, dict]:
     """Terms and states of all pipes with unsteady friction, from the flows of the start; what `check` shows of them."""
-    found, settings, floats = {}, scene.tables[rec.I_SETTINGS][0], scene.tables[rec.I_FLOATS]
+    found, settings, floats = {}, scene.tables.settings[0], scene.tables.floats
     numerics, fluid = scene.case.numerics, scene.fluid
     for name, row, mesh in zip(scene.pipe_names, scene.pipe_table, scene.meshes, strict=True):
         law = scene.case.links[name].friction

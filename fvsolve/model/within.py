@@ -13,7 +13,7 @@ NOBODY = -1
 def within(model) -> tuple[np.ndarray, np.ndarray]:
     """(at, by) as `steppers.rows.keep_within` takes them; depths come before what they are the whole of."""
     rows = [*depths(model)]
-    for q in range(len(model.tables[rec.I_SCALARS])):
+    for q in range(len(model.tables.scalars)):
         rows += [*in_pipes(model, q), *in_nodes(model, q), *in_basins(model, q)]
     if not rows:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 4))
@@ -41,8 +41,8 @@ def depths(model):
 
 def in_pipes(model, q: int):
     """Amounts per length, of the mass per length that both waves make."""
-    row, profile = model.tables[rec.I_SCALARS][q], model.tables[rec.I_PROFILE]
-    for pipe in model.tables[rec.I_PIPES]:
+    row, profile = model.tables.scalars[q], model.tables.profile
+    for pipe in model.tables.pipes:
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
         states, wave = row["y"] + pipe["cell"] + k, pipe["y"] + k
         masses = profile[pipe["center"] + k]
@@ -51,8 +51,8 @@ def in_pipes(model, q: int):
 
 def in_nodes(model, q: int):
     """Amounts in tanks and chambers, of the mass there."""
-    row, nodes = model.tables[rec.I_SCALARS][q], model.tables[rec.I_NODES]
-    places = model.tables[rec.I_INTEGERS][row["places"] : row["places"] + len(nodes)]
+    row, nodes = model.tables.scalars[q], model.tables.nodes
+    places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
     for node, place in zip(nodes, places, strict=True):
         if node["kind"] in STORES:
             yield table([place], node["y"], NOBODY, node["mass"], 1.0, row["least"], row["greatest"])
@@ -60,7 +60,7 @@ def in_nodes(model, q: int):
 
 def in_basins(model, q: int):
     """Amounts per area, of the depth."""
-    row = model.tables[rec.I_SCALARS][q]
+    row = model.tables.scalars[q]
     for basin in model.basins:
         if basin.row["carried"] < 0:
             continue

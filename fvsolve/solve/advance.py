@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
-from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import automatic
@@ -78,9 +77,9 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
     """The same model with schedules held at constant values."""
     if not inputs:
         return model
-    tables = list(model.tables)
-    schedules, pieces, nodes = tables[rec.I_SCHEDULES].copy(), tables[rec.I_PIECES], tables[rec.I_NODES].copy()
-    scalars = tables[rec.I_SCALARS].copy()
+    tables = model.tables
+    schedules, pieces, nodes = tables.schedules.copy(), tables.pieces, tables.nodes.copy()
+    scalars = tables.scalars.copy()
     known = input_schedules(model)
     linear = model.case.fluid.law == "linear"
     rows = []
@@ -104,9 +103,8 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         if one.scalar >= 0:  # which no value may leave
             bounds = scalars[one.scalar]
             bounds["least"], bounds["greatest"] = min(bounds["least"], found), max(bounds["greatest"], found)
-    tables[rec.I_SCHEDULES], tables[rec.I_NODES], tables[rec.I_SCALARS] = schedules, nodes, scalars
-    tables[rec.I_PIECES] = np.vstack([pieces, rows])
-    return replace(model, tables=tuple(tables))
+    pieces = np.vstack([pieces, rows])
+    return replace(model, tables=tables._replace(schedules=schedules, nodes=nodes, scalars=scalars, pieces=pieces))
 
 
 def checked(name: str, value: float, one: Input) -> float:
@@ -136,7 +134,7 @@ def torques(model: Model, pump: str, row) -> dict[str, Input]:
     from fvsolve.kernels.devices.pump import OWN_NUMBERS
 
     names = [name for name, link in model.case.links.items() if link.kind == "torque" and link.to == f"{pump}.shaft"]
-    schedules = model.tables[rec.I_FLOATS][row["data"] + OWN_NUMBERS :: 2]
+    schedules = model.tables.floats[row["data"] + OWN_NUMBERS :: 2]
     return {f"{name}.torque": Input("torque", int(k)) for name, k in zip(names, schedules, strict=False)}
 
 
@@ -158,7 +156,7 @@ def input_schedules(model: Model) -> dict[str, Input]:
     """Input name -> what it holds."""
     rho, weight = model.case.properties.density, model.case.properties.density * model.case.gravity
     found = {}
-    nodes = zip(model.node_names, model.case.places.values(), model.tables[rec.I_NODES], strict=True)
+    nodes = zip(model.node_names, model.case.places.values(), model.tables.nodes, strict=True)
     for i, (name, node, row) in enumerate(nodes):
         index = int(row["schedule"])
         if node.kind == "reservoir":
@@ -170,11 +168,11 @@ def input_schedules(model: Model) -> dict[str, Input]:
         elif node.kind == "inflow":
             found[f"{name}.flow"] = Input("flow", index, -rho)
         if node.kind in ("reservoir", "inflow"):
-            for q, (scalar, one) in enumerate(zip(model.case.scalars, model.tables[rec.I_SCALARS], strict=True)):
-                place = int(model.tables[rec.I_INTEGERS][one["places"] + i])
+            for q, (scalar, one) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
+                place = int(model.tables.integers[one["places"] + i])
                 if place >= 0:
                     found[f"{name}.{scalar}"] = Input("value", place, scalar=q)
-    for name, row in zip(model.valve_names, model.tables[rec.I_VALVES], strict=True):
+    for name, row in zip(model.valve_names, model.tables.valves, strict=True):
         if row["schedule"] < 0:
             continue
         if model.case.conduits[name].kind != "spool-valve":
@@ -183,7 +181,7 @@ def input_schedules(model: Model) -> dict[str, Input]:
             found[f"{name}.position"] = Input("position", int(row["schedule"]))
         elif found[f"{name}.position"].other < 0:
             found[f"{name}.position"] = found[f"{name}.position"]._replace(other=int(row["schedule"]))
-    for (name, *_), row in zip(model.devices, model.tables[rec.I_DEVICES], strict=True):
+    for (name, *_), row in zip(model.devices, model.tables.devices, strict=True):
         link = model.case.conduits.get(name)
         if link is not None and link.kind == "pump":
             found[f"{name}.speed"] = Input("speed", int(row["schedule"]))
@@ -193,7 +191,7 @@ def input_schedules(model: Model) -> dict[str, Input]:
         elif row["schedule"] >= 0 and hasattr(link, "set_flow"):
             found[f"{name}.set_flow"] = Input("flow", int(row["schedule"]), rho)
     pushed = zip((name for name, link in model.case.links.items() if link.kind == "force"),
-                 (row for row in model.tables[rec.I_BRACES] if row["schedule"] >= 0), strict=True)  # fmt: skip
+                 (row for row in model.tables.braces if row["schedule"] >= 0), strict=True)  # fmt: skip
     for name, row in pushed:
         found[f"{name}.force"] = Input("force", int(row["schedule"]))
     return found

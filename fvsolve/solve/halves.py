@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
 from fvsolve.limits.drives import lumped, spreads
 from fvsolve.limits.step import DOUBTFUL, WRONG
 from fvsolve.steppers import automatic
@@ -36,7 +35,7 @@ class Halves:
     """
 
     def __init__(self, model) -> None:
-        numerics, self.step = model.case.numerics, float(model.tables[rec.I_SETTINGS][0]["step"])
+        numerics, self.step = model.case.numerics, float(model.tables.settings[0]["step"])
         method = method_named(automatic.first_method(numerics.method))
         which = lumped(model) if method.explicit else np.arange(model.y_size)
         self.model, self.which = model, which[: None if self.step > 0.0 else 0]

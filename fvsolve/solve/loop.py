@@ -35,7 +35,7 @@ class Loop:
         self.model, method = model, method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * model.tables[rec.I_ARMED].size)  # their last times
+        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * model.tables.armed.size)  # their last times
         self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
@@ -45,16 +45,16 @@ class Loop:
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
         sums = [
-            *model.tables[rec.I_NODES]["y"],
-            *model.tables[rec.I_BODIES]["y"],
+            *model.tables.nodes["y"],
+            *model.tables.bodies["y"],
             *amounts(model),
         ]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.within = within(model)
         stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
-        self.tanks = np.flatnonzero(model.tables[rec.I_NODES]["kind"] == rec.TANK)
-        events = model.tables[rec.I_ARMED].size
+        self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
+        events = model.tables.armed.size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
@@ -69,7 +69,7 @@ class Loop:
             self.orders[told.CONTROL] = told.FIXED_STEP
             self.orders[told.SIZE] = numerics.courant / model.wave_rate
         given = self.orders[told.CONTROL] == told.FIXED_STEP
-        model.tables[rec.I_SETTINGS][0]["step"] = self.orders[told.SIZE] if given else 0.0
+        model.tables.settings[0]["step"] = self.orders[told.SIZE] if given else 0.0
 
     @property
     def now(self) -> np.ndarray:
@@ -96,7 +96,7 @@ class Loop:
         self.orders[told.END], self.orders[told.STOP_AT] = end, stop_at
         self.flags[told.PHASE], self.flags[told.BEHIND] = told.FRESH, 0
         self.settle()
-        self.model.tables[rec.I_SETTINGS][0]["limit"] = end
+        self.model.tables.settings[0]["limit"] = end
 
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
@@ -116,7 +116,7 @@ class Loop:
     @property
     def armed(self) -> np.ndarray:
         """Which events have happened and still hold (a view)."""
-        return self.model.tables[rec.I_ARMED]
+        return self.model.tables.armed
 
     def note(self, before: np.ndarray) -> None:
         """List the events that have happened since the flags were `before`, and do what they do at once."""
@@ -128,11 +128,11 @@ class Loop:
     def settle(self) -> None:
         """Have tanks and devices do what their events do at once."""
         for i in self.tanks:
-            node, sums = self.model.tables[rec.I_NODES][i], self.stepper.ledger.reshape(SUMS, -1)
+            node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(SUMS, -1)
             part = limits.overshot(node, self.armed, float(node["mass"] + self.now[node["y"]]))
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
-        for (_, _, device), row in zip(self.model.devices, self.model.tables[rec.I_DEVICES], strict=True):
+        for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
             device.settle(self.model, row, self.now, self.stepper.scale)
 
     def switch(self, before: np.ndarray) -> bool:
@@ -164,7 +164,7 @@ class Loop:
             self.note(before)
             out = self.evaluate(limit)
         places = shut_places(self.model, out)
-        for k, row in enumerate(self.model.tables[rec.I_COLUMNS]):
+        for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
             meets = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
             if flow != new and (meets or new == 0.0):
@@ -189,10 +189,10 @@ class Loop:
 
 def leap_allowed(model: Model, method: Method) -> bool:
     """Whether steps can be taken whole: upwind and Euler, pipes alone, no events, no friction or a given factor."""
-    settings, numerics = model.tables[rec.I_SETTINGS][0], model.case.numerics
-    plain = np.isin(model.tables[rec.I_PIPES]["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
+    settings, numerics = model.tables.settings[0], model.case.numerics
+    plain = np.isin(model.tables.pipes["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
     return bool(
         settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and plain and model.tables[rec.I_ARMED].size == 0
+        and model.y_size == 2 * model.cells and plain and model.tables.armed.size == 0
     )  # fmt: skip

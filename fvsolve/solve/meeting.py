@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.rigid import gate_inflow
 from fvsolve.model import Model
 
@@ -13,7 +12,7 @@ NONE = 1e-9  # of a small flow: columns that part no quicker are rounding
 
 def shut_places(model: Model, out: np.ndarray) -> list[int]:
     """Places where rigid columns, one or more, meet nothing but shut valves."""
-    found, nodes, at = [], model.tables[rec.I_NODES], model.layout["conductance"]
+    found, nodes, at = [], model.tables.nodes, model.layout["conductance"]
     for i in np.flatnonzero(nodes["gates"] >= 0):
         if not out[at + gates_of(model, i)].any():
             found.append(int(i))
@@ -22,13 +21,13 @@ def shut_places(model: Model, out: np.ndarray) -> list[int]:
 
 def gates_of(model: Model, i: int) -> np.ndarray:
     """Valves at such a place."""
-    row = model.tables[rec.I_NODES][i]
-    return model.tables[rec.I_INTEGERS][row["gates"] : row["gates"] + row["gate_count"]]
+    row = model.tables.nodes[i]
+    return model.tables.integers[row["gates"] : row["gates"] + row["gate_count"]]
 
 
 def air_valve_of(model: Model, i: int) -> int | None:
     """The first event function of the air valve at a place: that it opens; None where there is none."""
-    valves, devices = model.tables[rec.I_VALVES], model.tables[rec.I_DEVICES]
+    valves, devices = model.tables.valves, model.tables.devices
     for device in valves["device"][gates_of(model, i)]:
         if device >= 0 and devices[device]["row"] >= 0:
             return int(devices[device]["event"])
@@ -37,7 +36,7 @@ def air_valve_of(model: Model, i: int) -> int | None:
 
 def brought(model: Model, t: float, y: np.ndarray) -> np.ndarray:
     """What columns have carried up to t more than in the profile [kg/s]; at the start, their states."""
-    before, columns, settings = model.new_out(), model.tables[rec.I_COLUMNS], model.tables[rec.I_SETTINGS][0]
+    before, columns, settings = model.new_out(), model.tables.columns, model.tables.settings[0]
     if t <= model.case.numerics.start:
         return y[columns["y"]]
     limit, settings["limit"] = float(settings["limit"]), t
@@ -52,10 +51,10 @@ def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[in
     sum of A / L (J - J_far) = sum of the flows that columns bring: momentum is kept, and columns that their valves
     still lead keep their flow. carried : as of `brought`.
     """
-    sums = np.array([model.tables[rec.I_NODES]["inflow"][i] - gate_inflow(model.tables, i) for i in places])
+    sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
     matrix = np.zeros((len(places), len(places)))
     row = {i: r for r, i in enumerate(places)}
-    for k, column in enumerate(model.tables[rec.I_COLUMNS]):
+    for k, column in enumerate(model.tables.columns):
         ends = [(row.get(int(column["from_node"]), -1), -1.0), (row.get(int(column["to_node"]), -1), 1.0)]
         at = model.layout["column"] + k
         kept = out[model.layout["led"] + k] != 0.0 and out[at] != 0.0
@@ -75,7 +74,7 @@ def let_go(model: Model, t: float, y: np.ndarray, out: np.ndarray) -> int | None
     events = [air_valve_of(model, i) for i in places]
     if all(event is None for event in events):
         return None
-    small = NONE * model.scale[model.tables[rec.I_COLUMNS]["y"]].max()
+    small = NONE * model.scale[model.tables.columns["y"]].max()
     pushes = impulses(model, brought(model, t, y), out, places)
     apart = [(push, event) for push, event in zip(pushes, events, strict=True) if event is not None and push < -small]
     return min(apart)[1] if apart else None

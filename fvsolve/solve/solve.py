@@ -31,7 +31,7 @@ from fvsolve.units import show
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 FEW = 16.0  # steps at a time where they are beyond a limit, so that growth is seen early
-PERSISTENT = (rec.I_EXTREMES, rec.I_ENVELOPE, rec.I_MARKS, rec.I_ARMED)
+PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
 def flat(found: tuple[float, Waves] | None) -> list[float]:
@@ -90,10 +90,10 @@ class Run:
         self.changes: list[tuple[float, float, float]] = []  # of method, under `auto`
         self.loop.now[:] = state.y
         self.loop.memory[told.T] = state.t
-        for array in (model.tables[rec.I_EXTREMES], model.tables[rec.I_ENVELOPE]):
+        for array in (model.tables.extremes, model.tables.envelope):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
-        model.tables[rec.I_MARKS][:] = np.nan
-        model.tables[rec.I_ARMED][:] = 0.0
+        model.tables.marks[:] = np.nan
+        model.tables.armed[:] = 0.0
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         self.waves, self.soundness = Watch(model), Soundness(model)
         if self.soundness.predicted:
@@ -112,7 +112,7 @@ class Run:
 
     def memory(self) -> np.ndarray:
         """Everything that a resumed run needs beside t and y, flat."""
-        kept = [self.model.tables[at].ravel() for at in PERSISTENT]
+        kept = [getattr(self.model.tables, name).ravel() for name in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
@@ -143,12 +143,12 @@ class Run:
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
         seen = self.soundness.halves.kept
-        known = [self.model.tables[at] for at in PERSISTENT] + [*self.loop.stepper.memories(), seen]
+        known = [getattr(self.model.tables, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
         if memory.size != sum(array.size for array in known):
             raise ValueError("as many numbers as there is nothing for")
         memory = self.loop.stepper.remember(memory)
-        for at in PERSISTENT:
-            array = self.model.tables[at].ravel()
+        for name in PERSISTENT:
+            array = getattr(self.model.tables, name).ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
         seen[:] = memory
@@ -173,7 +173,7 @@ class Run:
 
     def widen(self, rows: np.ndarray) -> None:
         """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
-        least, t_least, greatest, t_greatest = self.model.tables[rec.I_EXTREMES]
+        least, t_least, greatest, t_greatest = self.model.tables.extremes
         for k in range(rows.shape[1] - 1):
             low, high = rows[np.argmin(rows[:, k + 1])], rows[np.argmax(rows[:, k + 1])]
             if low[k + 1] < least[k]:
@@ -224,10 +224,10 @@ class Run:
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
             at, scale = (
                 len(model.pipes) + 3 * len(model.node_names) + k,
-                model.scale[model.tables[rec.I_COLUMNS][k]["y"]],
+                model.scale[model.tables.columns[k]["y"]],
             )
-            if abs(flow) > 1e-3 * scale and np.isnan(model.tables[rec.I_MARKS][at]):
-                model.tables[rec.I_MARKS][at] = t
+            if abs(flow) > 1e-3 * scale and np.isnan(model.tables.marks[at]):
+                model.tables.marks[at] = t
 
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]

@@ -82,7 +82,7 @@ class Summary:
 
 def find_marks(model: Model) -> list[Mark]:
     """First time and place of everything the model cannot really follow; cavities are none where the law has them."""
-    marks, pipes, nodes = model.tables[rec.I_MARKS], model.pipes, model.node_names
+    marks, pipes, nodes = model.tables.marks, model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(what, place.removesuffix(".inside")) for what, place in kinds]
@@ -115,7 +115,7 @@ def find_marks(model: Model) -> list[Mark]:
 
 def run_downs(model: Model) -> list[Notice]:
     """Pumps that ran forward beyond their curve while they ran down, ahead of a check valve that shuts."""
-    found, marks = [], model.tables[rec.I_MARKS]
+    found, marks = [], model.tables.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     for (name, *_), time in zip(model.devices, marks[first + len(model.devices) :], strict=False):
         if np.isfinite(time):
@@ -127,7 +127,7 @@ def run_downs(model: Model) -> list[Notice]:
 
 def find_cavities(model: Model) -> list[Cavity]:
     """Every pipe in which pressure fell below twice the vapour pressure: more vapour than gas between the liquid."""
-    found, marks = [], model.tables[rec.I_MARKS]
+    found, marks = [], model.tables.marks
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
         share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
         if np.isfinite(share):
@@ -140,15 +140,15 @@ def find_cavities(model: Model) -> list[Cavity]:
 
 def find_extremes(model: Model) -> dict[str, tuple[float, float, float, float]]:
     """Probe -> (least, its time, greatest, its time), over all accepted steps and rows."""
-    table = model.tables[rec.I_EXTREMES]
+    table = model.tables.extremes
     return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(model.probes)}
 
 
 def find_envelope(model: Model) -> dict[str, dict[str, np.ndarray]]:
     """Pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with their times [s]."""
-    envelope, found = model.tables[rec.I_ENVELOPE], {}
+    envelope, found = model.tables.envelope, {}
     for k, pipe in enumerate(model.pipes):
-        cells = model.tables[rec.I_PIPES][k]["cell"] + np.arange(pipe.cells)
+        cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
         least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))
         found[pipe.name] = {
             "distance": pipe.x, "elevation": pipe.elevation, "least_pressure": least, "t_least": envelope[1, cells],
@@ -168,9 +168,9 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
 
     ledger : float64[2, nodes]  what came in by each, and, negative, what went out
     """
-    kinds = model.tables[rec.I_NODES]["kind"]
+    kinds = model.tables.nodes["kind"]
     initial, change = model.contents(y)
-    passes = {int(row["node"]) for row in model.tables[rec.I_PATCHES] if row["open"]}
+    passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]  # that make up for it
     words = [("made_up", "spilled") if within else ("inflow", "outflow") for within in own]
     rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)

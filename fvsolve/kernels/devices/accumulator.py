@@ -9,7 +9,7 @@ from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density, log_density, pressure_of_log
-from fvsolve.kernels.records import I_FLOATS, I_LAYOUT, I_NODES, I_SETTINGS, LAW_LINEAR
+from fvsolve.kernels.records import LAW_LINEAR
 
 EXPONENT, GAS, ROOM, NECK, EMPTY, SHED = 0, 1, 2, 3, 4, 5  # numbers of an accumulator
 NUMBERS = 6
@@ -75,9 +75,9 @@ def gas_and_pressure_dense(st, floats, node, at, y):
 @njit
 def set_accumulator(y, out, tables, device):
     """Its pressure and stiffness."""
-    i, layout = device["node"], tables[I_LAYOUT][0]
-    node = tables[I_NODES][i]
-    st, floats = tables[I_SETTINGS][0], tables[I_FLOATS]
+    i, layout = device["node"], tables.layout[0]
+    node = tables.nodes[i]
+    st, floats = tables.settings[0], tables.floats
     _, change, stiffness = gas_and_pressure(st, floats, node, device["data"], y[node["y"]])
     out[layout["pressure"] + i] = change
     out[layout["stiffness"] + node["row"]] = stiffness
@@ -86,15 +86,15 @@ def set_accumulator(y, out, tables, device):
 @njit
 def accumulator_events(y, tables, device, g):
     """g: fluid left until the bladder or vessel is empty [kg], and the same negative."""
-    left = y[tables[I_NODES][device["node"]]["y"]] - tables[I_FLOATS][device["data"] + EMPTY]
+    left = y[tables.nodes[device["node"]]["y"]] - tables.floats[device["data"] + EMPTY]
     g[device["event"]], g[device["event"] + 1] = left, -left
 
 
 @njit
 def accumulator_value(y, tables, device, which):
     """Gas volume [m3], gas pressure [Pa]."""
-    node = tables[I_NODES][device["node"]]
-    st, floats = tables[I_SETTINGS][0], tables[I_FLOATS]
+    node = tables.nodes[device["node"]]
+    st, floats = tables.settings[0], tables.floats
     at, came = device["data"], y[node["y"]]
     u, change, _ = gas_and_pressure(st, floats, node, at, came)
     if floats[at + NECK] > 0.0 and came < floats[at + EMPTY]:  # the bladder stands in its neck, and holds its precharge

@@ -6,7 +6,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.devices.accumulator import EMPTY, EXPONENT, GAS, NECK, ROOM, SHED, gas_and_pressure
 from fvsolve.kernels.energy import lift
 from fvsolve.kernels.energy_barotropic import head_at, vessel_energy
-from fvsolve.kernels.records import I_FLOATS, I_LAYOUT, I_NODES, I_SETTINGS, LAW_LINEAR
+from fvsolve.kernels.records import LAW_LINEAR
 
 
 @njit
@@ -39,16 +39,16 @@ def accumulator_energy(st, floats, node, at, y):
 @njit
 def accumulator_stored(y, tables, device):
     """What it stores, change since the profile [J]."""
-    node = tables[I_NODES][device["node"]]
-    return accumulator_energy(tables[I_SETTINGS][0], tables[I_FLOATS], node, device["data"], y[node["y"]])
+    node = tables.nodes[device["node"]]
+    return accumulator_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]])
 
 
 @njit
 def vessel_power(dydt, out, tables, device):
     """Rate of what a vessel stores [W]: what a mass brings, P / rho or h(p) - h(p_ambient) + g z, times its flow."""
-    i, nodes = device["node"], tables[I_NODES]
-    p = nodes[i]["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + i]
-    return head_at(tables[I_SETTINGS][0], tables[I_FLOATS], nodes[i], p) * dydt[nodes[i]["y"]]
+    i, nodes = device["node"], tables.nodes
+    p = nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i]
+    return head_at(tables.settings[0], tables.floats, nodes[i], p) * dydt[nodes[i]["y"]]
 
 
 @njit

@@ -10,16 +10,7 @@ from math import expm1, log1p, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.records import (
-    I_ARMED,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_SETTINGS,
-    I_VALVES,
-    LAW_LINEAR,
-    RATE,
-)
+from fvsolve.kernels.records import LAW_LINEAR, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
 
@@ -72,8 +63,8 @@ def air_inflow(st, floats, at, gauge):
 @njit
 def set_air_valve(y, out, tables, device):
     """Pressure and stiffness of its chamber, and whether fluid passes."""
-    st, floats, layout, i = tables[I_SETTINGS][0], tables[I_FLOATS], tables[I_LAYOUT][0], device["node"]
-    node, k = tables[I_NODES][i], device["valve"]
+    st, floats, layout, i = tables.settings[0], tables.floats, tables.layout[0], device["node"]
+    node, k = tables.nodes[i], device["valve"]
     gauge, volume, _ = air_state(st, floats, node, device["data"], y[node["y"]], y[device["y"]])
     change = gauge
     if st["law"] != LAW_LINEAR and gauge != 0.0:  # so that H dm is (p_air - p_ambient) dV
@@ -81,20 +72,20 @@ def set_air_valve(y, out, tables, device):
         change = pressure_of_enthalpy(st, floats, base + gauge / node["density"]) - st["ambient"]
     out[layout["pressure"] + i] = change
     out[layout["stiffness"] + node["row"]] = (st["ambient"] + gauge) / (volume * node["density"])
-    is_open = tables[I_ARMED][device["event"]] > 0.0
-    out[layout["conductance"] + k] = tables[I_VALVES][k]["conductance"] if is_open else 0.0
+    is_open = tables.armed[device["event"]] > 0.0
+    out[layout["conductance"] + k] = tables.valves[k]["conductance"] if is_open else 0.0
 
 
 @njit
 def air_rate(y, tables, device):
     """(d/dt of the air in its chamber [kg/s], how quick that is [1/s], R T ln(p / p_ambient) [J/kg])."""
-    st, floats, at = tables[I_SETTINGS][0], tables[I_FLOATS], device["data"]
-    node = tables[I_NODES][device["node"]]
+    st, floats, at = tables.settings[0], tables.floats, device["data"]
+    node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
     flow, slope = air_inflow(st, floats, at, gauge)
     even = st["ambient"] * volume / floats[at + HEAT]  # mass at which it would be at ambient pressure
     quick = slope / min(mass, even)
-    if tables[I_ARMED][device["event"]] <= 0.0 and abs(flow) * LINGER >= abs(even - mass):
+    if tables.armed[device["event"]] <= 0.0 and abs(flow) * LINGER >= abs(even - mass):
         flow, quick = (even - mass) / LINGER, 1.0 / LINGER
     return flow, quick, floats[at + HEAT] * log1p(gauge / st["ambient"])
 
@@ -111,9 +102,9 @@ def move_air_valve(y, dydt, out, tables, device):
 @njit
 def fluid_rate(out, tables, device):
     """How quickly fluid comes and goes in its chamber while open [1/s]: stiffness times all that joins the place."""
-    layout, nodes, valves, own = tables[I_LAYOUT][0], tables[I_NODES], tables[I_VALVES], device["valve"]
+    layout, nodes, valves, own = tables.layout[0], tables.nodes, tables.valves, device["valve"]
     place = valves[own]["from_node"]
-    if tables[I_ARMED][device["event"]] <= 0.0:
+    if tables.armed[device["event"]] <= 0.0:
         return 0.0
     total = nodes[place]["admittance"]
     for k in range(valves.size):
@@ -127,15 +118,15 @@ def fluid_rate(out, tables, device):
 @njit
 def air_valve_events(y, out, tables, device, g):
     """g: what is left until it opens [Pa], until it shuts, negative [kg]; and the same with the other sign."""
-    st, floats, at = tables[I_SETTINGS][0], tables[I_FLOATS], device["event"]
-    node, place = tables[I_NODES][device["node"]], tables[I_VALVES][device["valve"]]["from_node"]
+    st, floats, at = tables.settings[0], tables.floats, device["event"]
+    node, place = tables.nodes[device["node"]], tables.valves[device["valve"]]["from_node"]
     fluid = y[node["y"]]
     lax = LAX * node["density"] * floats[device["data"] + VOLUME]
     left = fluid - lax
-    if out[tables[I_LAYOUT][0]["valve"] + device["valve"]] <= 0.0:  # as full as when it shut, but fluid leaves
+    if out[tables.layout[0]["valve"] + device["valve"]] <= 0.0:  # as full as when it shut, but fluid leaves
         left = min(left, -lax)
-    if tables[I_ARMED][at] <= 0.0:
-        p = tables[I_NODES][place]["pressure"] + out[tables[I_LAYOUT][0]["pressure"] + place] - st["ambient"]
+    if tables.armed[at] <= 0.0:
+        p = tables.nodes[place]["pressure"] + out[tables.layout[0]["pressure"] + place] - st["ambient"]
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         left = p - min(gauge, 0.0) + RELUCTANCE
     either(tables, g, at, left)
@@ -144,7 +135,7 @@ def air_valve_events(y, out, tables, device, g):
 @njit
 def air_valve_value(y, tables, device, which):
     """Volume [m3], mass [kg] and pressure [Pa] of the air in its chamber."""
-    st, floats = tables[I_SETTINGS][0], tables[I_FLOATS]
-    node = tables[I_NODES][device["node"]]
+    st, floats = tables.settings[0], tables.floats
+    node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, device["data"], y[node["y"]], y[device["y"]])
     return volume if which == 0 else mass if which == 1 else st["ambient"] + gauge

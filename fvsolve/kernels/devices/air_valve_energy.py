@@ -5,7 +5,6 @@ from math import log1p
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.accumulator_energy import vessel_power
 from fvsolve.kernels.devices.air_valve import HEAT, air_rate, air_state
-from fvsolve.kernels.records import I_FLOATS, I_NODES, I_SETTINGS
 
 
 @njit
@@ -19,8 +18,8 @@ def air_energy(st, floats, node, at, y_fluid, y_air):
 @njit
 def air_stored(y, tables, device):
     """What it stores, change since the profile [J]."""
-    node = tables[I_NODES][device["node"]]
-    return air_energy(tables[I_SETTINGS][0], tables[I_FLOATS], node, device["data"], y[node["y"]], y[device["y"]])
+    node = tables.nodes[device["node"]]
+    return air_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]], y[device["y"]])
 
 
 @njit

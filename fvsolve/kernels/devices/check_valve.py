@@ -6,7 +6,7 @@ drop exceeds its cracking pressure. armed[event] says which: it changes on accep
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_NODES, I_VALVES, JUNCTION
+from fvsolve.kernels.records import JUNCTION
 from fvsolve.kernels.restrictions import head_drop
 
 RELUCTANCE = 1.0  # drop beyond the cracking pressure below which it stays shut: rounding must not open it [Pa]
@@ -15,14 +15,14 @@ RELUCTANCE = 1.0  # drop beyond the cracking pressure below which it stays shut:
 @njit
 def set_check_valve(out, tables, device):
     """Its conductance: whole, or none."""
-    k, shut = device["valve"], tables[I_ARMED][device["event"]] > 0.0
-    out[tables[I_LAYOUT][0]["conductance"] + k] = 0.0 if shut else tables[I_VALVES][k]["conductance"]
+    k, shut = device["valve"], tables.armed[device["event"]] > 0.0
+    out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
 def leads_on(tables, device):
     """Whether a place without storage lies at one of its ends: there others may hold the flow back, and it is open."""
-    valve, nodes = tables[I_VALVES][device["valve"]], tables[I_NODES]
+    valve, nodes = tables.valves[device["valve"]], tables.nodes
     return nodes[valve["from_node"]]["kind"] == JUNCTION or nodes[valve["to_node"]]["kind"] == JUNCTION
 
 
@@ -30,15 +30,15 @@ def leads_on(tables, device):
 def check_valve_events(out, tables, device, g):
     """g: flow that is left while open [kg/s], drop beyond what opens it while shut [Pa]; and the same negative."""
     k, at = device["valve"], device["event"]
-    left = out[tables[I_LAYOUT][0]["valve"] + k]
-    if left == 0.0 and tables[I_ARMED][at] == 0.0 and leads_on(tables, device):
+    left = out[tables.layout[0]["valve"] + k]
+    if left == 0.0 and tables.armed[at] == 0.0 and leads_on(tables, device):
         left = head_drop(tables, out, k)[1] + RELUCTANCE
-    if tables[I_ARMED][at] > 0.0:
-        left = head_drop(tables, out, k)[1] - tables[I_FLOATS][device["data"]] - RELUCTANCE
+    if tables.armed[at] > 0.0:
+        left = head_drop(tables, out, k)[1] - tables.floats[device["data"]] - RELUCTANCE
     either(tables, g, at, left)
 
 
 @njit
 def check_valve_value(out, tables, device):
     """1 while it is open, 0 while it is shut."""
-    return 1.0 if out[tables[I_LAYOUT][0]["conductance"] + device["valve"]] > 0.0 else 0.0
+    return 1.0 if out[tables.layout[0]["conductance"] + device["valve"]] > 0.0 else 0.0

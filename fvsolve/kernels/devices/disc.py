@@ -14,15 +14,7 @@ from fvsolve.kernels.devices.codes import RELIEF_DISC
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
 from fvsolve.kernels.devices.lead import lead_events, leads
-from fvsolve.kernels.records import (
-    CLOSING,
-    I_ARMED,
-    I_FLOATS,
-    I_LAYOUT,
-    I_NODES,
-    I_VALVES,
-    RATE,
-)
+from fvsolve.kernels.records import CLOSING, RATE
 from fvsolve.kernels.restrictions import head_drop
 
 LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6  # numbers: three of the start, then its keys
@@ -35,28 +27,28 @@ SLAM = 1e-9  # share of T or 1 / w in which a disc that is about to reach its se
 @njit
 def disc_lift(y, tables, device):
     """Lift x, beyond its stops by rounding at most."""
-    return tables[I_FLOATS][device["data"] + LIFT] + y[device["y"]]
+    return tables.floats[device["data"] + LIFT] + y[device["y"]]
 
 
 @njit
 def set_disc(y, out, tables, device):
     """Its conductance G x^2."""
     k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
-    out[tables[I_LAYOUT][0]["conductance"] + k] = tables[I_VALVES][k]["conductance"] * x * x
+    out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def disc_drive(y, out, tables, device):
     """target - x."""
     k = device["valve"]
-    before = out[tables[I_LAYOUT][0]["pressure"] + tables[I_VALVES][k]["from_node"]]
+    before = out[tables.layout[0]["pressure"] + tables.valves[k]["from_node"]]
     return disc_push(y, tables, device, before, head_drop(tables, out, k)[1])
 
 
 @njit
 def disc_push(y, tables, device, before, drop):
     """target - x, at p' before it and a drop across it."""
-    floats, data = tables[I_FLOATS], device["data"]
+    floats, data = tables.floats, device["data"]
     felt = before if device["kind"] == RELIEF_DISC else drop - floats[data + FELT]
     return (floats[data + TARGET] - floats[data + LIFT]) + felt / floats[data + SPAN] - y[device["y"]]
 
@@ -64,7 +56,7 @@ def disc_push(y, tables, device, before, drop):
 @njit
 def disc_speed(y, tables, device, before, drop):
     """dx/dt at p' before it and a drop across it, and d(dx/dt) / d(what it feels)."""
-    floats, armed, at, data = tables[I_FLOATS], tables[I_ARMED], device["event"], device["data"]
+    floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at] > 0.0 or armed[at + 2] > 0.0:
         return 0.0, 0.0
     if device["states"] == 2:
@@ -75,7 +67,7 @@ def disc_speed(y, tables, device, before, drop):
 @njit
 def disc_slope(tables, device):
     """d(dx/dt) / d(what it feels) [1/Pa/s]; none of a disc with inertia."""
-    floats, data = tables[I_FLOATS], device["data"]
+    floats, data = tables.floats, device["data"]
     return 1.0 / (floats[data + TIME] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
@@ -86,7 +78,7 @@ def move_disc(y, dydt, out, tables, device):
     And -x'/x where it closes on a column into out[CLOSING]: one that flows back slams it, x ~ (time left)^(1/3), which
     no step leads across.
     """
-    floats, armed, at, o = tables[I_FLOATS], tables[I_ARMED], device["event"], device["y"]
+    floats, armed, at, o = tables.floats, tables.armed, device["event"], device["y"]
     drive, held = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
     own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
@@ -98,7 +90,7 @@ def move_disc(y, dydt, out, tables, device):
     else:
         dydt[o] = 0.0 if held else y[o + 1]
         dydt[o + 1] = 0.0 if held else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
-    valve, nodes = tables[I_VALVES][device["valve"]], tables[I_NODES]
+    valve, nodes = tables.valves[device["valve"]], tables.nodes
     brakes = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
     if brakes and dydt[o] < 0.0 and not leads(tables, device["valve"]):
         out[CLOSING] = max(out[CLOSING], -dydt[o] / max(disc_lift(y, tables, device), 1e-300))
@@ -107,8 +99,8 @@ def move_disc(y, dydt, out, tables, device):
 @njit
 def disc_loop(y, out, tables, device, own):
     """Its rate with that of the places at its ends in the loop; where a column sets its flow, d dP / dx = -2 dP / x."""
-    k, speed, nodes = device["valve"], own / tables[I_FLOATS][device["data"] + SPAN], tables[I_NODES]
-    before, behind = tables[I_VALVES][k]["from_node"], tables[I_VALVES][k]["to_node"]
+    k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
+    before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
     if leads(tables, k):
         return own
     rate = own + loop_rate(out, tables, k, before, speed)
@@ -122,14 +114,14 @@ def disc_loop(y, out, tables, device, own):
 @njit
 def disc_events(y, out, tables, device, g):
     """g: way to its stop, to its seat, to where it leads no column any more; each both ways."""
-    armed, at, o = tables[I_ARMED], device["event"], device["y"]
+    armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
     stop, seat = -drive - AT_REST, drive - AT_REST
     if device["states"] == 1:
         down = AT_REST if armed[at + 4] > 0.0 else -SETTLED  # its column holds it back, as it did not on its seat
         onward, speed = (drive + down, drive + SETTLED), drive
     else:
-        speed = y[o + 1] / tables[I_FLOATS][device["data"] + SWING] + EARLY * drive
+        speed = y[o + 1] / tables.floats[device["data"] + SWING] + EARLY * drive
         onward = speed, speed
     if armed[at] == 0.0:
         stop = max(1.0 - x, -onward[1])

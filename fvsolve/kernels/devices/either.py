@@ -1,7 +1,6 @@
 """Which of two rules holds, as a pair of event functions. Knows flags; knows no law."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import I_ARMED
 
 LEAST = 1e-300
 
@@ -13,5 +12,5 @@ def either(tables, g, at, left):
     left : what is left of the rule that holds, below zero while armed[at]; it must leave zero where the rule changes.
     """
     if left == 0.0:
-        left = LEAST if tables[I_ARMED][at] > 0.0 else -LEAST
+        left = LEAST if tables.armed[at] > 0.0 else -LEAST
     g[at], g[at + 1] = left, -left

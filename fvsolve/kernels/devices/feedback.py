@@ -4,14 +4,14 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.network import stiffness_of
-from fvsolve.kernels.records import I_LAYOUT, I_NODES, I_VALVES, JUNCTION
+from fvsolve.kernels.records import JUNCTION
 from fvsolve.kernels.restrictions import head_drop, restriction_slope
 
 
 @njit
 def yielding(tables, i):
     """Rise of the pressure at a node without storage for a flow into it [Pa s/kg]; 0 of others."""
-    node = tables[I_NODES][i]
+    node = tables.nodes[i]
     return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
 
 
@@ -21,9 +21,9 @@ def loop_rate(out, tables, k, i, speed):
 
     p' follows dM/dx, sqrt(G dP) less what its own drop gives way, through pipes or through stored mass.
     """
-    layout, valve = tables[I_LAYOUT][0], tables[I_VALVES][k]
+    layout, valve = tables.layout[0], tables.valves[k]
     drop = head_drop(tables, out, k)[1]
     soft = yielding(tables, valve["from_node"]) + yielding(tables, valve["to_node"])
     gain = speed * sqrt(valve["conductance"] * abs(drop)) / (1.0 + soft * restriction_slope(tables, out, k, drop))
-    stiff = stiffness_of(tables[I_NODES], layout, out, i) if tables[I_NODES][i]["kind"] != JUNCTION else 0.0
+    stiff = stiffness_of(tables.nodes, layout, out, i) if tables.nodes[i]["kind"] != JUNCTION else 0.0
     return max(gain * yielding(tables, i), sqrt(gain * stiff))

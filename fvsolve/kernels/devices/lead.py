@@ -9,7 +9,6 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.codes import CHECK_DISC, REDUCING, RELIEF_DISC, SUSTAINING
 from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.records import I_ARMED, I_COLUMNS, I_DEVICES, I_NODES, I_SETTINGS, I_VALVES
 from fvsolve.kernels.restrictions import head_drop
 
 LEADS = 1e-4  # lift up to which it leads its column, at least
@@ -36,10 +35,10 @@ def lead_flag(device):
 @njit
 def leads(tables, k):
     """Whether restriction k leads the rigid column which it alone holds."""
-    if tables[I_VALVES][k]["device"] < 0:
+    if tables.valves[k]["device"] < 0:
         return False
-    device = tables[I_DEVICES][tables[I_VALVES][k]["device"]]
-    return (is_disc(device) or is_stem(device)) and tables[I_ARMED][lead_flag(device)] > 0.0
+    device = tables.devices[tables.valves[k]["device"]]
+    return (is_disc(device) or is_stem(device)) and tables.armed[lead_flag(device)] > 0.0
 
 
 @njit
@@ -48,10 +47,10 @@ def led_until(out, tables, device, speed):
 
     speed : d(dx/dt) / d(drop) [1/Pa/s].
     """
-    valve, columns, most = tables[I_VALVES][device["valve"]], tables[I_COLUMNS], 0.0
+    valve, columns, most = tables.valves[device["valve"]], tables.columns, 0.0
     for k in range(columns.size):
         for i in (columns[k]["from_node"], columns[k]["to_node"]):
-            joined, node = i == valve["from_node"] or i == valve["to_node"], tables[I_NODES][i]
+            joined, node = i == valve["from_node"] or i == valve["to_node"], tables.nodes[i]
             if joined and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
                 most = max(most, led_beside(out, tables, device, columns[k]["area"] / columns[k]["length"], speed))
     return most
@@ -64,15 +63,15 @@ def led_beside(out, tables, device, yielding, speed):
     Its rate is (2 dP / x) (speed + (A / L) / sqrt(G dP)).
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
-    rate = 2.0 * root * (root * speed + yielding / sqrt(tables[I_VALVES][device["valve"]]["conductance"]))
-    return max(LEADS, 2.0 * tables[I_SETTINGS][0]["step"] * rate)
+    rate = 2.0 * root * (root * speed + yielding / sqrt(tables.valves[device["valve"]]["conductance"]))
+    return max(LEADS, 2.0 * tables.settings[0]["step"] * rate)
 
 
 @njit
 def lead_events(out, tables, device, g, x, share, speed):
     """g: way to a lift x at which it leads no column any more; to this share of it, where it takes the lead, if any."""
     at, most = lead_flag(device), led_until(out, tables, device, speed)
-    if tables[I_ARMED][at] > 0.0:
+    if tables.armed[at] > 0.0:
         either(tables, g, at, x - most)
     else:
         either(tables, g, at, x - share * most if share * most > 0.0 else 1.0)

@@ -12,14 +12,7 @@ from fvsolve.kernels.curves import COUNT, LAST, LAW, OWN, SCALE, SUTER, curve_he
 from fvsolve.kernels.devices.check_valve import RELUCTANCE
 from fvsolve.kernels.devices.codes import PASSING
 from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.records import (
-    I_ARMED,
-    I_FLOATS,
-    I_LAYOUT,
-    I_SETTINGS,
-    I_VALVES,
-    RATE,
-)
+from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
 
@@ -38,13 +31,13 @@ OUTSIDE = 1e-6  # share of a flow that is not yet outside the curve
 @njit
 def tripped(t, tables, device):
     """Whether the motor no longer holds the speed; a step that ends at the trip has not yet tripped."""
-    return schedule_value(tables, int(tables[I_FLOATS][device["data"] + TRIP]), t) > 0.0
+    return schedule_value(tables, int(tables.floats[device["data"] + TRIP]), t) > 0.0
 
 
 @njit
 def pump_speed(t, y, tables, device):
     """Relative speed."""
-    floats, at = tables[I_FLOATS], device["data"]
+    floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
         return schedule_value(tables, device["schedule"], t)
@@ -54,16 +47,16 @@ def pump_speed(t, y, tables, device):
 @njit
 def set_pump(t, y, out, tables, device):
     """Its speed, and whether its check valve lets anything pass."""
-    layout, k, floats = tables[I_LAYOUT][0], device["valve"], tables[I_FLOATS]
-    shut = floats[device["data"] + CHECK] > 0.0 and tables[I_ARMED][device["event"]] > 0.0
+    layout, k, floats = tables.layout[0], device["valve"], tables.floats
+    shut = floats[device["data"] + CHECK] > 0.0 and tables.armed[device["event"]] > 0.0
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
-    out[layout["conductance"] + k] = 0.0 if shut else tables[I_VALVES][k]["conductance"]
+    out[layout["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
 def pump_point(out, tables, device):
     """(relative speed, flow [m3/s], density [kg/m3]) of a pump whose nodes are closed."""
-    layout, k = tables[I_LAYOUT][0], device["valve"]
+    layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     return out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho
 
@@ -72,8 +65,8 @@ def pump_point(out, tables, device):
 def pump_torque(out, tables, device):
     """Torque that the fluid asks of the shaft [N m]."""
     n, q, rho = pump_point(out, tables, device)
-    curve, dense = tables[I_VALVES][device["valve"]]["data"], rho / tables[I_SETTINGS][0]["rho"]
-    return fluid_torque(tables[I_FLOATS], device["data"], curve, n, q, dense)
+    curve, dense = tables.valves[device["valve"]]["data"], rho / tables.settings[0]["rho"]
+    return fluid_torque(tables.floats, device["data"], curve, n, q, dense)
 
 
 @njit
@@ -93,7 +86,7 @@ def fluid_torque(floats, at, curve, n, q, dense):
 @njit
 def move_pump(t, dydt, out, tables, device):
     """d/dt of the relative speed of a shaft that runs free, and its rate."""
-    floats, at = tables[I_FLOATS], device["data"]
+    floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED:
         return
@@ -114,7 +107,7 @@ def move_pump(t, dydt, out, tables, device):
 @njit
 def given_torque(t, tables, device, change):
     """Sum of the torques given to the shaft, or its `change` since the start [N m]."""
-    floats, total = tables[I_FLOATS], 0.0
+    floats, total = tables.floats, 0.0
     for k in range(int(floats[device["data"] + GIVEN])):
         own = device["data"] + OWN_NUMBERS + 2 * k
         total += schedule_value(tables, int(floats[own]), t) - (floats[own + 1] if change else 0.0)
@@ -124,7 +117,7 @@ def given_torque(t, tables, device, change):
 @njit
 def shaft_rate(out, tables, device, torque):
     """Greatest rate at which the fluid brakes a free shaft [1/s]."""
-    floats, at, curve = tables[I_FLOATS], device["data"], tables[I_VALVES][device["valve"]]["data"]
+    floats, at, curve = tables.floats, device["data"], tables.valves[device["valve"]]["data"]
     n, q, _ = pump_point(out, tables, device)
     if floats[curve + LAW] == SUTER:
         return (
@@ -138,10 +131,10 @@ def shaft_rate(out, tables, device, torque):
 @njit
 def pump_powers(t, y, dydt, out, tables, device):
     """Power given to the shaft, rate of what it stores, power that the fluid takes from it [W]."""
-    floats, at = tables[I_FLOATS], device["data"]
+    floats, at = tables.floats, device["data"]
     if floats[at + KNOWN] == 0.0:
         return 0.0, 0.0, 0.0
-    n = out[tables[I_LAYOUT][0]["drive"] + device["valve"]]
+    n = out[tables.layout[0]["drive"] + device["valve"]]
     omega, mode = n * floats[at + RATED], floats[at + MODE]
     taken = pump_torque(out, tables, device) * omega
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
@@ -153,7 +146,7 @@ def pump_powers(t, y, dydt, out, tables, device):
 @njit
 def shaft_energy(y, tables, device):
     """Energy of a free shaft, change since it was let go [J]."""
-    floats, at = tables[I_FLOATS], device["data"]
+    floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return 0.0
     n = y[device["y"]]
@@ -169,26 +162,26 @@ def unreversed(valve):
 @njit
 def pump_events(out, tables, device, g):
     """g of its check valve: flow left while open [kg/s], drop that opens it while shut [Pa]; and the same negative."""
-    layout, k, at = tables[I_LAYOUT][0], device["valve"], device["event"]
-    valve, floats = tables[I_VALVES][k], tables[I_FLOATS]
+    layout, k, at = tables.layout[0], device["valve"], device["event"]
+    valve, floats = tables.valves[k], tables.floats
     g[at], g[at + 1] = 1.0, 1.0
     if floats[device["data"] + CHECK] == 0.0:
         return
     left = out[layout["valve"] + k] + unreversed(valve)
-    if tables[I_ARMED][at] > 0.0:
+    if tables.armed[at] > 0.0:
         rho, drop = head_drop(tables, out, k)
         most = curve_head(floats, valve["data"], out[layout["drive"] + k], 0.0)[0]
-        left = drop + rho * tables[I_SETTINGS][0]["gravity"] * most - RELUCTANCE
+        left = drop + rho * tables.settings[0]["gravity"] * most - RELUCTANCE
     either(tables, g, at, left)
 
 
 @njit
 def pump_value(out, tables, device, which):
     """Its head [m], relative speed, torque of the fluid [N m], power at the shaft [W]."""
-    floats = tables[I_FLOATS]
+    floats = tables.floats
     n, q, _ = pump_point(out, tables, device)
     if which == 0:
-        return curve_head(floats, tables[I_VALVES][device["valve"]]["data"], n, q)[0]
+        return curve_head(floats, tables.valves[device["valve"]]["data"], n, q)[0]
     if which == 1:
         return n
     torque = pump_torque(out, tables, device)
@@ -201,14 +194,14 @@ def pump_outside(out, tables, device):
 
     PASSING where it runs down behind a check valve: slower than at the start, forward, by a flow its curve then held.
     """
-    floats, curve = tables[I_FLOATS], tables[I_VALVES][device["valve"]]["data"]
+    floats, curve = tables.floats, tables.valves[device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:
         return 0
     n, q, _ = pump_point(out, tables, device)
     slack, last, begun = (
         OUTSIDE * floats[curve + SCALE],
         floats[curve + LAST],
-        tables[I_VALVES][device["valve"]]["drive"],
+        tables.valves[device["valve"]]["drive"],
     )
     if -slack <= q <= max(n, 0.0) * last + slack:
         return 0

@@ -12,7 +12,7 @@ from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
 from fvsolve.kernels.devices.lead import is_stem, lead_events, leads
-from fvsolve.kernels.records import I_ARMED, I_FLOATS, I_LAYOUT, I_NODES, I_VALVES, RATE
+from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
 
@@ -27,21 +27,21 @@ RELUCTANCE = 1e-3  # drop below which it stays shut against reversed flow [Pa]
 @njit
 def regulator_opening(y, tables, device):
     """Stem position x, beyond its stops by rounding at most."""
-    return tables[I_FLOATS][device["data"] + OPENING] + y[device["y"]]
+    return tables.floats[device["data"] + OPENING] + y[device["y"]]
 
 
 @njit
 def set_regulator(y, out, tables, device):
     """Its conductance G x^2; none while it holds back reversed flow."""
     k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
-    back = tables[I_ARMED][device["event"]] > 0.0
-    out[tables[I_LAYOUT][0]["conductance"] + k] = 0.0 if back else tables[I_VALVES][k]["conductance"] * x * x
+    back = tables.armed[device["event"]] > 0.0
+    out[tables.layout[0]["conductance"] + k] = 0.0 if back else tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def stem_speed(t, tables, device, before, behind):
     """dx/dt of one that a pressure moves, at p' before it and behind it, and d(dx/dt) / d(what it senses)."""
-    floats, armed, at, data = tables[I_FLOATS], tables[I_ARMED], device["event"], device["data"]
+    floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at + 2] > 0.0 or armed[at + 4] > 0.0:
         return 0.0, 0.0
     change, slope = schedule_value(tables, device["schedule"], t) - floats[data + SET], 1.0 / stroke(tables, device)
@@ -52,14 +52,14 @@ def stem_speed(t, tables, device, before, behind):
 @njit
 def stroke(tables, device):
     """Band times time constant: dx/dt = error / stroke."""
-    return tables[I_FLOATS][device["data"] + BAND] * tables[I_FLOATS][device["data"] + TIME]
+    return tables.floats[device["data"] + BAND] * tables.floats[device["data"] + TIME]
 
 
 @njit
 def regulator_error(t, out, tables, device):
     """What asks it to open, as a share of its band: set less sensed, but sensed less set where it sustains."""
-    layout, floats, data = tables[I_LAYOUT][0], tables[I_FLOATS], device["data"]
-    valve = tables[I_VALVES][device["valve"]]
+    layout, floats, data = tables.layout[0], tables.floats, device["data"]
+    valve = tables.valves[device["valve"]]
     change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
     if device["kind"] == FLOW_CONTROL:
         change -= out[layout["valve"] + device["valve"]] - valve["flow"]
@@ -76,8 +76,8 @@ def move_regulator(t, y, dydt, out, tables, device):
     out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
-    armed, at = tables[I_ARMED], device["event"]
-    rate = regulator_error(t, out, tables, device) / tables[I_FLOATS][device["data"] + TIME]
+    armed, at = tables.armed, device["event"]
+    rate = regulator_error(t, out, tables, device) / tables.floats[device["data"] + TIME]
     dydt[device["y"]] = 0.0 if armed[at + 2] > 0.0 or armed[at + 4] > 0.0 else rate
 
 
@@ -87,9 +87,9 @@ def regulator_rate(y, out, tables, device):
     k, speed = device["valve"], 1.0 / stroke(tables, device)
     drop = abs(head_drop(tables, out, k)[1])
     if not is_stem(device):
-        return speed * sqrt(tables[I_VALVES][k]["conductance"] * drop)
-    end = tables[I_VALVES][k]["to_node"] if device["kind"] == REDUCING else tables[I_VALVES][k]["from_node"]
-    if tables[I_NODES][end]["gates"] < 0:
+        return speed * sqrt(tables.valves[k]["conductance"] * drop)
+    end = tables.valves[k]["to_node"] if device["kind"] == REDUCING else tables.valves[k]["from_node"]
+    if tables.nodes[end]["gates"] < 0:
         return loop_rate(out, tables, k, end, speed)
     return 0.0 if leads(tables, k) else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
 
@@ -97,7 +97,7 @@ def regulator_rate(y, out, tables, device):
 @njit
 def regulator_events(t, y, out, tables, device, g):
     """g: flow that is left or drop beyond what opens it, way to full opening, way to its seat; each both ways."""
-    layout, armed = tables[I_LAYOUT][0], tables[I_ARMED]
+    layout, armed = tables.layout[0], tables.armed
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
     drop, back = head_drop(tables, out, device["valve"])[1], 1.0
     if device["kind"] != FLOW_CONTROL:

@@ -6,7 +6,6 @@ armed[event + 2] that it is fully open: these change on accepted states alone, s
 
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.records import I_ARMED, I_LAYOUT, I_VALVES
 from fvsolve.kernels.restrictions import pressure_lift
 
 RELUCTANCE = 1e-10  # of lift, beyond which it changes: rounding must not open it
@@ -15,8 +14,8 @@ RELUCTANCE = 1e-10  # of lift, beyond which it changes: rounding must not open i
 @njit
 def set_relief(out, tables, device):
     """Its conductance G, of which x^2 is used; none where it is shut."""
-    k, shut = device["valve"], tables[I_ARMED][device["event"]] > 0.0
-    out[tables[I_LAYOUT][0]["conductance"] + k] = 0.0 if shut else tables[I_VALVES][k]["conductance"]
+    k, shut = device["valve"], tables.armed[device["event"]] > 0.0
+    out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
@@ -31,7 +30,7 @@ def relief_events(out, tables, device, g):
 
     From shut to fully open it lifts first: a jump may ask for either end in the law of the other, and not stay there.
     """
-    armed, at, x = tables[I_ARMED], device["event"], pressure_lift(tables, out, device["valve"])
+    armed, at, x = tables.armed, device["event"], pressure_lift(tables, out, device["valve"])
     left, missing = x, 1.0 - x
     if armed[at] > 0.0:
         left, missing = x - RELUCTANCE, 1.0

@@ -3,16 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.devices.codes import PASSING
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import (
-    DEVICE_VALUE,
-    I_COLUMNS,
-    I_DEVICES,
-    I_MARKS,
-    I_NODES,
-    I_PIPES,
-    I_PISTONS,
-    I_PROBES,
-)
+from fvsolve.kernels.records import DEVICE_VALUE
 
 KIND = -1
 DEVICE = 3  # rows of `power` a device
@@ -22,8 +13,8 @@ DEVICE = 3  # rows of `power` a device
 def before(t, y, dydt, out, handle):
     """Before nodes are closed: conductances, speeds, pressures and stiffness that devices set, from (t, y) alone."""
     tables = open_tables(handle)
-    for k in range(tables[I_DEVICES].size):
-        device = tables[I_DEVICES][k]
+    for k in range(tables.devices.size):
+        device = tables.devices[k]
         if device["kind"] == KIND:
             ...  # each: set
 
@@ -32,8 +23,8 @@ def before(t, y, dydt, out, handle):
 def after(t, y, dydt, out, handle):
     """d/dt of what devices hold, where dydt is asked for, and their greatest rates into out[RATE]."""
     tables = open_tables(handle)
-    for k in range(tables[I_DEVICES].size):
-        device = tables[I_DEVICES][k]
+    for k in range(tables.devices.size):
+        device = tables.devices[k]
         if device["kind"] == KIND:
             ...  # each: move
 
@@ -42,8 +33,8 @@ def after(t, y, dydt, out, handle):
 def events(t, y, out, handle, g):
     """Event functions of devices, from a state whose nodes are closed."""
     tables = open_tables(handle)
-    for k in range(tables[I_DEVICES].size):
-        device = tables[I_DEVICES][k]
+    for k in range(tables.devices.size):
+        device = tables.devices[k]
         if device["kind"] == KIND:
             ...  # each: events
 
@@ -52,10 +43,10 @@ def events(t, y, out, handle, g):
 def observe(t, y, out, handle, values):
     """Values of the probes that read devices."""
     tables = open_tables(handle)
-    probes = tables[I_PROBES]
+    probes = tables.probes
     for k in range(probes.size):
         if probes[k]["kind"] == DEVICE_VALUE:
-            device, which = tables[I_DEVICES][probes[k]["index"]], probes[k]["side"]  # noqa: F841
+            device, which = tables.devices[probes[k]["index"]], probes[k]["side"]  # noqa: F841
             if device["kind"] == KIND:
                 ...  # each: values[k] = value
 
@@ -64,8 +55,8 @@ def observe(t, y, out, handle, values):
 def record(t, y, out, handle, values):
     """The first time that each device works where its law is not to be trusted, and where that passes by itself."""
     tables = open_tables(handle)
-    marks, devices = tables[I_MARKS], tables[I_DEVICES]
-    first = tables[I_PIPES].size + 3 * tables[I_NODES].size + tables[I_COLUMNS].size + tables[I_PISTONS].size
+    marks, devices = tables.marks, tables.devices
+    first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size + tables.pistons.size
     for k in range(devices.size):
         device, beyond = devices[k], 0
         if device["kind"] == KIND:
@@ -79,7 +70,7 @@ def record(t, y, out, handle, values):
 def power(t, y, dydt, out, handle, power):
     """Rows of devices, the last of `power` [W]: supplied, rate of what is stored, dissipated."""
     tables = open_tables(handle)
-    devices = tables[I_DEVICES]
+    devices = tables.devices
     first = power.size - DEVICE * devices.size
     for k in range(devices.size):
         device, rows = devices[k], power[first + DEVICE * k : first + DEVICE * (k + 1)]
@@ -92,7 +83,7 @@ def power(t, y, dydt, out, handle, power):
 def stored(t, y, dydt, out, handle, stored):
     """Rows of devices, the last of `stored`, changes since the profile [J]."""
     tables = open_tables(handle)
-    devices = tables[I_DEVICES]
+    devices = tables.devices
     first = stored.size - devices.size
     for k in range(devices.size):
         device = devices[k]

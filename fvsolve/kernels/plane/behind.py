@@ -1,7 +1,6 @@
 """Cells behind a patch: what each counts by in what passes it. Knows cells and faces; knows no network."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import I_BASINS, I_INTEGERS, I_PLANE
 
 SHALLOW = 1e-3  # depth behind a patch below which no more than a share of what is asked can leave [m]
 HARDLY = 1e-9  # volume behind a patch, over its area, below which its surface turns to the lowest one's [m]
@@ -36,9 +35,9 @@ def weight(plane, basin, leaves, i, y):
 @njit
 def counted(tables, patch, leaves, y):
     """Sum of area times `weight` of the cells behind a patch [m3], never nothing."""
-    basin, plane, total = tables[I_BASINS][patch["basin"]], tables[I_PLANE], 0.0
+    basin, plane, total = tables.basins[patch["basin"]], tables.plane, 0.0
     for m in range(patch["count"]):
-        i = tables[I_INTEGERS][patch["first"] + m]
+        i = tables.integers[patch["first"] + m]
         total += plane[basin["area"] + i] * weight(plane, basin, leaves, i, y)
     return max(total, HARDLY * patch["area"])
 
@@ -46,7 +45,7 @@ def counted(tables, patch, leaves, y):
 @njit
 def through_patch(tables, patch):
     """What flows in through all faces of a patch."""
-    through, total = tables[I_BASINS][patch["basin"]]["through"], 0.0
+    through, total = tables.basins[patch["basin"]]["through"], 0.0
     for m in range(patch["faces"]):
-        total += tables[I_PLANE][through + tables[I_INTEGERS][patch["ring"] + m]]
+        total += tables.plane[through + tables.integers[patch["ring"] + m]]
     return total

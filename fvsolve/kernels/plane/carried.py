@@ -11,21 +11,7 @@ from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import THIN
 from fvsolve.kernels.plane.behind import counted, through_patch, weight
 from fvsolve.kernels.plane.diffusion import add_decay
-from fvsolve.kernels.records import (
-    CELL_SCALAR,
-    GIVEN_FLOW,
-    I_BASINS,
-    I_FLOATS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_PATCHES,
-    I_PLANE,
-    I_PROBES,
-    I_SCALARS,
-    I_SETTINGS,
-    SHALLOW_FACES,
-)
+from fvsolve.kernels.records import CELL_SCALAR, GIVEN_FLOW, SHALLOW_FACES
 from fvsolve.kernels.schedules import schedule_value
 
 LEAST = 1e-12  # what a dry cell counts by in the value at a patch [m]
@@ -36,7 +22,7 @@ def depth_at(tables, basin, y, i):
     """Depth of a cell that an amount is spread over."""
     if basin["kind"] > SHALLOW_FACES:
         return 1.0
-    return max(tables[I_PLANE][basin["plan"] + i] + y[basin["y"] + i], 0.0)
+    return max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
 
 
 @njit
@@ -49,16 +35,16 @@ def cell_value(tables, basin, q, y, i):
 def patch_values(t, y, dydt, out, handle):
     """Value of every scalar at every patch: the mean of what leaves the cells behind it, or of dry ones by area."""
     tables = open_tables(handle)
-    nodes, value = tables[I_NODES].size, tables[I_LAYOUT][0]["value"]
-    for k in range(tables[I_PATCHES].size):
-        patch = tables[I_PATCHES][k]
-        basin = tables[I_BASINS][patch["basin"]]
-        for q in range(tables[I_SCALARS].size):
+    nodes, value = tables.nodes.size, tables.layout[0]["value"]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        for q in range(tables.scalars.size):
             water, total, held = basin["kind"] <= SHALLOW_FACES, 0.0, 0.0
             for m in range(patch["count"]):
-                i = tables[I_INTEGERS][patch["first"] + m]
-                part = tables[I_PLANE][basin["area"] + i]
-                part *= max(weight(tables[I_PLANE], basin, True, i, y), LEAST) if water else 1.0
+                i = tables.integers[patch["first"] + m]
+                part = tables.plane[basin["area"] + i]
+                part *= max(weight(tables.plane, basin, True, i, y), LEAST) if water else 1.0
                 total, held = total + part, held + part * cell_value(tables, basin, q, y, i)
             out[value + q * nodes + patch["node"]] = held / total
 
@@ -67,23 +53,23 @@ def patch_values(t, y, dydt, out, handle):
 def observe_values(t, y, out, handle, values):
     """values[k] of every probe of a scalar at a point of a basin."""
     tables = open_tables(handle)
-    for k in range(tables[I_PROBES].size):
-        probe = tables[I_PROBES][k]
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
         if probe["kind"] == CELL_SCALAR:
             values[k] = 0.0
             for m in range(probe["count"]):
-                i, weight = tables[I_INTEGERS][probe["cell"] + m], tables[I_FLOATS][probe["weights"] + m]
-                values[k] += weight * cell_value(tables, tables[I_BASINS][probe["index"]], probe["scalar"], y, i)
+                i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+                values[k] += weight * cell_value(tables, tables.basins[probe["index"]], probe["scalar"], y, i)
 
 
 @njit
 def observe_given_flows(t, y, out, handle, values):
     """values[k] of every probe of what a given velocity brings in through a patch [m3/s]."""
     tables = open_tables(handle)
-    for k in range(tables[I_PROBES].size):
-        if tables[I_PROBES][k]["kind"] == GIVEN_FLOW:
-            patch = tables[I_PATCHES][tables[I_PROBES][k]["index"]]
-            basin, values[k] = tables[I_BASINS][patch["basin"]], 0.0
+    for k in range(tables.probes.size):
+        if tables.probes[k]["kind"] == GIVEN_FLOW:
+            patch = tables.patches[tables.probes[k]["index"]]
+            basin, values[k] = tables.basins[patch["basin"]], 0.0
             if patch["open"] == 1:
                 values[k] = turned(t, basin) * basin["thickness"] * through_patch(tables, patch)
 
@@ -91,26 +77,26 @@ def observe_given_flows(t, y, out, handle, values):
 @njit
 def put_outside(t, tables, patch, basin, q):
     """Fill the values of a scalar beyond the faces of a patch, its initial one where nothing is said."""
-    schedule = tables[I_INTEGERS][patch["values"] + q]
-    value = tables[I_SCALARS][q]["initial"]
+    schedule = tables.integers[patch["values"] + q]
+    value = tables.scalars[q]["initial"]
     if schedule >= 0:
         value = schedule_value(tables, schedule, t)
     for m in range(patch["faces"]):
-        k = tables[I_INTEGERS][patch["ring"] + m]
-        tables[I_PLANE][basin["outside"] + q * basin["outer"] + k] = value
+        k = tables.integers[patch["ring"] + m]
+        tables.plane[basin["outside"] + q * basin["outer"] + k] = value
 
 
 @njit
 def made_ready(t, tables, b, y):
     """Depths and values beyond the boundary of a basin, for its scalars."""
-    plane, basin, patches = tables[I_PLANE], tables[I_BASINS][b], tables[I_PATCHES]
+    plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at = basin["n"], basin["y"], basin["plan"]
     if basin["kind"] <= SHALLOW_FACES:
         depth, rest, change = plane[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
         for i in range(n):
             depth[i] = max(rest[i] + change[i], 0.0)
     for p in range(patches.size):
-        for q in range(tables[I_SCALARS].size if patches[p]["basin"] == b else 0):
+        for q in range(tables.scalars.size if patches[p]["basin"] == b else 0):
             put_outside(t, tables, patches[p], basin, q)
 
 
@@ -130,14 +116,14 @@ def deep(basin):
 def settle_amounts(t, y, dydt, out, handle):
     """Add what decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
     tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
+    plane = tables.plane
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
         n, depth = basin["n"], plane[basin["toil"] : basin["toil"] + deep(basin)]
-        per = tables[I_SETTINGS][0]["rho"]
+        per = tables.settings[0]["rho"]
         if basin["kind"] > SHALLOW_FACES:
             per = basin["density"] * basin["thickness"]
-        for q in range(tables[I_SCALARS].size if basin["carried"] >= 0 else 0):
+        for q in range(tables.scalars.size if basin["carried"] >= 0 else 0):
             at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
             outside, s, rate = plane[ring : ring + basin["outer"]], y[at : at + n], dydt[at : at + n]
             settle(tables, b, basin, q, turned(t, basin), per, depth, outside, y, s, rate, out)
@@ -146,11 +132,11 @@ def settle_amounts(t, y, dydt, out, handle):
 @njit
 def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
     """Add to rates what decays and what links bring; book these, and what passes the boundary."""
-    scalar, patches, n = tables[I_SCALARS][q], tables[I_PATCHES], basin["n"]
+    scalar, patches, n = tables.scalars[q], tables.patches, basin["n"]
     if basin["through"] >= 0:
         book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
     if scalar["decay"] > 0.0:
-        area = tables[I_PLANE][basin["area"] : basin["area"] + n]
+        area = tables.plane[basin["area"] : basin["area"] + n]
         for i in range(n):
             high = depth[i] if depth.size > 0 else 1.0
             lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
@@ -163,8 +149,8 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
 @njit
 def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
     """What a given velocity brings in is booked to its patches; what it takes out, all else that cells gain, to one."""
-    plane, patches, nodes = tables[I_PLANE], tables[I_PATCHES], tables[I_NODES].size
-    lies, gained = tables[I_LAYOUT][0]["gain"] + q * nodes, 0.0
+    plane, patches, nodes = tables.plane, tables.patches, tables.nodes.size
+    lies, gained = tables.layout[0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
         gained += plane[basin["area"] + i] * rate[i]
     last, most = -1, -1.0
@@ -173,7 +159,7 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
             continue
         into, away = 0.0, 0.0
         for m in range(patches[p]["faces"]):
-            k = tables[I_INTEGERS][patches[p]["ring"] + m]
+            k = tables.integers[patches[p]["ring"] + m]
             flow = factor * plane[basin["through"] + k]
             into += max(flow, 0.0) * outside[k]
             away -= min(flow, 0.0)
@@ -187,17 +173,17 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
 @njit
 def bring(tables, patch, basin, q, y, rate, out):
     """What the network brings through a patch into the cells behind it; each gives of its own where water leaves."""
-    layout, nodes, rho = tables[I_LAYOUT][0], tables[I_NODES].size, tables[I_SETTINGS][0]["rho"]
+    layout, nodes, rho = tables.layout[0], tables.nodes.size, tables.settings[0]["rho"]
     node = patch["node"]
     made_up = out[layout["gain"] + q * nodes + node]
     flow = min(out[layout["net"] + node] + out[layout["supply"] + node], 0.0) / (rho * counted(tables, patch, True, y))
-    brought, plane = (out[layout["brought"] + q * nodes + node] + made_up) / rho, tables[I_PLANE]
+    brought, plane = (out[layout["brought"] + q * nodes + node] + made_up) / rho, tables.plane
     for m in range(patch["count"] if flow < 0.0 else 0):
-        i = tables[I_INTEGERS][patch["first"] + m]
+        i = tables.integers[patch["first"] + m]
         gone = flow * weight(plane, basin, True, i, y) * cell_value(tables, basin, q, y, i)
         rate[i] += gone
         brought -= plane[basin["area"] + i] * gone
     brought /= counted(tables, patch, False, y)
     for m in range(patch["count"]):
-        i = tables[I_INTEGERS][patch["first"] + m]
+        i = tables.integers[patch["first"] + m]
         rate[i] += brought * weight(plane, basin, False, i, y)

@@ -4,24 +4,16 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.advection_faces import advection_rates
 from fvsolve.kernels.plane.carried import deep, made_ready, turned
-from fvsolve.kernels.records import (
-    CARRIED_FACES,
-    I_BASINS,
-    I_INTEGERS,
-    I_PLANE,
-    I_SCALARS,
-    RATE,
-    SHALLOW_FACES,
-)
+from fvsolve.kernels.records import CARRIED_FACES, RATE, SHALLOW_FACES
 
 
 @njit
 def carry_on_meshes(t, y, dydt, out, handle):
     """Rates of all amounts, carried and spread."""
     tables = open_tables(handle)
-    plane, scalars, integers = tables[I_PLANE], tables[I_SCALARS], tables[I_INTEGERS]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
+    plane, scalars, integers = tables.plane, tables.scalars, tables.integers
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
         if basin["kind"] != SHALLOW_FACES and basin["kind"] != CARRIED_FACES:
             continue
         n, flow = basin["n"], plane[basin["flows"] : basin["flows"] + basin["faces"]]

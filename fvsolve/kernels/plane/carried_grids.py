@@ -5,7 +5,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.advection import add_fifth_order, grid_advection, grid_fastest
 from fvsolve.kernels.plane.carried import deep, made_ready, turned
 from fvsolve.kernels.plane.diffusion import grid_diffusion
-from fvsolve.kernels.records import CARRIED_GRID, I_BASINS, I_PLANE, I_SCALARS, RATE, SHALLOW_GRID
+from fvsolve.kernels.records import CARRIED_GRID, RATE, SHALLOW_GRID
 
 
 @njit(forceinline=True)
@@ -29,16 +29,16 @@ def parts(plane, basin):
 def carry_on_grids(t, y, dydt, out, handle):
     """Rates of all amounts by upwind or muscl."""
     tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
+    plane = tables.plane
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
         if not on_grid(basin):
             continue
         made_ready(t, tables, b, y)
         kx, ky, flow_x, flow_y, depth, work = parts(plane, basin)
         quick = basin["unsplit"] * basin["fastest"]  # at full speed: while it turns back it gets quicker in a step
-        for q in range(tables[I_SCALARS].size):
-            out[RATE] = max(out[RATE], quick + tables[I_SCALARS][q]["decay"])
+        for q in range(tables.scalars.size):
+            out[RATE] = max(out[RATE], quick + tables.scalars[q]["decay"])
             n, ring = basin["n"], basin["outside"] + q * basin["outer"]
             at = basin["carried"] + q * n
             grid_advection(
@@ -51,17 +51,17 @@ def carry_on_grids(t, y, dydt, out, handle):
 def add_on_grids(t, y, dydt, out, handle):
     """Add to the rates of all amounts what upwind5 has more, or weno5, which keeps the bounds of what there can be."""
     tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
+    plane = tables.plane
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
         if not on_grid(basin):
             continue
         kx, ky, flow_x, flow_y, depth, work = parts(plane, basin)
         fastest = basin["fastest"]
         if depth.size > 0:
             fastest = grid_fastest(kx.size, ky.size, kx, ky, flow_x, flow_y, depth, work)
-        for q in range(tables[I_SCALARS].size):
-            n, ring, scalar = basin["n"], basin["outside"] + q * basin["outer"], tables[I_SCALARS][q]
+        for q in range(tables.scalars.size):
+            n, ring, scalar = basin["n"], basin["outside"] + q * basin["outer"], tables.scalars[q]
             at = basin["carried"] + q * n
             add_fifth_order(
                 basin["scheme"], kx.size, ky.size, kx, ky, turned(t, basin), flow_x, flow_y, depth,
@@ -74,19 +74,19 @@ def add_on_grids(t, y, dydt, out, handle):
 def spread_on_grids(t, y, dydt, out, handle):
     """Add to the rates of all amounts what spreads."""
     tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size if dydt.size > 0 else 0):
-        basin = tables[I_BASINS][b]
+    plane = tables.plane
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
         if not on_grid(basin):
             continue
         kx, ky, flow_x, flow_y, depth, work = parts(plane, basin)
-        for q in range(tables[I_SCALARS].size):
-            n, ring, spreads = basin["n"], basin["outside"] + q * basin["outer"], tables[I_SCALARS][q]["diffusivity"]
+        for q in range(tables.scalars.size):
+            n, ring, spreads = basin["n"], basin["outside"] + q * basin["outer"], tables.scalars[q]["diffusivity"]
             at = basin["carried"] + q * n
             if spreads > 0.0:
                 quick = grid_diffusion(
                     kx.size, ky.size, kx, ky, spreads, turned(t, basin), flow_x, flow_y, depth,
                     plane[ring : ring + basin["outer"]], y[at : at + n], work, dydt[at : at + n],
                 )  # fmt: skip
-                still = basin["unsplit"] * basin["fastest"] + tables[I_SCALARS][q]["decay"]
+                still = basin["unsplit"] * basin["fastest"] + tables.scalars[q]["decay"]
                 out[RATE] = max(out[RATE], still + quick)

@@ -15,18 +15,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.behind import counted, weight
 from fvsolve.kernels.plane.friction import FASTEST
 from fvsolve.kernels.plane.shallow_rows import THIN
-from fvsolve.kernels.records import (
-    CARRIED_GRID,
-    I_BASINS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_PATCHES,
-    I_PLANE,
-    I_SETTINGS,
-    MANNING,
-    NO_DRAG,
-    SHALLOW_FACES,
-)
+from fvsolve.kernels.records import CARRIED_GRID, MANNING, NO_DRAG, SHALLOW_FACES
 
 ROWS = 4  # of `power` a basin
 
@@ -48,18 +37,18 @@ def at_rest(st, basin):
 def add_power(t, y, dydt, out, handle, power):
     """Rows of all basins."""
     tables = open_tables(handle)
-    st, basins, patches = tables[I_SETTINGS][0], tables[I_BASINS], tables[I_PATCHES]
+    st, basins, patches = tables.settings[0], tables.basins, tables.patches
     first = power.size - ROWS * basins.size
     for b in range(basins.size):
         rows = power[first + ROWS * b : first + ROWS * (b + 1)]
         rows[0] = rows[1] = rows[2] = rows[3] = 0.0
         if basins[b]["kind"] <= SHALLOW_FACES:
-            water_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
+            water_power(st, basins[b], tables.plane, y, dydt, rows)
         elif basins[b]["kind"] < CARRIED_GRID:
-            liquid_power(st, basins[b], tables[I_PLANE], y, dydt, rows)
+            liquid_power(st, basins[b], tables.plane, y, dydt, rows)
     for k in range(patches.size):
         patch, node = patches[k], patches[k]["node"]
-        flow = out[tables[I_LAYOUT][0]["net"] + node] + out[tables[I_LAYOUT][0]["supply"] + node]
+        flow = out[tables.layout[0]["net"] + node] + out[tables.layout[0]["supply"] + node]
         power[first + ROWS * patch["basin"]] += potential(tables, out, node) * flow / st["rho"]
         if basins[patch["basin"]]["kind"] <= SHALLOW_FACES:
             power[first + ROWS * patch["basin"] + 1] += patch_loss(tables, patch, flow, y)
@@ -110,10 +99,10 @@ def liquid_power(st, basin, plane, y, dydt, rows):
 def patch_loss(tables, patch, flow, y):
     """What speed is lost where `flow` [kg/s] enters the cells behind a patch, or leaves them [W]; see `patches`."""
     st, basin, plane, integers = (
-        tables[I_SETTINGS][0],
-        tables[I_BASINS][patch["basin"]],
-        tables[I_PLANE],
-        tables[I_INTEGERS],
+        tables.settings[0],
+        tables.basins[patch["basin"]],
+        tables.plane,
+        tables.integers,
     )
     n, o, lost, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
     depths, area = plane[basin["plan"] :], plane[basin["area"] :]
@@ -141,7 +130,7 @@ def patch_loss(tables, patch, flow, y):
 def add_stored(t, y, dydt, out, handle, stored):
     """Rows of all basins."""
     tables = open_tables(handle)
-    st, basins, plane = tables[I_SETTINGS][0], tables[I_BASINS], tables[I_PLANE]
+    st, basins, plane = tables.settings[0], tables.basins, tables.plane
     first = stored.size - basins.size
     for b in range(basins.size):
         basin, total = basins[b], 0.0

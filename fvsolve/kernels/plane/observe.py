@@ -12,14 +12,6 @@ from fvsolve.kernels.records import (
     CELL_STATE,
     CELL_U,
     CELL_V,
-    I_BASINS,
-    I_FLOATS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_PLANE,
-    I_PROBES,
-    I_SETTINGS,
     LAW_LINEAR,
     LAW_LOG,
     PATCH_FLOW,
@@ -31,7 +23,7 @@ from fvsolve.kernels.records import (
 def observe_basins(t, y, out, handle, values):
     """values[k] = scale * quantity + offset of the probes that read cells of basins or flows through patches."""
     tables = open_tables(handle)
-    probes = tables[I_PROBES]
+    probes = tables.probes
     for k in range(probes.size):
         probe = probes[k]
         kind = probe["kind"]
@@ -48,52 +40,52 @@ def observe_basins(t, y, out, handle, values):
 def observe_dense_flows(t, y, out, handle, values):
     """Flows through patches at the density of the place, under all laws but linear [m3/s]."""
     tables = open_tables(handle)
-    st, probes, at = tables[I_SETTINGS][0], tables[I_PROBES], tables[I_LAYOUT][0]["pressure"]
+    st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
     for k in range(probes.size):
         if probes[k]["kind"] == PATCH_FLOW:
             i = probes[k]["index"]
-            rho = density(st, tables[I_FLOATS], tables[I_NODES][i]["pressure"] + out[at + i])
+            rho = density(st, tables.floats, tables.nodes[i]["pressure"] + out[at + i])
             values[k] = patch_flow(tables, probes[k], out) / rho
 
 
 @njit
 def patch_flow(tables, probe, out):
     """Mass that flows into a basin through a patch [kg/s]."""
-    layout, i = tables[I_LAYOUT][0], probe["index"]
+    layout, i = tables.layout[0], probe["index"]
     return out[layout["net"] + i] + out[layout["supply"] + i]
 
 
 @njit
 def stored(tables, probe, y):
     """Weighted sum of a quantity's deviations, or of depths."""
-    basin, total = tables[I_BASINS][probe["index"]], 0.0
+    basin, total = tables.basins[probe["index"]], 0.0
     at = basin["y"] + probe["side"] * basin["n"]
     for m in range(probe["count"]):
-        i = tables[I_INTEGERS][probe["cell"] + m]
+        i = tables.integers[probe["cell"] + m]
         value = y[at + i]
         if probe["kind"] == CELL_DEPTH:
-            value = max(tables[I_PLANE][basin["plan"] + i] + value, 0.0)
-        elif probe["side"] == 0 and tables[I_SETTINGS][0]["law"] == LAW_LOG:  # pressure over the slope at rest
+            value = max(tables.plane[basin["plan"] + i] + value, 0.0)
+        elif probe["side"] == 0 and tables.settings[0]["law"] == LAW_LOG:  # pressure over the slope at rest
             value = basin["density"] * log1p(value / basin["density"])
-        total += tables[I_FLOATS][probe["weights"] + m] * value
+        total += tables.floats[probe["weights"] + m] * value
     return total
 
 
 @njit
 def velocity(tables, probe, y):
     """Weighted sums of velocities along x and y [m/s]."""
-    basin, u, v = tables[I_BASINS][probe["index"]], 0.0, 0.0
+    basin, u, v = tables.basins[probe["index"]], 0.0, 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):
-        i = tables[I_INTEGERS][probe["cell"] + m]
+        i = tables.integers[probe["cell"] + m]
         share = 1.0 / basin["density"] if basin["kind"] > SHALLOW_FACES else 1.0
-        if tables[I_SETTINGS][0]["law"] != LAW_LINEAR:
+        if tables.settings[0]["law"] != LAW_LINEAR:
             share = 1.0 / (basin["density"] + y[o + i])
         if basin["kind"] <= SHALLOW_FACES:  # which fades where water is thin
-            depth = max(tables[I_PLANE][basin["plan"] + i] + y[basin["y"] + i], 0.0)
+            depth = max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
             wet = max(depth, THIN)
             share = 2.0 * depth / (depth * depth + wet * wet)
-        share *= tables[I_FLOATS][probe["weights"] + m]
+        share *= tables.floats[probe["weights"] + m]
         u += share * y[o + n + i]
         v += share * y[o + 2 * n + i]
     return u, v

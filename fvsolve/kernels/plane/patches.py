@@ -15,32 +15,17 @@ from fvsolve.kernels.plane.behind import (
     weight_out,
 )
 from fvsolve.kernels.plane.shallow_rows import THIN
-from fvsolve.kernels.records import (
-    I_BASINS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_MARKS,
-    I_NODES,
-    I_PATCHES,
-    I_PIPES,
-    I_PLANE,
-    I_SETTINGS,
-    I_VALVES,
-    LAW_LOG,
-    PATCH,
-    RATE,
-    SHALLOW_FACES,
-)
+from fvsolve.kernels.records import LAW_LOG, PATCH, RATE, SHALLOW_FACES
 from fvsolve.kernels.restrictions import head_drop
 
 
 @njit
 def mean_deviation(tables, patch, y):
     """Of what is stored in the cells behind a patch, per area of these."""
-    basin, total = tables[I_BASINS][patch["basin"]], 0.0
+    basin, total = tables.basins[patch["basin"]], 0.0
     for m in range(patch["count"]):
-        i = tables[I_INTEGERS][patch["first"] + m]
-        total += tables[I_PLANE][basin["area"] + i] * y[basin["y"] + i]
+        i = tables.integers[patch["first"] + m]
+        total += tables.plane[basin["area"] + i] * y[basin["y"] + i]
     return total / patch["area"]
 
 
@@ -51,16 +36,16 @@ def water_behind(tables, patch, y):
     Cells count by their area times `weight_out`, so that a dry bank is no water; the volume is the sum. The rise is
     from the surface at rest, where all is dry from the lowest bed.
     """
-    basin, plane = tables[I_BASINS][patch["basin"]], tables[I_PLANE]
+    basin, plane = tables.basins[patch["basin"]], tables.plane
     n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
     for m in range(patch["count"]):
-        i = tables[I_INTEGERS][patch["first"] + m]
+        i = tables.integers[patch["first"] + m]
         bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
         if bed < low:
             low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
     rest, rise, depth, volume, squares = max(low, 0.0), 0.0, 0.0, 0.0, 0.0
     for m in range(patch["count"]):
-        i = tables[I_INTEGERS][patch["first"] + m]
+        i = tables.integers[patch["first"] + m]
         h = depth_behind(plane, basin, i, y)
         part = plane[basin["area"] + i] * weight_out(h)
         volume, squares = volume + part, squares + part * weight_out(h)
@@ -75,10 +60,10 @@ def water_behind(tables, patch, y):
 def patch_pressures(t, y, dydt, out, handle):
     """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
     tables = open_tables(handle)
-    st, layout = tables[I_SETTINGS][0], tables[I_LAYOUT][0]
-    for k in range(tables[I_PATCHES].size):
-        patch = tables[I_PATCHES][k]
-        basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
+    st, layout = tables.settings[0], tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
         if basin["kind"] <= SHALLOW_FACES:
             stored, depth, volume, squares = water_behind(tables, patch, y)
             slope, content, had = st["rho"] * st["gravity"], st["rho"] * patch["area"], to_be_had(depth)
@@ -99,20 +84,20 @@ def patch_pressures(t, y, dydt, out, handle):
 @njit
 def book_open(tables, b, per, out):
     """Book what passes the open boundary of a basin, to each patch its own."""
-    patches = tables[I_PATCHES]
+    patches = tables.patches
     for k in range(patches.size):
         if patches[k]["basin"] == b and patches[k]["open"] == 1:
-            out[tables[I_LAYOUT][0]["supply"] + patches[k]["node"]] = per * through_patch(tables, patches[k])
+            out[tables.layout[0]["supply"] + patches[k]["node"]] = per * through_patch(tables, patches[k])
 
 
 @njit
 def record_patches(t, y, out, handle, values):
     """Mark where a link asked for more than there was; what passes an open boundary is booked, and no mark."""
     tables = open_tables(handle)
-    patches, marks, nodes = tables[I_PATCHES], tables[I_MARKS], tables[I_NODES].size
+    patches, marks, nodes = tables.patches, tables.marks, tables.nodes.size
     for k in range(patches.size):
-        at = tables[I_PIPES].size + nodes + patches[k]["node"]
-        made_up = patches[k]["open"] == 0 and out[tables[I_LAYOUT][0]["supply"] + patches[k]["node"]] > 0.0
+        at = tables.pipes.size + nodes + patches[k]["node"]
+        made_up = patches[k]["open"] == 0 and out[tables.layout[0]["supply"] + patches[k]["node"]] > 0.0
         if made_up and marks[at] != marks[at]:
             marks[at] = t
 
@@ -121,21 +106,21 @@ def record_patches(t, y, out, handle, values):
 def patch_flows(t, y, dydt, out, handle):
     """Add what the patches bring or take to the rates of the cells behind them."""
     tables = open_tables(handle)
-    layout = tables[I_LAYOUT][0]
-    for k in range(tables[I_PATCHES].size):
-        patch = tables[I_PATCHES][k]
+    layout = tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
         asked = out[layout["net"] + patch["node"]]
-        if tables[I_BASINS][patch["basin"]]["kind"] <= SHALLOW_FACES:
+        if tables.basins[patch["basin"]]["kind"] <= SHALLOW_FACES:
             shallow_patch(tables, patch, asked, y, dydt, out)
         elif dydt.size > 0:
-            basin = tables[I_BASINS][patch["basin"]]
+            basin = tables.basins[patch["basin"]]
             n, flow = basin["n"], asked / (basin["thickness"] * patch["area"])
             for m in range(patch["count"]):
-                dydt[basin["y"] + tables[I_INTEGERS][patch["first"] + m]] += flow
+                dydt[basin["y"] + tables.integers[patch["first"] + m]] += flow
             for m in range(patch["faces"]):
-                i = basin["y"] + tables[I_INTEGERS][patch["ring"] + patch["faces"] + m]
+                i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
                 push = -basin["speed"] * asked / (basin["thickness"] * patch["length"])
-                give_way(tables[I_PLANE], patch, m, push, dydt, i + n, i + 2 * n)
+                give_way(tables.plane, patch, m, push, dydt, i + n, i + 2 * n)
 
 
 @njit
@@ -155,12 +140,12 @@ def give_way(plane, patch, m, push, dydt, x, y):
 def quickest_inflow(t, y, dydt, out, handle):
     """Let steps see what is about to come: waves as quick as the head before a gate makes them, over a dry bed too."""
     tables = open_tables(handle)
-    st, valves, patches = tables[I_SETTINGS][0], tables[I_VALVES], tables[I_PATCHES]
+    st, valves, patches = tables.settings[0], tables.valves, tables.patches
     for k in range(valves.size):
         drop = head_drop(tables, out, k)[1]
         taker = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
-        for p in range(patches.size if tables[I_NODES][taker]["kind"] == PATCH else 0):
-            if patches[p]["node"] == taker and tables[I_BASINS][patches[p]["basin"]]["kind"] <= SHALLOW_FACES:
+        for p in range(patches.size if tables.nodes[taker]["kind"] == PATCH else 0):
+            if patches[p]["node"] == taker and tables.basins[patches[p]["basin"]]["kind"] <= SHALLOW_FACES:
                 wide = sqrt(patches[p]["area"] / patches[p]["count"])
                 out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)
 
@@ -168,8 +153,8 @@ def quickest_inflow(t, y, dydt, out, handle):
 @njit
 def shallow_patch(tables, patch, asked, y, dydt, out):
     """What a patch brings or takes of water with a free surface; where it is thin, what is asked may not be had."""
-    st, layout, integers, plane = tables[I_SETTINGS][0], tables[I_LAYOUT][0], tables[I_INTEGERS], tables[I_PLANE]
-    basin, rho = tables[I_BASINS][patch["basin"]], st["rho"]
+    st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
+    basin, rho = tables.basins[patch["basin"]], st["rho"]
     n, o, first = basin["n"], basin["y"], patch["first"]
     _, depth, volume, _ = water_behind(tables, patch, y)
     leaves, had = asked < 0.0, 1.0

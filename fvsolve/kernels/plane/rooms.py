@@ -5,19 +5,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log, shallow, shallow_faces
 from fvsolve.kernels.plane.friction import FASTEST, add_friction
 from fvsolve.kernels.plane.patches import book_open
-from fvsolve.kernels.records import (
-    ACOUSTIC_GRID,
-    I_BASINS,
-    I_INTEGERS,
-    I_PLANE,
-    I_SETTINGS,
-    LIQUID_FACES,
-    LIQUID_GRID,
-    NO_DRAG,
-    RATE,
-    SHALLOW_FACES,
-    SHALLOW_GRID,
-)
+from fvsolve.kernels.records import ACOUSTIC_GRID, LIQUID_FACES, LIQUID_GRID, NO_DRAG, RATE, SHALLOW_FACES, SHALLOW_GRID
 
 
 @njit
@@ -43,9 +31,9 @@ def wanted(basin, dydt):
 @njit
 def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
     """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
-    st, basin = tables[I_SETTINGS][0], tables[I_BASINS][b]
+    st, basin = tables.settings[0], tables.basins[b]
     if basin["friction"] != NO_DRAG:
-        roughness = tables[I_BASINS]["roughness"][b : b + 1]
+        roughness = tables.basins["roughness"][b : b + 1]
         fades = add_friction(
             basin["friction"], st["gravity"], roughness, FASTEST, depth, dh, qx, qy, rate_x, rate_y
         )  # fmt: skip
@@ -58,9 +46,9 @@ def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
 def shallow_grids(t, y, dydt, out, handle):
     """Rates of water on grids."""
     tables = open_tables(handle)
-    st, plane = tables[I_SETTINGS][0], tables[I_PLANE]
-    for b in range(tables[I_BASINS].size):
-        basin = tables[I_BASINS][b]
+    st, plane = tables.settings[0], tables.plane
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
         if basin["kind"] != SHALLOW_GRID or not wanted(basin, dydt):
             continue
         n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
@@ -87,9 +75,9 @@ def shallow_grids(t, y, dydt, out, handle):
 def acoustic_grids(t, y, dydt, out, handle):
     """Rates of a liquid under law linear on grids."""
     tables = open_tables(handle)
-    plane = tables[I_PLANE]
-    for b in range(tables[I_BASINS].size):
-        basin = tables[I_BASINS][b]
+    plane = tables.plane
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
         if basin["kind"] != ACOUSTIC_GRID or not wanted(basin, dydt):
             continue
         n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
@@ -110,7 +98,7 @@ def acoustic_grids(t, y, dydt, out, handle):
 @njit
 def full_grid(tables, b, table, y, dydt, out):
     """Rates of a liquid with the full momentum flux on a grid, of its waves or, with no table, under law log."""
-    plane, basin = tables[I_PLANE], tables[I_BASINS][b]
+    plane, basin = tables.plane, tables.basins[b]
     n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
     through = basin["through"]
     to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
@@ -131,8 +119,8 @@ def full_grid(tables, b, table, y, dydt, out):
 def liquid_grids(t, y, dydt, out, handle):
     """Rates of a liquid under law log on grids."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size):
-        if tables[I_BASINS][b]["kind"] == LIQUID_GRID and wanted(tables[I_BASINS][b], dydt):
+    for b in range(tables.basins.size):
+        if tables.basins[b]["kind"] == LIQUID_GRID and wanted(tables.basins[b], dydt):
             full_grid(tables, b, None, y, dydt, out)
 
 
@@ -140,9 +128,9 @@ def liquid_grids(t, y, dydt, out, handle):
 def shallow_meshes(t, y, dydt, out, handle):
     """Rates of water on meshes of any cells."""
     tables = open_tables(handle)
-    st, plane, integers = tables[I_SETTINGS][0], tables[I_PLANE], tables[I_INTEGERS]
-    for b in range(tables[I_BASINS].size):
-        basin = tables[I_BASINS][b]
+    st, plane, integers = tables.settings[0], tables.plane, tables.integers
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
         if basin["kind"] != SHALLOW_FACES or not wanted(basin, dydt):
             continue
         n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
@@ -165,12 +153,12 @@ def shallow_meshes(t, y, dydt, out, handle):
 @njit
 def liquid_mesh(tables, b, table, y, dydt, out):
     """Rates of a liquid on a mesh, of its waves or, with no table, under laws linear and log."""
-    plane, integers, basin = tables[I_PLANE], tables[I_INTEGERS], tables[I_BASINS][b]
+    plane, integers, basin = tables.plane, tables.integers, tables.basins[b]
     n, o, through = basin["n"], basin["y"], basin["through"]
     to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
     rates = to[first : first + 3 * n]
     rate = liquid_faces.liquid_rates(
-        tables[I_SETTINGS][0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
+        tables.settings[0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
         plane[basin["mesh"] :],
         integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
         y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
@@ -185,6 +173,6 @@ def liquid_mesh(tables, b, table, y, dydt, out):
 def liquid_meshes(t, y, dydt, out, handle):
     """Rates of a liquid on meshes of any cells, under laws linear and log."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size):
-        if tables[I_BASINS][b]["kind"] == LIQUID_FACES and wanted(tables[I_BASINS][b], dydt):
+    for b in range(tables.basins.size):
+        if tables.basins[b]["kind"] == LIQUID_FACES and wanted(tables.basins[b], dydt):
             liquid_mesh(tables, b, None, y, dydt, out)

@@ -5,50 +5,38 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.patches import mean_deviation
 from fvsolve.kernels.plane.rooms import full_grid, liquid_mesh, wanted
 from fvsolve.kernels.plane.waves import pressure
-from fvsolve.kernels.records import (
-    CELL_STATE,
-    I_BASINS,
-    I_FLOATS,
-    I_INTEGERS,
-    I_LAYOUT,
-    I_NODES,
-    I_PATCHES,
-    I_PLANE,
-    I_PROBES,
-    TABLE_FACES,
-    TABLE_GRID,
-)
+from fvsolve.kernels.records import CELL_STATE, TABLE_FACES, TABLE_GRID
 
 
 @njit
 def table_grids(t, y, dydt, out, handle):
     """Rates on grids."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size):
-        basin = tables[I_BASINS][b]
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
         if basin["kind"] == TABLE_GRID and wanted(basin, dydt):
-            full_grid(tables, b, tables[I_PLANE][basin["table"] :], y, dydt, out)
+            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out)
 
 
 @njit
 def table_meshes(t, y, dydt, out, handle):
     """Rates on meshes of any cells."""
     tables = open_tables(handle)
-    for b in range(tables[I_BASINS].size):
-        basin = tables[I_BASINS][b]
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
         if basin["kind"] == TABLE_FACES and wanted(basin, dydt):
-            liquid_mesh(tables, b, tables[I_PLANE][basin["table"] :], y, dydt, out)
+            liquid_mesh(tables, b, tables.plane[basin["table"] :], y, dydt, out)
 
 
 @njit
 def table_pressures(t, y, dydt, out, handle):
     """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
     tables = open_tables(handle)
-    layout = tables[I_LAYOUT][0]
-    for k in range(tables[I_PATCHES].size):
-        patch = tables[I_PATCHES][k]
-        basin, node = tables[I_BASINS][patch["basin"]], tables[I_NODES][patch["node"]]
-        table = tables[I_PLANE][basin["table"] :]
+    layout = tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
+        table = tables.plane[basin["table"] :]
         found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, y))
         out[layout["pressure"] + patch["node"]] = found
         out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch["area"])
@@ -58,14 +46,14 @@ def table_pressures(t, y, dydt, out, handle):
 def observe_pressures(t, y, out, handle, values):
     """Pressures in cells [Pa]."""
     tables = open_tables(handle)
-    probes = tables[I_PROBES]
+    probes = tables.probes
     for k in range(probes.size):
         probe = probes[k]
         if probe["kind"] != CELL_STATE or probe["side"] != 0:
             continue
-        basin, total = tables[I_BASINS][probe["index"]], 0.0
-        table = tables[I_PLANE][basin["table"] :]
+        basin, total = tables.basins[probe["index"]], 0.0
+        table = tables.plane[basin["table"] :]
         for m in range(probe["count"]):
-            r = y[basin["y"] + tables[I_INTEGERS][probe["cell"] + m]]
-            total += tables[I_FLOATS][probe["weights"] + m] * pressure(table, basin["density"], r)[0]
+            r = y[basin["y"] + tables.integers[probe["cell"] + m]]
+            total += tables.floats[probe["weights"] + m] * pressure(table, basin["density"], r)[0]
         values[k] = total + probe["offset"]

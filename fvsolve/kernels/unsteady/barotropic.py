@@ -6,7 +6,6 @@ What remembers is the velocity: u = (rho A)_ref M / m, so that v times the drag 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.pipes import GAUSS
-from fvsolve.kernels.records import I_FLOATS, I_PIPES, I_PROFILE, I_SCRATCH, I_SETTINGS
 from fvsolve.kernels.unsteady.memory import follow_all, take_off
 
 
@@ -28,12 +27,12 @@ def velocity_change(pipe, profile, reference, r, l, change):
 def remember_barotropic(t, y, dydt, out, handle):
     """Unsteady friction of all pipes, added to rates, where there are any."""
     tables = open_tables(handle)
-    pipes, floats, scratch = tables[I_PIPES], tables[I_FLOATS], tables[I_SCRATCH]
+    pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
         if pipe["terms"] > 0 and dydt.size > 0:
-            n, o, reference = pipe["cells"], pipe["y"], tables[I_SETTINGS][0]["rho"] * pipe["area"]
+            n, o, reference = pipe["cells"], pipe["y"], tables.settings[0]["rho"] * pipe["area"]
             change, pull = scratch[:n], scratch[n : 2 * n]
-            velocity_change(pipe, tables[I_PROFILE], reference, y[o : o + n], y[o + n : o + 2 * n], change)
+            velocity_change(pipe, tables.profile, reference, y[o : o + n], y[o + n : o + 2 * n], change)
             follow_all(pipe, floats, change, y, dydt, pull)
             take_off(pull, dydt[o : o + n], dydt[o + n : o + 2 * n])

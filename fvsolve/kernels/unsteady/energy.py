@@ -8,7 +8,7 @@ kinetic energy. Under the laws log and table M is rho A times the velocity at th
 from fvsolve.jit import njit
 from fvsolve.kernels.energy import NODE, PIPE, SHARES, at_point, width_of
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_FLOATS, I_NODES, I_PIPES, I_PROFILE, I_SCRATCH, I_SETTINGS, LAW_LINEAR
+from fvsolve.kernels.records import LAW_LINEAR
 from fvsolve.kernels.unsteady.barotropic import velocity_change
 from fvsolve.kernels.unsteady.memory import difference
 
@@ -16,12 +16,12 @@ from fvsolve.kernels.unsteady.memory import difference
 @njit
 def followed(y, pipe, tables, change):
     """Fill `change` with what the terms of a pipe follow, cell by cell: deviation from the profile's flow [kg/s]."""
-    st, n, o = tables[I_SETTINGS][0], pipe["cells"], pipe["y"]
+    st, n, o = tables.settings[0], pipe["cells"], pipe["y"]
     r, l = y[o : o + n], y[o + n : o + 2 * n]
     if st["law"] == LAW_LINEAR:
         difference(r, l, change)
     else:
-        velocity_change(pipe, tables[I_PROFILE], st["rho"] * pipe["area"], r, l, change)
+        velocity_change(pipe, tables.profile, st["rho"] * pipe["area"], r, l, change)
 
 
 @njit(forceinline=True)
@@ -71,12 +71,12 @@ def memory_energy(st, floats, profile, pipe, y):
 def add_power(t, y, dydt, out, handle, power):
     """What all pipes remember, into their rows of power."""
     tables = open_tables(handle)
-    st, pipes, at = tables[I_SETTINGS][0], tables[I_PIPES], NODE * tables[I_NODES].size
+    st, pipes, at = tables.settings[0], tables.pipes, NODE * tables.nodes.size
     for i in range(pipes.size):
         if pipes[i]["terms"] > 0:
-            change = tables[I_SCRATCH][: pipes[i]["cells"]]
+            change = tables.scratch[: pipes[i]["cells"]]
             followed(y, pipes[i], tables, change)
-            taken, rate = memory_power(st, tables[I_FLOATS], tables[I_PROFILE], pipes[i], change, y, dydt)
+            taken, rate = memory_power(st, tables.floats, tables.profile, pipes[i], change, y, dydt)
             power[at + 1] += taken
             power[at + 3] += rate
         at += PIPE
@@ -86,7 +86,7 @@ def add_power(t, y, dydt, out, handle, power):
 def add_stored(t, y, dydt, out, handle, stored):
     """What all pipes remember, into their rows of stored energy."""
     tables = open_tables(handle)
-    st, pipes, nodes = tables[I_SETTINGS][0], tables[I_PIPES], tables[I_NODES]
+    st, pipes, nodes = tables.settings[0], tables.pipes, tables.nodes
     for i in range(pipes.size):
         if pipes[i]["terms"] > 0:
-            stored[nodes.size + 2 * i] += memory_energy(st, tables[I_FLOATS], tables[I_PROFILE], pipes[i], y)
+            stored[nodes.size + 2 * i] += memory_energy(st, tables.floats, tables.profile, pipes[i], y)

@@ -8,7 +8,6 @@ dz_k/dt = (n_k nu / R^2) (M - z_k). Linear in averages of cells, so exact for th
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import I_FLOATS, I_PIPES, I_SCRATCH
 
 
 @njit
@@ -52,7 +51,7 @@ def difference(r, l, flow):
 def remember_linear(t, y, dydt, out, handle):
     """Unsteady friction of all pipes under the linear law, added to rates, where there are any."""
     tables = open_tables(handle)
-    pipes, floats, scratch = tables[I_PIPES], tables[I_FLOATS], tables[I_SCRATCH]
+    pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
         if pipe["terms"] > 0 and dydt.size > 0:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import accumulator as law
 from fvsolve.kernels.devices.codes import ACCUMULATOR
 from fvsolve.model.devices.device import Device
@@ -28,9 +27,9 @@ class Accumulator(Device, kind="accumulator"):
         return [0.0] * law.NUMBERS
 
     def settle(self, model, row, y, scale) -> None:
-        floats, at = model.tables[rec.I_FLOATS][row["data"] :], model.tables[rec.I_NODES][row["node"]]["y"]
+        floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]
-        if floats[law.NECK] > 0.0 and model.tables[rec.I_ARMED][row["event"]] > 0.0:  # its neck feels far less
+        if floats[law.NECK] > 0.0 and model.tables.armed[row["event"]] > 0.0:  # its neck feels far less
             scale[at] = -(1e5 / floats[law.NECK] + ROUNDED * abs(floats[law.EMPTY]))
 
     def begin(self, start, part, row) -> list[str]:
@@ -47,7 +46,7 @@ class Accumulator(Device, kind="accumulator"):
         empty = dense(p + shed) * neck - mass
         if fluid.law == "linear":
             empty = shed / stiff if neck and shed > 0.0 else -fluid.density * (part.volume - gas)
-        floats = scene.tables[rec.I_FLOATS]
+        floats = scene.tables.floats
         floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, room, stiff, empty, shed]
         node["mass"] = mass
         node["stiffness"] = stiff if shed > 0.0 and neck else part.exponent * p / (fluid.density * gas)
@@ -63,8 +62,8 @@ class Accumulator(Device, kind="accumulator"):
         from fvsolve.kernels.devices.accumulator_energy import accumulator_energy
         from fvsolve.kernels.energy_barotropic import head_at
 
-        st, floats = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS]
-        node, at = model.tables[rec.I_NODES][row["node"]], int(row["data"])
+        st, floats = model.tables.settings[0], model.tables.floats
+        node, at = model.tables.nodes[row["node"]], int(row["data"])
 
         def head(y: float) -> float:
             return head_at(st, floats, node, float(node["pressure"] + law.gas_and_pressure(st, floats, node, at, y)[1]))

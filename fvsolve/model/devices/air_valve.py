@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import air_valve as law
 from fvsolve.kernels.devices.codes import AIR_VALVE
 from fvsolve.model.devices.device import Device
@@ -60,7 +59,7 @@ class AirValve(Device, kind="air-valve"):
 
     def squares(self, model, part, row, y, out):
         """R T / (2 m) (dm + m / (V rho) dy)^2 : what changes its pressure, in air or in fluid."""
-        st, floats, node = model.tables[rec.I_SETTINGS][0], model.tables[rec.I_FLOATS], model.tables[rec.I_NODES]
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes
         node, at = node[row["node"]], int(row["data"])
         _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
         root = math.sqrt(floats[at + law.HEAT] / (2.0 * mass))

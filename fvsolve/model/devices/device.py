@@ -83,7 +83,7 @@ class Device:
         """
         if not self.vessel:
             return []
-        node = model.tables[rec.I_NODES][row["node"]]
+        node = model.tables.nodes[row["node"]]
         stiffness = float(out[model.layout["stiffness"] + node["row"]])
         return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
 

@@ -36,9 +36,9 @@ class Lifting(Device, kind=""):
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
     def settle(self, model, row, y, scale) -> None:
-        stop, seat = (model.tables[rec.I_ARMED][row["event"] + k] > 0.0 for k in (0, 2))
+        stop, seat = (model.tables.armed[row["event"] + k] > 0.0 for k in (0, 2))
         if self.states and seat and law.disc_lift(y, model.tables, row) > 0.0:  # it has slammed
-            y[row["y"]] = -model.tables[rec.I_FLOATS][row["data"] + law.LIFT] - SEATED
+            y[row["y"]] = -model.tables.floats[row["data"] + law.LIFT] - SEATED
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 
@@ -93,14 +93,14 @@ class Lifting(Device, kind=""):
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
-        start.scene.tables[rec.I_FLOATS][row["data"] + 2] = start.law_of(k)[1]
+        start.scene.tables.floats[row["data"] + 2] = start.law_of(k)[1]
         self.tell(start, name, x)
         target = self.felt(start, k) / part.overpressure
         return [f"{name}: shut, though the pressure lifts it"] if start.rest and target > SMALL_LIFT else []
 
     def fill(self, start, row, x: float, target: float) -> None:
         """Its lift at the start, and where the pressures draw it."""
-        start.scene.tables[rec.I_FLOATS][row["data"] : row["data"] + 2] = x, target
+        start.scene.tables.floats[row["data"] : row["data"] + 2] = x, target
 
     def tell(self, start, name: str, x: float) -> None:
         """What its user may not expect."""
@@ -164,7 +164,7 @@ class Relief(ReliefDisc, kind="relief-valve"):
         return [0.0, part.overpressure, 0.0]
 
     def fill(self, start, row, x, target):
-        start.scene.tables[rec.I_FLOATS][row["data"]] = target
+        start.scene.tables.floats[row["data"]] = target
 
 
 class CheckDisc(Lifting, kind=""):

@@ -77,7 +77,7 @@ class Pump(Device, kind="pump"):
         return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
 
     def above(self, model, part, row) -> float:
-        speed = float(model.tables[rec.I_VALVES][row["valve"]]["drive"])
+        speed = float(model.tables.valves[row["valve"]]["drive"])
         return 0.5 * part.inertia * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
 
     def speed_at(self, start, k: int) -> float:
@@ -95,7 +95,7 @@ class Pump(Device, kind="pump"):
         if start.rest:
             row["open"] = 0.0
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        floats, at, g = start.scene.tables[rec.I_FLOATS], int(row["data"]), float(row["conductance"])
+        floats, at, g = start.scene.tables.floats, int(row["data"]), float(row["conductance"])
         rho, gravity = start.density_at(i), start.case.gravity
         ratio = rho / start.scene.fluid.density
 
@@ -108,7 +108,7 @@ class Pump(Device, kind="pump"):
 
     def lift(self, start, row, flow: float) -> float:
         """What a pump adds at a mass flow [Pa]."""
-        floats, rho = start.scene.tables[rec.I_FLOATS], start.density_at(int(row["from_node"]))
+        floats, rho = start.scene.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
         return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
 
@@ -143,8 +143,8 @@ class Pump(Device, kind="pump"):
 
     def let_go(self, start, part, row, valve) -> list[str]:
         """The speed from which a shaft runs free, and what does not hold it; returns what moves, in words."""
-        scene, floats, at = start.scene, start.scene.tables[rec.I_FLOATS], int(row["data"])
-        name, settings = scene.valve_names[row["valve"]], scene.tables[rec.I_SETTINGS][0]
+        scene, floats, at = start.scene, start.scene.tables.floats, int(row["data"])
+        name, settings = scene.valve_names[row["valve"]], scene.tables.settings[0]
         if floats[at + law.MODE] == law.TRIPPING:
             limit, settings["limit"] = float(settings["limit"]), part.trip
             floats[at + law.HELD] = schedule_value(scene.tables, int(row["schedule"]), float(part.trip))

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING, SUSTAINING
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, transition_of
@@ -123,7 +122,7 @@ class Regulator(Device, kind=""):
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
-        valve, floats, at = start.valves[k], start.scene.tables[rec.I_FLOATS], int(row["data"])
+        valve, floats, at = start.valves[k], start.scene.tables.floats, int(row["data"])
         shut, active = k in start.shut, self.mode(start, k) == ACTIVE
         error = self.error(start, k)
         if active and not shut:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.plane import end_errors, size_at_end
 from fvsolve.studies.outcome import Outcome
@@ -42,14 +41,14 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
         total, mass_flow = waves[pipe.name]
         pressure = model.cell_pressure(k, total)
         density = rho if model.case.fluid.law == "linear" else model.density(pressure)
-        found[pipe.name] = pressure, (model.tables[rec.I_PIPES][k]["flow"] + mass_flow) / density
+        found[pipe.name] = pressure, (model.tables.pipes[k]["flow"] + mass_flow) / density
     return found
 
 
 def waves(model, y: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Sum and difference of both waves in the cells of every pipe [kg/s]."""
     found = {}
-    for row, pipe in zip(model.tables[rec.I_PIPES], model.pipes, strict=True):
+    for row, pipe in zip(model.tables.pipes, model.pipes, strict=True):
         o, n = int(row["y"]), pipe.cells
         r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
         found[pipe.name] = r + l, r - l

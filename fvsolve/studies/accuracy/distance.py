@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.studies.accuracy.plane import contents, lowered
 from fvsolve.studies.outcome import Outcome
 
@@ -58,10 +57,10 @@ class Pool(NamedTuple):
 def track(found: Outcome) -> Track:
     """Rows and last fields of a run that has just ended (its envelope stands in the model until the next)."""
     waves, spans, model = {}, {}, found.model
-    for pipe, row in zip(model.pipes, model.tables[rec.I_PIPES], strict=True):
+    for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
         n, at, cell = pipe.cells, int(row["y"]), int(row["cell"])
         waves[pipe.name] = found.y[at : at + 2 * n].reshape(2, n).copy()
-        envelope = model.tables[rec.I_ENVELOPE][:, cell : cell + n]
+        envelope = model.tables.envelope[:, cell : cell + n]
         span = float(envelope[2].max() - envelope[0].min())
         spans[pipe.name] = span if span > STILL * model.scale[at] else 0.0
     pools = tuple(Pool(basin, contents(basin, found.y)) for basin in model.basins)

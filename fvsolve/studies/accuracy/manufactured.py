@@ -9,7 +9,6 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
-from fvsolve.kernels import records as rec
 from fvsolve.studies.accuracy.apart import recorded
 from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
@@ -83,7 +82,7 @@ class Manufactured(Judge):
         """Deviations of both waves, averaged over cells, from the given start [kg/s]."""
         y = np.zeros(model.y_size)
         for k, pipe in enumerate(model.pipes if self.initial else []):
-            row, n = model.tables[rec.I_PIPES][k], pipe.cells
+            row, n = model.tables.pipes[k], pipe.cells
             p, q = averages(lambda x, name=pipe.name: self.initial(name, x), pipe.edges)
             total = (p - model.profiles[k]) * row["admittance"]
             change = q * model.case.properties.density - row["flow"]
@@ -131,7 +130,7 @@ class Sourced:
     def rates(self, t: float, y: np.ndarray, dydt: np.ndarray) -> None:
         """The model's rates and what the source brings."""
         dydt[:] = self.model.evaluate(t, y, self.limit)[0]
-        for row, pipe in zip(self.model.tables[rec.I_PIPES], self.model.pipes, strict=True):
+        for row, pipe in zip(self.model.tables.pipes, self.model.pipes, strict=True):
             mass, momentum = averages(lambda x, name=pipe.name: self.source(name, x, t), pipe.edges)
             o, n = int(row["y"]), pipe.cells
             dydt[o : o + n] += 0.5 * (row["speed"] * mass + momentum)

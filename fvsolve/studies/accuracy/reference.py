@@ -14,7 +14,6 @@ import numpy as np
 
 from fvsolve import exact as room
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, averaged, differences, fields, recorded, size_of, waves
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, keys, pipes, scaled, total
@@ -131,10 +130,10 @@ def sided(t: np.ndarray) -> np.ndarray:
 def start_of(model) -> room.Start:
     """Pressures and flows that a model starts from."""
     rho, tables = model.case.properties.density, model.tables
-    flows = {pipe.name: row["flow"] for pipe, row in zip(model.pipes, tables[rec.I_PIPES], strict=True)}
-    flows |= {name: row["flow"] for name, row in zip(model.column_names, tables[rec.I_COLUMNS], strict=True)}
-    flows |= {name: row["flow"] for name, row in zip(model.valve_names, tables[rec.I_VALVES], strict=True)}
-    pressures = zip(model.node_names, tables[rec.I_NODES]["pressure"], strict=True)
+    flows = {pipe.name: row["flow"] for pipe, row in zip(model.pipes, tables.pipes, strict=True)}
+    flows |= {name: row["flow"] for name, row in zip(model.column_names, tables.columns, strict=True)}
+    flows |= {name: row["flow"] for name, row in zip(model.valve_names, tables.valves, strict=True)}
+    pressures = zip(model.node_names, tables.nodes["pressure"], strict=True)
     return room.Start({n: float(p) for n, p in pressures}, {n: float(m) / rho for n, m in flows.items()})
 
 

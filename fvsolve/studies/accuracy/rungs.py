@@ -76,7 +76,7 @@ def column(case, name: str) -> dict[str, Any]:
 
 def resistance(case, model, name: str) -> dict[str, Any]:
     """A pipe as the drop that its friction takes from the flow of the start, dp = zeta rho v^2 / 2."""
-    row = model.tables[rec.I_PIPES][[pipe.name for pipe in model.pipes].index(name)]
+    row = model.tables.pipes[[pipe.name for pipe in model.pipes].index(name)]
     law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
     flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * row["dx"] * row["cells"]
     if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:

@@ -10,7 +10,6 @@ import numpy as np
 
 from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
 from fvsolve.studies.accuracy.distance import Distance, Track, distance, extremes_apart, ranges, track
 from fvsolve.studies.accuracy.reference import exact_reference
 from fvsolve.studies.accuracy.setting import cell_keys
@@ -103,7 +102,7 @@ def exact(case: Case, numeric: Witness) -> Witness:
     rows = np.column_stack([numeric.run.rows[:, 0], truth.rows(numeric.run)])
     waves = {}
     for k, (name, (pressure, flow)) in enumerate(truth.fields(model).items()):
-        row = model.tables[rec.I_PIPES][k]
+        row = model.tables.pipes[k]
         total = (pressure - model.profiles[k]) * row["admittance"]
         difference = case.properties.density * flow - row["flow"]
         waves[name] = np.array([total + difference, total - difference]) / 2.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.mechanics import motion
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.solve.loop import Loop
@@ -35,7 +34,7 @@ class Booked(Loop):
 
     def run(self, budget: float) -> int:
         """`Loop.run`, one step at a time."""
-        code, left, armed = super().run(0.0), budget, self.model.tables[rec.I_ARMED]
+        code, left, armed = super().run(0.0), budget, self.model.tables.armed
         while code == told.CHUNK and left > 0.0 and not automatic.wants_change(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
             first = self.stepper.k[0].copy(), self.stepper.supply[0].copy()
@@ -107,7 +106,7 @@ class Booked(Loop):
         Where a contact stops to push, the rate of what it holds has a kink that no stage sees.
         """
         tables, lines = self.model.tables, self.accounts.stops
-        for (rate, loss), stop in zip(lines, tables[rec.I_STOPS], strict=True):
+        for (rate, loss), stop in zip(lines, tables.stops, strict=True):
             was, leaves = pressed(tables, stop, y)
             now, left = pressed(tables, stop, self.now)
             if leaves or left:
@@ -126,7 +125,7 @@ class Booked(Loop):
 
 def pressed(tables, stop, y: np.ndarray) -> tuple[float, bool]:
     """(how deep a stop is pressed [m], whether what presses it leaves quicker than it can follow)."""
-    (x_i, v_i), (x_j, v_j) = (motion(tables[rec.I_BODIES][stop[port]], y) for port in ("from_body", "to_body"))
+    (x_i, v_i), (x_j, v_j) = (motion(tables.bodies[stop[port]], y) for port in ("from_body", "to_body"))
     above, below = (x_j - x_i) - stop["above"], -stop["below"] - (x_j - x_i)
     deep, faster = (above, v_j - v_i) if above > below else (below, v_i - v_j)
     leaves = faster < 0.0 and stop["stiffness"] * deep + stop["damping"] * faster <= 0.0
@@ -170,10 +169,10 @@ class EnergyRun(Run):
         """What a column that stops dead had is dissipated; where columns meet, what the lost flows had (Carnot)."""
         before = self.flows()
         super().stop_columns()
-        columns, rho = self.model.tables[rec.I_COLUMNS], self.model.case.properties.density
+        columns, rho = self.model.tables.columns, self.model.case.properties.density
         self.lost += 0.5 * (before - self.flows()) ** 2 * columns["length"] / (rho * columns["area"])
 
     def flows(self) -> np.ndarray:
         """Of rigid columns [kg/s]."""
-        columns = self.model.tables[rec.I_COLUMNS]
+        columns = self.model.tables.columns
         return columns["flow"] + self.loop.now[columns["y"]]

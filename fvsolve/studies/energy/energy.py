@@ -9,7 +9,6 @@ import numpy as np
 
 from fvsolve.doors import CALL, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.kernels import records as rec
 from fvsolve.model.energy_ledger import Account
 from fvsolve.model.energy_start import available, datum_of
 from fvsolve.solve import initial_state
@@ -154,7 +153,7 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """
     model = prepared(case, set) if not hasattr(case, "tables") else case
     check_port(model.case, port)
-    model.tables[rec.I_SETTINGS]["datum"] = datum_of(model, port)
+    model.tables.settings["datum"] = datum_of(model, port)
     run = EnergyRun(model, initial_state(model), Rows(), progress)
     summary = run.go()
     if run.times[-1] < run.loop.t:
@@ -180,7 +179,7 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
         reason, summary.finished, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
         lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1) - dead.sum(axis=1) - kept,
         totals[:, -1], supplied - kept - dissipated, available(run.model),
-        float(run.model.tables[rec.I_SETTINGS][0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
+        float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
         [f"{mark.text}: the ledger from {mark.time:.6g} s on is not to be trusted" for mark in summary.marks],
         None if port is None else judged(run, port),
     )  # fmt: skip

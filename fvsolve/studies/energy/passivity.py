@@ -158,7 +158,6 @@ def same_time(c: np.ndarray) -> np.ndarray:
 @functools.cache
 def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
     """(A, S) of a lossless pipe shut at both ends: dy/dt = A y per crossing of a cell, energy |S y|^2."""
-    from fvsolve.kernels import records as rec
     from fvsolve.studies.outcome import prepared
 
     model = prepared({
@@ -172,7 +171,7 @@ def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
     })  # fmt: skip
     unit = 100.0 * np.eye(model.y_size)
     a = np.column_stack([model.rhs(0.0, one) / 100.0 for one in unit]) / model.wave_rates[0]
-    return a, np.kron(np.eye(2), point_matrix(model.tables[rec.I_SETTINGS][0], CELLS))
+    return a, np.kron(np.eye(2), point_matrix(model.tables.settings[0], CELLS))
 
 
 def point_matrix(settings, n: int) -> np.ndarray:

@@ -78,41 +78,42 @@ def _arrive(model, at: float | None) -> tuple[float, np.ndarray]:
 
 def stopped(model, t: float, before: bool = False):
     """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit."""
-    tables = list(model.tables)
-    tables[rec.I_SETTINGS][0]["limit"] = t if before else np.inf
-    schedules = tables[rec.I_SCHEDULES].copy()
+    tables = model.tables
+    tables.settings[0]["limit"] = t if before else np.inf
+    schedules = tables.schedules.copy()
     values = [schedule_value(model.tables, k, t) for k in range(len(schedules))]
-    tables[rec.I_SETTINGS][0]["limit"] = np.inf
+    tables.settings[0]["limit"] = np.inf
     for k in range(len(schedules)):
         schedules[k] = (k, 1)
-    tables[rec.I_SCHEDULES] = schedules
     rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]
-    tables[rec.I_PIECES] = np.array(rows).reshape(-1, 7)
-    hold_velocities(model, tables, t)
+    tables = tables._replace(schedules=schedules, pieces=np.array(rows).reshape(-1, 7))
+    tables = with_held_velocities(model, tables, t)
     if not has_limiter(model):
-        carry_without_limits(tables)
-    return replace(model, tables=tuple(tables), breaks=[])
+        tables = without_limits(tables)
+    return replace(model, tables=tables, breaks=[])
 
 
-def carry_without_limits(tables: list) -> None:
-    """Let pipes carry scalars without slopes, and no bound cut what leaves a part: both are kinks that no scene has."""
-    tables[rec.I_SETTINGS], tables[rec.I_SCALARS] = tables[rec.I_SETTINGS].copy(), tables[rec.I_SCALARS].copy()
-    tables[rec.I_SETTINGS]["limiter"] = rec.FLAT
-    tables[rec.I_SCALARS]["least"], tables[rec.I_SCALARS]["greatest"] = -np.inf, np.inf
+def without_limits(tables: rec.Tables) -> rec.Tables:
+    """Tables by which pipes carry scalars without slopes, and no bound cuts what leaves: kinks that no scene has."""
+    settings, scalars = tables.settings.copy(), tables.scalars.copy()
+    settings["limiter"] = rec.FLAT
+    scalars["least"], scalars["greatest"] = -np.inf, np.inf
+    return tables._replace(settings=settings, scalars=scalars)
 
 
-def hold_velocities(model, tables: list, t: float) -> None:
-    """Let velocities that are given to basins, and turn back in a period, stand still as they are at t."""
-    if not any(row["period"] > 0.0 for row in tables[rec.I_BASINS]):
-        return
-    tables[rec.I_BASINS], tables[rec.I_PLANE] = tables[rec.I_BASINS].copy(), tables[rec.I_PLANE].copy()
-    for basin, row in zip(model.basins, tables[rec.I_BASINS], strict=True):
+def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
+    """Tables by which velocities that are given to basins, and turn back in a period, stand still as they are at t."""
+    if not any(row["period"] > 0.0 for row in tables.basins):
+        return tables
+    tables = tables._replace(basins=tables.basins.copy(), plane=tables.plane.copy())
+    for basin, row in zip(model.basins, tables.basins, strict=True):
         if row["period"] > 0.0:
             grid = basin.mesh.grid
             faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
             factor = np.cos(np.pi * t / row["period"])
-            tables[rec.I_PLANE][row["flows"] : row["flows"] + faces] *= factor
+            tables.plane[row["flows"] : row["flows"] + faces] *= factor
             row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
+    return tables
 
 
 def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
@@ -120,14 +121,13 @@ def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
 
     No wider than the scheme of `at`, whose pattern of the Jacobian is kept.
     """
-    tables = list(at.model.tables)
-    tables[rec.I_SETTINGS] = tables[rec.I_SETTINGS].copy()
-    settings = tables[rec.I_SETTINGS][0]
+    tables = at.model.tables._replace(settings=at.model.tables.settings.copy())
+    settings = tables.settings[0]
     settings["scheme"], settings["degree"] = rec.LINEAR, degree
     for k, weight in enumerate(weights):
         settings[f"w{k}"] = weight
     settings["inside"], settings["enter"], settings["leave"] = difference_rows(weights, degree)
-    model = replace(at.model, tables=tuple(tables))
+    model = replace(at.model, tables=tables)
     model.__dict__["structure"] = at.model.structure
     return replace(at, model=model)
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.model.basins.units import unit_of
 from fvsolve.solve.advance import Input, hold, input_schedules
@@ -154,7 +153,7 @@ def input_value(at: Frozen, name: str, one: Input) -> float:
     """Value of an input at the state [SI]."""
     model = at.model
     if one.node >= 0:
-        pressure = float(model.tables[rec.I_NODES][one.node]["pressure"]
+        pressure = float(model.tables.nodes[one.node]["pressure"]
                          + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + one.node])  # fmt: skip
         place = model.node_names[one.node]
         return pressure if one.kind == "pressure" else float(model.head(pressure, model.elevation[place]))

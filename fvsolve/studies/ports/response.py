@@ -105,7 +105,6 @@ def response(
 
 def _linear(case, port: str, at, before, scheme):
     """((A, b, c, d), the Linear they are from)."""
-    from fvsolve.kernels import records as rec
     from fvsolve.studies.linear.linearise import linearise
 
     kind = case.places[port].kind
@@ -121,7 +120,7 @@ def _linear(case, port: str, at, before, scheme):
         found = asked([name], [pressure])
         return (_dense(found.a), sign * found.b[:, 0], found.c[0], sign * float(found.d[0, 0])), found
     found = asked([], [pressure])
-    row = found.at.model.tables[rec.I_NODES][found.at.model.node_names.index(port)]
+    row = found.at.model.tables.nodes[found.at.model.node_names.index(port)]
     b = np.zeros(len(found.states))
     b[row["y"]] = _density(found, row)
     return (_dense(found.a), b, found.c[0], 0.0), found

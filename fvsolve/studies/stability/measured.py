@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fvsolve.kernels.records import Tables
 from fvsolve.model.energy import EnergyForm
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import orders as told
@@ -70,7 +71,7 @@ class Runs:
         model = self.at.model
         changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
-        own = tuple(table.copy() for table in model.tables)  # what has opened or shut in one run has not in another
+        own = Tables(*map(np.copy, model.tables))  # what has opened or shut in one run has not in another
         made = Loop(replace(model, case=replace(model.case, numerics=numerics), tables=own), lambda: self.structure)
         made.now[:] = y
         made.memory[told.T] = self.at.t

@@ -149,7 +149,7 @@ def check_size(cells: int, steps: int) -> None:
         raise FvsolveError(f"steps = {steps}: wanted 10 or more, failure is growth over many steps")
 
 
-def _tables(scheme: str, limiter: str, cells: int) -> tuple:
+def _tables(scheme: str, limiter: str, cells: int) -> rec.Tables:
     """The tables of a model that has nothing but the scheme's settings, a pipe's small number and scratch."""
     found = {name: np.zeros(1, dtype) for name, dtype in rec.RECORDS.items()}
     found |= {name: np.zeros(1, np.int64 if name == "integers" else float) for name in rec.ARRAYS}
@@ -157,7 +157,7 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
     found["scratch"] = np.zeros(2 * cells + 7)
     scheme_settings(found["settings"][0], scheme, limiter)
     found["pipes"]["noise"] = SMALL
-    return tuple(found[name] for name in rec.TABLES)
+    return rec.Tables(**found)
 
 
 def _rhs():
