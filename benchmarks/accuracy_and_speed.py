@@ -43,9 +43,8 @@ def made(name: str) -> Chart:
     case, keys, about = SCENES[name]
     found = chart(shipped.find(case), keys, folder=POINTS / name)
     PICTURES.mkdir(parents=True, exist_ok=True)
-    csv, png, svg = write(found, POINTS / name, title=f"{name}: {about}", dpi=80)
-    for path in (png, svg):
-        (PICTURES / f"{name}{path.suffix}").write_bytes(path.read_bytes())
+    picture = write(found, POINTS / name, title=f"{name}: {about}", dpi=80)[1]
+    (PICTURES / picture.with_stem(name).name).write_bytes(picture.read_bytes())
     return found
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fvsolve.kernels.limiters import slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.limiters import monotonized_central, slope, van_leer
 from fvsolve.limits.grid import advection_limit
 from fvsolve.limits.symbol import WEIGHTS, weights_of
 from fvsolve.steppers import METHODS
@@ -88,10 +88,10 @@ def test_a_short_run_looks_stable_far_beyond_the_exact_limit(scheme, method, lea
 def test_frozen_slopes_are_the_tangents_of_the_limiters():
     """Their slopes at a = 0, at a = b and at b = 0, by differences."""
     tiny = 1e-7
-    for slope in (slope_van_leer, slope_monotonized_central):
+    for limiter in (van_leer, monotonized_central):
         for a, b, wanted in ((tiny, 1.0, (2, 0)), (1.0, tiny, (0, 2)), (1.0, 1.0, (0.5, 0.5)), (1.0, -1.0, (0, 0))):
-            by_a = (slope(a * (1 + tiny), b) - slope(a, b)) / (a * tiny)
-            by_b = (slope(a, b * (1 + tiny)) - slope(a, b)) / (b * tiny)
+            by_a = (slope(limiter, a * (1 + tiny), b) - slope(limiter, a, b)) / (a * tiny)
+            by_b = (slope(limiter, a, b * (1 + tiny)) - slope(limiter, a, b)) / (b * tiny)
             assert (by_a, by_b) == pytest.approx(wanted, abs=1e-5)
     for name, branches in FROZEN.items():
         for weights in branches.values():

@@ -5,22 +5,12 @@ and elsewhere it is the mean of all that flows in. A pipe's end also exchanges g
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.records import CHAMBER, FIXED, FLAT, JUNCTION, MINMOD, PATCH, RATE, TANK, UPWIND, VAN_LEER
+from fvsolve.kernels.limiters import limited
+from fvsolve.kernels.records import CHAMBER, FIXED, JUNCTION, PATCH, RATE, TANK, UPWIND
 from fvsolve.kernels.schedules import schedule_value
 
 ROUNDS, SAME = 10000, 4e-16  # of flow that runs in a circle without volume, which is mixed by iteration
 DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it holds no value, and gets no quicker [m]
-
-
-@njit
-def limited(limiter, a, b):
-    """The limited mean of two differences."""
-    if limiter == FLAT:
-        return 0.0
-    if limiter == MINMOD:
-        return slope_minmod(a, b)
-    return slope_van_leer(a, b) if limiter == VAN_LEER else slope_monotonized_central(a, b)
 
 
 @njit(forceinline=True)

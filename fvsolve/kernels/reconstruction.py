@@ -4,9 +4,9 @@ Every loop reads a window P and writes F: face j lies between P[j+2] and P[j+3].
 P[j] .. P[j+4], a backward wave at P[j+5] .. P[j+1].
 """
 
-from fvsolve.jit import njit
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.records import LINEAR, MINMOD, MUSCL, SHORT, UPWIND, VAN_LEER
+from fvsolve.jit import inner, njit
+from fvsolve.kernels.limiters import by_limiter, limited, slope
+from fvsolve.kernels.records import LINEAR, MUSCL, SHORT, UPWIND
 
 
 @njit
@@ -31,11 +31,7 @@ def value_weno5(a, b, c, d, e, small):
 @njit
 def value_muscl(limiter, b, c, d):
     """Second-order value at the face after c with a limited slope."""
-    if limiter == MINMOD:
-        return c + 0.5 * slope_minmod(c - b, d - c)
-    if limiter == VAN_LEER:
-        return c + 0.5 * slope_van_leer(c - b, d - c)
-    return c + 0.5 * slope_monotonized_central(c - b, d - c)
+    return c + 0.5 * limited(limiter, c - b, d - c)
 
 
 @njit
@@ -45,29 +41,18 @@ def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
         f[j] = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3]) + (w4 * p[j + 4] + w5 * p[j + 5])
 
 
-@njit
-def faces_muscl(limiter, backward, p, f):
-    """Limited second-order values; one loop a limiter, so that each becomes straight vector code."""
-    if limiter == MINMOD:
-        if backward == 1:
-            for j in range(f.size):
-                f[j] = p[j + 3] - 0.5 * slope_minmod(p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
-        else:
-            for j in range(f.size):
-                f[j] = p[j + 2] + 0.5 * slope_minmod(p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
-    elif limiter == VAN_LEER:
-        if backward == 1:
-            for j in range(f.size):
-                f[j] = p[j + 3] - 0.5 * slope_van_leer(p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
-        else:
-            for j in range(f.size):
-                f[j] = p[j + 2] + 0.5 * slope_van_leer(p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
-    elif backward == 1:
-        for j in range(f.size):
-            f[j] = p[j + 3] - 0.5 * slope_monotonized_central(p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
-    else:
-        for j in range(f.size):
-            f[j] = p[j + 2] + 0.5 * slope_monotonized_central(p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
+@inner
+def muscl_forward(limiter, p, f):
+    """Limited second-order values of waves that go forward."""
+    for j in range(f.size):
+        f[j] = p[j + 2] + 0.5 * slope(limiter, p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
+
+
+@inner
+def muscl_backward(limiter, p, f):
+    """The same of waves that go backward."""
+    for j in range(f.size):
+        f[j] = p[j + 3] - 0.5 * slope(limiter, p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
 
 
 @njit
@@ -100,6 +85,9 @@ def faces(settings, scheme, small, backward, p, f):
         else:
             faces_linear(0.0, b, c, d, 0.0, 0.0, p, f)
     elif scheme == MUSCL:
-        faces_muscl(settings["limiter"], backward, p, f)
+        if backward == 1:
+            by_limiter(muscl_backward, settings["limiter"], p, f)
+        else:
+            by_limiter(muscl_forward, settings["limiter"], p, f)
     else:
         faces_weno5(small, backward, p, f)

@@ -332,7 +332,8 @@ BASIN = np.dtype(
     [
         ("kind", "i8"),
         ("scheme", "i8"),
-        ("limiter", "i8"),
+        ("limiter", "i8"),  # on rectangles
+        ("wide", "f8"),  # on any mesh: how far values at sides of cells may go beyond those around
         ("n", "i8"),  # cells
         ("nx", "i8"),
         ("ny", "i8"),

@@ -5,11 +5,11 @@ Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with
 stays uniform.
 """
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, limited, lose, mix
-from fvsolve.kernels.records import FLAT, MINMOD, NODE_SCALAR, PIPE_SCALAR, RATE, UPWIND, VAN_LEER
+from fvsolve.kernels.limiters import by_limiter, limited, slope
+from fvsolve.kernels.mixing import end_flow, exchange, leaving_values, lose, mix
+from fvsolve.kernels.records import FLAT, NODE_SCALAR, PIPE_SCALAR, RATE, UPWIND
 
 
 @njit
@@ -35,20 +35,12 @@ def values(s, m, c):
         c[i] = s[i] / m[i]
 
 
-@njit
+@inner
 def inner_slopes(limiter, c, d):
     """Limited differences across all cells but those at the ends."""
-    n = c.size - 2
-    here, next, slope = c[1:], c[2:], d[1:]
-    if limiter == MINMOD:
-        for i in range(n):
-            slope[i] = slope_minmod(here[i] - c[i], next[i] - here[i])
-    elif limiter == VAN_LEER:
-        for i in range(n):
-            slope[i] = slope_van_leer(here[i] - c[i], next[i] - here[i])
-    else:
-        for i in range(n):
-            slope[i] = slope_monotonized_central(here[i] - c[i], next[i] - here[i])
+    here, next, inside = c[1:], c[2:], d[1:]
+    for i in range(c.size - 2):
+        inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
 
 
 @njit
@@ -115,7 +107,7 @@ def carry_in_pipe(y, dydt, out, tables, p):
         for i in range(n):
             d[i] = 0.0
         if st["scheme"] != UPWIND and limiter != FLAT:
-            inner_slopes(limiter, c, d)
+            by_limiter(inner_slopes, limiter, c, d)
             for right in range(2):
                 near, beside = (n - 1, n - 2) if right == 1 else (0, 1)
                 sign = 1.0 if right == 1 else -1.0

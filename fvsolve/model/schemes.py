@@ -1,5 +1,7 @@
 """Schemes as data: the family that computes them and, for linear ones, their weights. Knows no fields."""
 
+from typing import NamedTuple
+
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
 
@@ -12,10 +14,23 @@ LINEAR = {
     "upwind5": ((2 / 60, -13 / 60, 47 / 60, 27 / 60, -3 / 60), 4),
 }
 FAMILIES = {"upwind": (rec.UPWIND, 0), "muscl": (rec.MUSCL, 1), "weno5": (rec.WENO5, 4)}
+
+
+class Limiter(NamedTuple):
+    """A function of `kernels.limiters` by its code, and what stands for it on meshes of any cells.
+
+    wide : how far values at sides may go beyond those around, where slopes are least squares: 1 for not at all, or as
+    linear fields want on shaken meshes
+    """
+
+    code: int
+    wide: float
+
+
 LIMITERS = {
-    "minmod": rec.MINMOD,
-    "van-leer": rec.VAN_LEER,
-    "monotonized-central": rec.MONOTONIZED_CENTRAL,
+    "minmod": Limiter(rec.MINMOD, 1.0),
+    "van-leer": Limiter(rec.VAN_LEER, 2.0),
+    "monotonized-central": Limiter(rec.MONOTONIZED_CENTRAL, 2.0),
 }
 FROZEN_AS = {"muscl": "fromm", "weno5": "upwind5"}  # what limited schemes are where all is smooth
 ORDER = {name: degree + 1 for name, (_, degree) in (LINEAR | FAMILIES).items()}
@@ -23,7 +38,7 @@ ORDER = {name: degree + 1 for name, (_, degree) in (LINEAR | FAMILIES).items()}
 
 def scheme_settings(settings, scheme: str, limiter: str) -> None:
     """Write family, weights, degree and limiter into the settings record."""
-    settings["limiter"] = LIMITERS[limiter]
+    settings["limiter"] = LIMITERS[limiter].code
     if scheme in LINEAR:
         weights, settings["degree"] = LINEAR[scheme]
         settings["scheme"] = rec.LINEAR

@@ -33,7 +33,6 @@ from fvsolve.kernels.plane.faces import (
     gather,
     place,
     put_sides,
-    width,
 )
 from fvsolve.kernels.records import UPWIND
 
@@ -138,13 +137,14 @@ def work_size(integers):
 
 @njit
 def advection_rates(
-    scheme, limiter, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
+    scheme, wide_by, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
 ):
     """Rates of the amounts `s`; returns one over the step that keeps bounds, which diffusion shortens [1/s].
 
     That is the greatest share of a cell that leaves it, by `muscl` twice that.
 
-    scheme, limiter : UPWIND, or MUSCL as in `faces.width`; diffusivity : [m2/s], 0 for none; factor : on all flows
+    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
+    diffusivity : [m2/s], 0 for none; factor : on all flows
     flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty where s is the
     value; outside : float64[b]  values that come in with the flow; least, most : bounds, infinite for none
     work : float64[work_size(integers)]
@@ -163,7 +163,7 @@ def advection_rates(
     free = w[_FREE:]
     for i in range(BLOCK):
         w[_TOP + i] = 0.0
-    wide_by, twice = width(limiter), 2.0 if limited else 1.0
+    twice = 2.0 if limited else 1.0
     known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:

@@ -22,7 +22,7 @@ def carry_on_meshes(t, y, dydt, out, handle):
         for q in range(scalars.size):
             o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
             quickest = advection_rates(
-                basin["scheme"], basin["limiter"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
+                basin["scheme"], basin["wide"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
                 integers[basin["links"] :],
                 flow, depth, plane[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
                 y[o : o + n], plane[basin["toil"] + n :], dydt[o : o + n],

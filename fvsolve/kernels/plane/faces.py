@@ -21,7 +21,6 @@ floats : float64[:]  by block, side and row of BLOCK: outward normal, length / a
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import MINMOD
 
 CELL, SIDE, INDICES = 0, 1, 2
 NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
@@ -30,7 +29,6 @@ HEAD = 5
 BLOCK = 256  # cells whose geometry and neighbours stay in the nearest cache
 TINY = 1e-300
 HUGE = 1e300
-WIDE = 2.0  # how far beyond the values around a linear field may go on shaken meshes
 
 _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEASURES * BLOCK
 
@@ -53,12 +51,6 @@ def edges_before(edges, first, side):
 def place(side, ring):
     """Where the ring has the cell of a side of the boundary."""
     return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
-
-
-@njit
-def width(limiter):
-    """How far values at sides may go beyond the values around: not at all for minmod, else as linear fields want."""
-    return 1.0 if limiter == MINMOD else WIDE
 
 
 @njit

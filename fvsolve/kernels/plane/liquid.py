@@ -8,9 +8,9 @@ is read once: its own faces, then those towards the rows before it, whose waves 
 
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.ends import entering_cells, leaving_cells
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.reconstruction import value_muscl, value_weno5
-from fvsolve.kernels.records import LINEAR, MINMOD, MUSCL, UPWIND, VAN_LEER, WENO5
+from fvsolve.kernels.records import LINEAR, MUSCL, UPWIND, WENO5
 
 WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
 RING = 8  # rows of waves that are kept: six that a row of faces looks at, and room for all three beyond a side
@@ -26,9 +26,16 @@ def value_upwind5(a, b, c, d, e):
     return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) * (1.0 / 60.0)
 
 
+@inner
+def faces_limited(limiter, b, c, d, f):
+    """Values at faces after cells c by a limiter."""
+    for i in range(f.size):
+        f[i] = c[i] + 0.5 * slope(limiter, c[i] - b[i], d[i] - c[i])
+
+
 @njit
 def faces(scheme, limiter, small, a, b, c, d, e, f):
-    """Values at faces after cells c, from two cells before and two behind; one loop a scheme and limiter."""
+    """Values at faces after cells c, from two cells before and two behind."""
     if scheme == UPWIND:
         for i in range(f.size):
             f[i] = c[i]
@@ -38,15 +45,8 @@ def faces(scheme, limiter, small, a, b, c, d, e, f):
     elif scheme == WENO5:
         for i in range(f.size):
             f[i] = value_weno5(a[i], b[i], c[i], d[i], e[i], small)
-    elif limiter == MINMOD:
-        for i in range(f.size):
-            f[i] = c[i] + 0.5 * slope_minmod(c[i] - b[i], d[i] - c[i])
-    elif limiter == VAN_LEER:
-        for i in range(f.size):
-            f[i] = c[i] + 0.5 * slope_van_leer(c[i] - b[i], d[i] - c[i])
     else:
-        for i in range(f.size):
-            f[i] = c[i] + 0.5 * slope_monotonized_central(c[i] - b[i], d[i] - c[i])
+        by_limiter(faces_limited, limiter, b, c, d, f)
 
 
 @njit

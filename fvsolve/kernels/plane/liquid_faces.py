@@ -26,7 +26,6 @@ from fvsolve.kernels.plane.faces import (
     place,
     put_inward,
     put_sides,
-    width,
 )
 from fvsolve.kernels.plane.liquid_log import log_sum
 from fvsolve.kernels.plane.waves import invariant, state
@@ -147,13 +146,13 @@ def work_size(integers):
 
 @njit
 def liquid_rates(
-    law, c0, rho, table, scheme, limiter, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
+    law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
 ):
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
     table : of `waves` in place of a law, or None
-    scheme, limiter : UPWIND, or MUSCL as in `faces.width`
+    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
     reflect : float64[b]  share of a wave that comes back, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
     through : float64[b]  what comes in through the boundary [kg/(m s)], or empty
@@ -176,7 +175,6 @@ def liquid_rates(
     free = w[_FREE:]
     for i in range(BLOCK):
         w[_TOP + i], free[i] = 0.0, HUGE
-    wide_by = width(limiter)
     known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:

@@ -14,7 +14,7 @@ compiled, so that neither law compiles or runs anything of the other's.
 from math import sqrt
 
 from fvsolve.jit import inner, njit
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
+from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.plane.liquid import (
     BEYOND,
     EDGE,
@@ -36,7 +36,7 @@ from fvsolve.kernels.plane.liquid import (
 from fvsolve.kernels.plane.shallow import put_inward
 from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.reconstruction import value_weno5
-from fvsolve.kernels.records import LINEAR, MINMOD, UPWIND, VAN_LEER, WENO5
+from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
 
 
 @njit(forceinline=True)
@@ -75,6 +75,16 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
         top[i] = rate if rate > top[i] else top[i]
 
 
+@inner
+def carried_limited(limiter, forward, backward, b, c, d, e, f):
+    """`faces_carried` by a limiter."""
+    for i in range(f.size):
+        on, jump = forward[i] > backward[i], d[i] - c[i]
+        rise = c[i] - b[i] if on else e[i] - d[i]
+        s = 0.5 * slope(limiter, rise, jump)
+        f[i] = c[i] + s if on else d[i] - s
+
+
 @njit
 def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f):
     """Values at faces between c and d from the side that the flow, forward less backward wave, comes from."""
@@ -91,24 +101,8 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
             on = forward[i] > backward[i]
             first, low, here = a[i] if on else g[i], b[i] if on else e[i], c[i] if on else d[i]
             f[i] = value_weno5(first, low, here, d[i] if on else c[i], e[i] if on else b[i], small)
-    elif limiter == MINMOD:
-        for i in range(f.size):
-            on, jump = forward[i] > backward[i], d[i] - c[i]
-            rise = c[i] - b[i] if on else e[i] - d[i]
-            s = 0.5 * slope_minmod(rise, jump)
-            f[i] = c[i] + s if on else d[i] - s
-    elif limiter == VAN_LEER:
-        for i in range(f.size):
-            on, jump = forward[i] > backward[i], d[i] - c[i]
-            rise = c[i] - b[i] if on else e[i] - d[i]
-            s = 0.5 * slope_van_leer(rise, jump)
-            f[i] = c[i] + s if on else d[i] - s
     else:
-        for i in range(f.size):
-            on, jump = forward[i] > backward[i], d[i] - c[i]
-            rise = c[i] - b[i] if on else e[i] - d[i]
-            s = 0.5 * slope_monotonized_central(rise, jump)
-            f[i] = c[i] + s if on else d[i] - s
+        by_limiter(carried_limited, limiter, forward, backward, b, c, d, e, f)
 
 
 @inner

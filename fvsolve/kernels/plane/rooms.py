@@ -143,7 +143,7 @@ def shallow_meshes(t, y, dydt, out, handle):
         if f >= 0:  # scalars are carried by them
             flow = plane[f : f + basin["faces"]]
         rate = shallow_faces.shallow_rates(
-            st["gravity"], basin["scheme"], basin["limiter"], plane[basin["mesh"] :], integers[basin["links"] :],
+            st["gravity"], basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
             plane[through : through + basin["outer_given"]], plane[basin["work"] :], rates[:n], rate_x, rate_y,
         )  # fmt: skip
@@ -158,7 +158,7 @@ def liquid_mesh(tables, b, table, y, dydt, out):
     to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
     rates = to[first : first + 3 * n]
     rate = liquid_faces.liquid_rates(
-        tables.settings[0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["limiter"],
+        tables.settings[0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["wide"],
         plane[basin["mesh"] :],
         integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
         y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],

@@ -6,15 +6,22 @@ to the bit. An upwind cell's slope comes from the difference across the face and
 """
 
 from fvsolve.jit import inner, njit
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central, slope_van_leer
-from fvsolve.kernels.records import MINMOD, UPWIND, VAN_LEER
+from fvsolve.kernels.limiters import by_limiter, limited, slope
+from fvsolve.kernels.records import UPWIND
 
 
 @njit
-def value(slope, forward, b, c, d, e):
+def value(limiter, forward, b, c, d, e):
     """The value between cells c and d, from c where the flow is forward; b and e lie beyond them."""
-    half = 0.5 * slope(c - b if forward else e - d, d - c)
+    half = 0.5 * slope(limiter, c - b if forward else e - d, d - c)
     return c + half if forward else d - half
+
+
+@inner
+def along_limited(limiter, factor, flow, b, c, d, e, q):
+    """Values q at faces between c and d by a limiter."""
+    for i in range(q.size):
+        q[i] = value(limiter, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
 
 
 @njit
@@ -32,15 +39,8 @@ def along(scheme, limiter, factor, flow, b, c, d, e, q):
         for i in range(q.size):
             low, high = c[i], d[i]  # read before it is known which: a choice, not a branch
             q[i] = low if factor * flow[i] > 0.0 else high
-    elif limiter == MINMOD:
-        for i in range(q.size):
-            q[i] = value(slope_minmod, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
-    elif limiter == VAN_LEER:
-        for i in range(q.size):
-            q[i] = value(slope_van_leer, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
     else:
-        for i in range(q.size):
-            q[i] = value(slope_monotonized_central, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
+        by_limiter(along_limited, limiter, factor, flow, b, c, d, e, q)
 
 
 @njit
@@ -48,11 +48,8 @@ def one_value(scheme, limiter, forward, b, c, d, e):
     """The value at one face."""
     if scheme == UPWIND:
         return c if forward else d
-    if limiter == MINMOD:
-        return value(slope_minmod, forward, b, c, d, e)
-    if limiter == VAN_LEER:
-        return value(slope_van_leer, forward, b, c, d, e)
-    return value(slope_monotonized_central, forward, b, c, d, e)
+    half = 0.5 * limited(limiter, c - b if forward else e - d, d - c)
+    return c + half if forward else d - half
 
 
 @inner
@@ -75,30 +72,27 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
 
 
 @inner
+def across_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
+    """`across` by a limiter."""
+    fe, qe = fx[1:], qx[1:]
+    for i in range(rate.size):
+        q = value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
+        qn[i] = q
+        rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+
+
+@inner
 def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
     """Values qn at the northern faces of a row of cells c, and its rates; ky : its own."""
-    fe, qe = fx[1:], qx[1:]
     if scheme == UPWIND:
+        fe, qe = fx[1:], qx[1:]
         for i in range(rate.size):
             low, high = c[i], d[i]
             q = low if factor * fn[i] > 0.0 else high
             qn[i] = q
             rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
-    elif limiter == MINMOD:
-        for i in range(rate.size):
-            q = value(slope_minmod, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
-            qn[i] = q
-            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
-    elif limiter == VAN_LEER:
-        for i in range(rate.size):
-            q = value(slope_van_leer, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
-            qn[i] = q
-            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
     else:
-        for i in range(rate.size):
-            q = value(slope_monotonized_central, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
-            qn[i] = q
-            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+        by_limiter(across_limited, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate)
 
 
 def second_order_work(nx, ny):

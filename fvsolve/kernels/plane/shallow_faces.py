@@ -27,7 +27,6 @@ from fvsolve.kernels.plane.faces import (
     place,
     put_inward,
     put_sides,
-    width,
 )
 from fvsolve.kernels.records import UPWIND
 
@@ -140,12 +139,12 @@ def work_size(integers):
 
 @njit
 def shallow_rates(
-    g, scheme, limiter, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y
+    g, scheme, wide_by, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y
 ):
     """Rates of all cells; returns the greatest of sum L (|u| + c) / (2 A) and of the share that leaves a cell [1/s].
 
     Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
-    scheme, limiter : UPWIND, or MUSCL as in `faces.width`
+    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
     reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
     flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
     through : float64[b]  volumes inward through the boundary [m3/s], or empty
@@ -168,7 +167,6 @@ def shallow_rates(
     top, shore = w[11 * BLOCK :], w[12 * BLOCK :]
     for i in range(BLOCK):
         top[i] = 0.0
-    wide_by = width(limiter)
     known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
     for j in range(count):
         while sided < need[j]:

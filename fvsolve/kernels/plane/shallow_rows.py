@@ -9,12 +9,11 @@ pressure on the side before and after, of momentum along the faces.
 from math import sqrt
 
 from fvsolve.jit import inner, njit
-from fvsolve.kernels.limiters import slope_minmod, slope_monotonized_central
-from fvsolve.kernels.records import MINMOD, UPWIND, VAN_LEER
+from fvsolve.kernels.limiters import by_limiter, halves
+from fvsolve.kernels.records import UPWIND
 
 THIN = 1e-6  # depth below which velocities fade [m]
 TINY = 1e-300
-LEAST = 1e-280  # product of two differences below which a slope is none, so that four can be multiplied
 MOST = 1024  # cells of a row at a time
 GHOSTS = 8  # three are needed; with eight the cells of a row begin where a cache line does
 STRIDE = 1048  # an odd number of cache lines, so that rows do not push each other out
@@ -77,34 +76,22 @@ def put_beyond(n, fields, walls, last, mirror, cells):
                 p[i] = walls[i] * turn * b[i] + (1.0 - walls[i]) * a[i]
 
 
-@njit
-def van_leer_halves(a, b, c, d):
-    """Half the slopes a b / (a + b) and c d / (c + d), zero where signs differ, by one division."""
-    ab, cd = a * b, c * d
-    one, two = ab > LEAST, cd > LEAST
-    s, t = (a + b if one else 1.0), (c + d if two else 1.0)
-    r = 1.0 / (s * t)
-    return ab * (t * r) if one else 0.0, cd * (s * r) if two else 0.0
-
-
-@njit
-def minmod_halves(a, b, c, d):
-    """Half the slopes from two pairs of differences."""
-    return 0.5 * slope_minmod(a, b), 0.5 * slope_minmod(c, d)
-
-
-@njit
-def central_halves(a, b, c, d):
-    """Half the slopes from two pairs of differences."""
-    return 0.5 * slope_monotonized_central(a, b), 0.5 * slope_monotonized_central(c, d)
-
-
 @inner
 def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
     """Values at both faces of cell i and what its surface rises."""
     sides[i], sides[i + SURFACE], sides[i + EAST], sides[i + NORTH] = hl, el, ul, vl
     sides[i + HIGH], sides[i + (HIGH + SURFACE)], sides[i + (HIGH + EAST)], sides[i + (HIGH + NORTH)] = hr, er, ur, vr
     sides[i + PUSH] = push
+
+
+@inner
+def put_sloped(limiter, n, before, here, after, sides):
+    """`put_limited` by a limiter."""
+    for i in range(n):
+        h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
+        a, b = halves(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
+        c, d = halves(limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v)
+        put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
 
 
 @njit
@@ -114,28 +101,8 @@ def put_limited(scheme, limiter, n, before, here, after, sides):
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
             put_side(i, h, e, u, v, h, e, u, v, 0.0, sides)
-    elif limiter == MINMOD:
-        for i in range(n):
-            h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
-            a, b = minmod_halves(h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
-            c, d = minmod_halves(u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v)
-            put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
-    elif limiter == VAN_LEER:
-        for i in range(n):
-            h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
-            a, b = van_leer_halves(h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
-            c, d = van_leer_halves(
-                u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
-            )
-            put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
     else:
-        for i in range(n):
-            h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
-            a, b = central_halves(h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
-            c, d = central_halves(
-                u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
-            )
-            put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
+        by_limiter(put_sloped, limiter, n, before, here, after, sides)
 
 
 @inner

@@ -16,13 +16,13 @@ from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
 from fvsolve.model.basins import FIFTH
 from fvsolve.model.face_mesh import lower_mesh
+from fvsolve.model.schemes import LIMITERS
 from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
 
 if TYPE_CHECKING:
     from fvsolve.mesh.points import Points
 
-LIMITERS = {"minmod": rec.MINMOD, "van-leer": rec.VAN_LEER, "monotonized-central": rec.MONOTONIZED_CENTRAL}
 ROUNDING = 1e-12  # of rates
 MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
 
@@ -159,7 +159,7 @@ class Basin:
         numerics, mesh, before = self.case.numerics, self.mesh, scene.plane_size + len(scene.integers)
         self.row, row["n"] = row, self.n
         row["scheme"] = rec.UPWIND if numerics.scheme == "upwind" else FIFTH.get(numerics.scheme, rec.MUSCL)
-        row["limiter"] = LIMITERS.get(numerics.limiter, rec.MONOTONIZED_CENTRAL)
+        row["limiter"], row["wide"] = LIMITERS[numerics.limiter]
         row["area"] = scene.to_plane(mesh.area)
         if self.is_grid:
             grid = mesh.grid
