@@ -11,7 +11,7 @@ from truth.scenes import WATER, chamber, junction, pipe, reservoir, scene, tank,
 import fvsolve
 from fvsolve.kernels import records as rec
 from fvsolve.solve.loop import Loop
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 
 PIPES = {"pipes", "ends", "reconstruction", "limiters", "leap"}
 BODIES = {"mechanics"}
@@ -38,7 +38,7 @@ def compiled_with(*functions) -> set[str]:
 
 
 def files(model) -> set[str]:
-    loop, own = Loop(model), model.functions.scene.functions(*JOBS)
+    loop, own = Loop(model), model.functions.cast.functions(*JOBS)
     return compiled_with(*own, loop.stepper.attempt, loop.stepper.march, *loop.stepper.algebra)
 
 
@@ -141,7 +141,7 @@ def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
 @pytest.mark.parametrize(("physics", "law"), [("transport", "linear"), ("free-surface", "linear"), ("liquid", "log")])
 def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
     alone, both = (fvsolve.build(fvsolve.load(pool(physics, links, law))) for links in (False, True))
-    assert alone.functions.scene.alone and not both.functions.scene.alone
+    assert alone.functions.cast.alone and not both.functions.cast.alone
     y = fvsolve.initial_state(alone).y
     y += 1e-3 * np.cos(np.arange(y.size)) * np.abs(y).max()
     assert alone.state_names == both.state_names and np.abs(alone.rhs(0.0, y)).max() > 0.0
@@ -159,4 +159,4 @@ def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
     loop = Loop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)
     loop.run(1e308)
-    assert loop.memory[told.STEPS] == 100 and loop.memory[told.CALLS] <= 4 * 100 + 1
+    assert loop.memory[slots.STEPS] == 100 and loop.memory[slots.CALLS] <= 4 * 100 + 1

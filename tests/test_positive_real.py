@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pytest import approx
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.studies import positive_real
 from fvsolve.studies.ports.rational import places
 

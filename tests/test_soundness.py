@@ -18,7 +18,7 @@ from fvsolve.limits.step import step_limits
 from fvsolve.run import model_of
 from fvsolve.solve.loop import MOST_IN_A_SPAN, SPAN, Loop
 from fvsolve.solve.soundness import OPEN, Soundness, unclosed
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.studies import sweep
 from tests.truth.scenes import scene
 
@@ -49,9 +49,9 @@ def closing(cells: int = 40, beta: float = 2.2e9, **numerics) -> dict:
 @pytest.mark.parametrize("setting", ["numerics.step=0.1", "numerics.courant=1.25"])
 def test_the_main_case_beyond_its_limit_is_not_ok_grown_or_not(setting, fvs, tmp_path):
     code, out, *_ = fvs("run", MAIN, "--set", setting, "--out", str(tmp_path / "run"))
-    told = json.loads((tmp_path / "run" / "summary.json").read_text())
-    (limit,) = [one for one in told["warnings"] if one["kind"] == "step-limit"]
-    assert code == 1 and not told["ok"] and not limit["ok"] and limit["place"] == "links.main"
+    slots = json.loads((tmp_path / "run" / "summary.json").read_text())
+    (limit,) = [one for one in slots["warnings"] if one["kind"] == "step-limit"]
+    assert code == 1 and not slots["ok"] and not limit["ok"] and limit["place"] == "links.main"
     assert limit["limit"] == pytest.approx(advection_limit("fromm", "ssp-rk3").limit, rel=1e-12)
     assert limit["value"] > limit["limit"] and "or less" in limit["text"]
     assert "not to be trusted" in " ".join(out.split())
@@ -263,7 +263,7 @@ def test_events_that_crowd_within_a_millionth_of_a_run_are_bounded_under_error_c
         loop = Loop(model_of(case))
         count = loop.crowd.maxlen
         for k in range(count):
-            loop.memory[told.T] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
+            loop.memory[slots.T] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
             goes_on = loop.switch(loop.armed.copy())
             assert goes_on or k == count - 1
         assert goes_on is not crowds

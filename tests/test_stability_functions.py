@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, analyse, global_error, local_error, pade, seen_frequency, stability_function
 from fvsolve.steppers.analysis.stability_function import by_determinants, by_resolvent
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.polynomial import Polynomial
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 PADE = {  # Hairer and Wanner 1996, IV.3 and IV.5

@@ -12,7 +12,7 @@ from fvsolve.cli import terminal
 from fvsolve.cli.studying import method_from
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 
 PICTURES = (".png", ".svg", ".pdf")
 LONG = 28  # characters of an entry that is shown whole

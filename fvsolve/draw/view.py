@@ -75,19 +75,19 @@ def draw(frames: Frames, field: str, out: str, contours: int) -> None:
     """Draw in this process."""
     import pyvista
 
-    scene = Scene(frames, field, contours)
+    canvas = Canvas(frames, field, contours)
     film = len(frames) > 1
     plotter = pyvista.Plotter(off_screen=True, window_size=SMALL if film else SIZE)
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     plotter.enable_parallel_projection()
     if not film:
-        scene.show(plotter, *frames[0])
+        canvas.show(plotter, *frames[0])
         plotter.screenshot(out)
     elif out.endswith(".mp4"):
         plotter.open_movie(out, framerate=1000 // FRAME)
         for frame in frames:
-            scene.show(plotter, *frame)
+            canvas.show(plotter, *frame)
             plotter.write_frame()
         plotter.close()
     else:
@@ -95,12 +95,12 @@ def draw(frames: Frames, field: str, out: str, contours: int) -> None:
 
         pictures = []
         for frame in frames:
-            scene.show(plotter, *frame)
+            canvas.show(plotter, *frame)
             pictures.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(255))
         pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=FRAME, loop=0)
 
 
-class Scene:
+class Canvas:
     """What frames have in common: the range of their field, its unit, how far they reach and how they are seen."""
 
     def __init__(self, frames: Frames, field: str, contours: int) -> None:

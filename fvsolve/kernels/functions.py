@@ -4,9 +4,9 @@ import functools
 
 from fvsolve.jit import beside, njit
 from fvsolve.kernels import calls
-from fvsolve.kernels.rooms import Scene
+from fvsolve.kernels.rooms import Cast
 
-READERS = "from fvsolve.kernels.functions import Scene, compile_readers; "
+READERS = "from fvsolve.kernels.functions import Cast, compile_readers; "
 MARCH = "from fvsolve.steppers.march import compiled; compiled()"
 INSIDE = {getattr(calls, name.upper()): name for name in ("clusters", "inflows", "hold", "move", "brake")}
 
@@ -17,18 +17,18 @@ class Functions:
     calls : int64[jobs, n]  addresses of what they call, which the handle of a model must hold
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene, rates = scene, scene.functions("before", "core", "after")
+    def __init__(self, cast: Cast) -> None:
+        self.cast, rates = cast, cast.functions("before", "core", "after")
         self.calls = calls.empty_calls(len(rates) + 2)
-        with beside(f"{READERS}compile_readers({scene!r}); {MARCH}", "march.march-*.nbi"):
+        with beside(f"{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.one(calls.RHS, rates, calls.rhs_in_turn)
         for job, name in INSIDE.items():
-            self.enter(job, scene.functions(name))
-        self.enter(calls.CLOSE, scene.functions("before", "core"))
-        self.observe = self.one(calls.OBSERVE, scene.functions("observe"), calls.observe_in_turn)
-        self.enter(calls.RECORD, scene.functions("record"))
-        self.enter(calls.EVENTS, scene.functions("events"))
-        self.record, self.events = compile_readers(scene)
+            self.enter(job, cast.functions(name))
+        self.enter(calls.CLOSE, cast.functions("before", "core"))
+        self.observe = self.one(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
+        self.enter(calls.RECORD, cast.functions("record"))
+        self.enter(calls.EVENTS, cast.functions("events"))
+        self.record, self.events = compile_readers(cast)
 
     def enter(self, job: int, functions: list) -> None:
         """Note the addresses of a job's functions."""
@@ -45,16 +45,16 @@ class Functions:
     @functools.cached_property
     def energies(self) -> tuple:
         """(power, stored), each of (t, y, dydt, out, handle, rows)."""
-        power, stored = self.scene.functions("power"), self.scene.functions("stored")
+        power, stored = self.cast.functions("power"), self.cast.functions("stored")
         return self.one(calls.POWER, power, calls.power_in_turn), self.one(calls.STORED, stored, calls.stored_in_turn)
 
 
 functions = functools.cache(Functions)
 
 
-def compile_readers(scene: Scene) -> tuple:
+def compile_readers(cast: Cast) -> tuple:
     """(record, events) of a scene, compiled with all that they call."""
-    for function in scene.functions("observe", "record", "events"):
+    for function in cast.functions("observe", "record", "events"):
         calls.compile_as(function, calls.READS)
     calls.compile_as(calls.record_in_turn, calls.READS)
     calls.compile_as(calls.events_in_turn, "tvhv")

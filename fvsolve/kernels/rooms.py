@@ -123,7 +123,7 @@ ALWAYS = Room(record="observer: record_nodes", events="observer: tank_events")
 
 
 @dataclass(frozen=True)
-class Scene:
+class Cast:
     """What decides which functions a scene is made of.
 
     law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are

@@ -22,8 +22,8 @@ from fvsolve.limits.boxes import negative_point, value
 from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability import a_stable
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
-from fvsolve.steppers.exact.sturm import count_roots, odd_part
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import count_roots, odd_part
 from fvsolve.steppers.tableau import METHODS, Method, method_named
 
 RAYS = 240  # waves whose roots are looked at first

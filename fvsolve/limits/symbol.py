@@ -14,7 +14,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model.schemes import FAMILIES, LINEAR
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.polynomial import Polynomial
 
 Weights = tuple[Fraction, ...]
 LARGEST_DENOMINATOR = 1000  # of a face weight: the table holds them as floats

@@ -18,7 +18,7 @@ SHOWN = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class Sketch:
     """A mesh as it is being read, in the file's unit."""
 
     points: np.ndarray
@@ -47,12 +47,12 @@ class Draft:
         return f"{len(cells)} of {len(self.cells)} cells: {', '.join(named)}"
 
 
-def shape_faults(draft: Draft) -> tuple[list[Fault], np.ndarray, np.ndarray]:
+def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
     """(faults of single cells, bool[n] which cells are bad, bool[n] which turn right, sound ones clockwise)."""
-    turn, _, side = corners(draft.points, draft.cells)
+    turn, _, side = corners(sketch.points, sketch.cells)
     long = side.max(axis=1, keepdims=True)
     left, right = turn > FLAT * long**2, turn < -FLAT * long**2
-    quad = draft.cells[:, 3] >= 0
+    quad = sketch.cells[:, 3] >= 0
     kinds = {
         "have corners in one place; wanted three or four apart: a collapsed quad is a triangle": (
             side <= FLAT * long
@@ -68,11 +68,11 @@ def shape_faults(draft: Draft) -> tuple[list[Fault], np.ndarray, np.ndarray]:
         which = np.flatnonzero(which & ~bad)
         bad[which] = True
         if which.size:
-            faults.append(Fault("cells", f"{draft.list(which)} {words}"))
+            faults.append(Fault("cells", f"{sketch.list(which)} {words}"))
     return faults, bad, right.any(axis=1)
 
 
-def overlap_faults(draft: Draft, edges: Edges, number: np.ndarray) -> list[Fault]:
+def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
     """Faces with more than two cells, or with two on one side; number : int64  the numbers of the cells of `edges`."""
     crowded = np.flatnonzero(edges.mate == CROWDED)
     faces = np.unique(edges.key[crowded])
@@ -80,21 +80,21 @@ def overlap_faults(draft: Draft, edges: Edges, number: np.ndarray) -> list[Fault
         return []
     at = crowded[edges.key[crowded] == faces[0]]
     cells = np.sort(number[edges.cell[at]])
-    which = " and ".join(draft.show(c) for c in cells[:SHOWN])
+    which = " and ".join(sketch.show(c) for c in cells[:SHOWN])
     many = "more than two cells share it" if cells.size > 2 else "both lie on one side of it"
     more = f" ({faces.size} such faces)" if faces.size > 1 else ""
-    where = draft.face((edges.start[at[0]], edges.stop[at[0]]))
+    where = sketch.face((edges.start[at[0]], edges.stop[at[0]]))
     remedy = "wanted one cell on each side; is a surface meshed twice, or in two physical groups?"
     return [Fault("cells", f"they overlap at {where}{more}: {which}, {many}; {remedy}")]
 
 
-def contact_faults(draft: Draft, edges: Edges, named: np.ndarray) -> list[Fault]:
+def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
     """Boundary faces that touch others elsewhere than at their ends; named : bool[outer]  in a group.
 
     Two faces in one place are the sides of a thin wall where a group names one of them.
     """
     start, stop, cell = edges.start[edges.outer], edges.stop[edges.outer], edges.cell[edges.outer]
-    found, whole = contacts(draft.points[start], draft.points[stop], named)
+    found, whole = contacts(sketch.points[start], sketch.points[stop], named)
     words = {
         "same": "lie in one place and do not hang together: {one} and {other} at {face}; wanted one set of points "
         "there (Gmsh: Coherence), or a group that names it as a thin wall",
@@ -107,7 +107,7 @@ def contact_faults(draft: Draft, edges: Edges, named: np.ndarray) -> list[Fault]
         if len(pairs):
             i, j = pairs[0]
             said = words[kind].format(
-                one=draft.show(cell[i]), other=draft.show(cell[j]), face=draft.face((start[i], stop[i]))
+                one=sketch.show(cell[i]), other=sketch.show(cell[j]), face=sketch.face((start[i], stop[i]))
             )
             number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
             many = f"at {number}{'' if whole else ' or more'} places faces"
@@ -115,13 +115,13 @@ def contact_faults(draft: Draft, edges: Edges, named: np.ndarray) -> list[Fault]
     return faults
 
 
-def piece_faults(draft: Draft, edges: Edges) -> list[Fault]:
+def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
     """A mesh that does not hang together."""
-    piece = edges.pieces(len(draft.cells))
+    piece = edges.pieces(len(sketch.cells))
     size, first = np.bincount(piece), np.unique(piece, return_index=True)[1]
     if size.size == 1:
         return []
-    listed = [f"{size[k]} with {draft.show(first[k])}" for k in np.argsort(-size, kind="stable")[:SHOWN]]
+    listed = [f"{size[k]} with {sketch.show(first[k])}" for k in np.argsort(-size, kind="stable")[:SHOWN]]
     more = ", ..." if size.size > SHOWN else ""
     return [
         Fault(
@@ -133,7 +133,7 @@ def piece_faults(draft: Draft, edges: Edges) -> list[Fault]:
 
 
 def grouped(
-    draft: Draft, edges: Edges, lines: np.ndarray, groups: Mapping[str, np.ndarray]
+    sketch: Sketch, edges: Edges, lines: np.ndarray, groups: Mapping[str, np.ndarray]
 ) -> tuple[list[Fault], list[str], np.ndarray]:
     """(faults, patch names, int64[outer] the patch of each outer edge, -1 where no group names it)."""
     names = [*(name for name in groups if name != WALL), WALL]
@@ -146,28 +146,28 @@ def grouped(
             remedy = "wanted lines of the boundary; Gmsh leaves them out under Mesh.SaveAll = 1"
             faults.append(Fault(place, f"no line in the file is in it; {remedy}"))
             continue
-        wanted = key_of(lines[members], len(draft.points))
+        wanted = key_of(lines[members], len(sketch.points))
         spot = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
         missed = keys[spot] != wanted
         if missed.any():
             text = f"{missed.sum()} of {members.size} lines no face of the boundary"
-            how = _beside(draft, edges, lines[members][missed][0])
+            how = _beside(sketch, edges, lines[members][missed][0])
             faults.append(Fault(place, f"{text}: {how}; wanted a curve of the boundary"))
         spot = spot[~missed]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:
             others = listing(f'"{names[k]}"' for k in np.unique(patch[taken]))
             first = edges.outer[taken[0]]
-            where = draft.face((edges.start[first], edges.stop[first]))
+            where = sketch.face((edges.start[first], edges.stop[first]))
             faults.append(Fault(place, f"shares {taken.size} faces with {others}, {where}; wanted each in one group"))
         patch[spot] = names.index(name)
     return faults, names, patch
 
 
-def _beside(draft: Draft, edges: Edges, ends: np.ndarray) -> str:
+def _beside(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
     """Where a line lies that is no face of the boundary."""
     if (ends < 0).any():
         return "one ends in a point that no cell has"
-    where = draft.face(ends).removeprefix("the face ")
-    inside = np.isin(key_of(ends[None], len(draft.points)), edges.key).any()
+    where = sketch.face(ends).removeprefix("the face ")
+    inside = np.isin(key_of(ends[None], len(sketch.points)), edges.key).any()
     return f"the one {where} {'lies between two cells' if inside else 'is no side of a cell'}"

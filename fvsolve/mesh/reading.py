@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import Fault, MeshError
-from fvsolve.mesh.checks import Draft, contact_faults, grouped, overlap_faults, piece_faults, shape_faults
+from fvsolve.mesh.checks import Sketch, contact_faults, grouped, overlap_faults, piece_faults, shape_faults
 from fvsolve.mesh.edges import edges_of
 from fvsolve.mesh.files import Content, load
 from fvsolve.mesh.mesh import WALL, Mesh
@@ -39,27 +39,27 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     if spare:
         notes.append(f"{spare} of {len(content.points)} points in the file belong to no cell: left out")
     lines = _renumber(content.lines, used[1:])
-    draft = Draft(content.points[used[1:], :2], cells, unit)
-    faults, bad, clockwise = shape_faults(draft)
+    sketch = Sketch(content.points[used[1:], :2], cells, unit)
+    faults, bad, clockwise = shape_faults(sketch)
     cells[clockwise] = _turned(cells[clockwise])
     if clockwise.any():
-        notes.append(f"{draft.list(np.flatnonzero(clockwise))} ran clockwise: turned")
+        notes.append(f"{sketch.list(np.flatnonzero(clockwise))} ran clockwise: turned")
     number = np.flatnonzero(~bad)
-    edges = edges_of(cells[number], len(draft.points))
-    faults += overlap_faults(draft, edges, number)
+    edges = edges_of(cells[number], len(sketch.points))
+    faults += overlap_faults(sketch, edges, number)
     if faults:
         raise MeshError(faults, path.name)
-    faults, names, patch = grouped(draft, edges, lines, content.groups)
-    touching = contact_faults(draft, edges, patch >= 0)
-    faults += touching or piece_faults(draft, edges)
+    faults, names, patch = grouped(sketch, edges, lines, content.groups)
+    touching = contact_faults(sketch, edges, patch >= 0)
+    faults += touching or piece_faults(sketch, edges)
     if faults:
         raise MeshError(faults, path.name)
-    notes += _notes(draft, factor, patch, bool(content.groups))
+    notes += _notes(sketch, factor, patch, bool(content.groups))
     cells = cells[edges.order(len(cells))]
-    draft, edges = Draft(draft.points, cells, unit), edges_of(cells, len(draft.points))
-    patch = grouped(draft, edges, lines, content.groups)[2]
+    sketch, edges = Sketch(sketch.points, cells, unit), edges_of(cells, len(sketch.points))
+    patch = grouped(sketch, edges, lines, content.groups)[2]
     patch = np.where(patch < 0, len(names) - 1, patch)
-    return assemble(factor * draft.points, cells, edges, names, patch, notes=notes)
+    return assemble(factor * sketch.points, cells, edges, names, patch, notes=notes)
 
 
 def _factor(unit: str, path: Path) -> float:
@@ -106,7 +106,7 @@ def _turned(cells: np.ndarray) -> np.ndarray:
     return np.where(cells[:, 3:] < 0, triangle, quad)
 
 
-def _notes(draft: Draft, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
+def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
     """What the file leaves unsaid: names of the boundary, and perhaps its unit."""
     notes = []
     unnamed = int((patch < 0).sum())
@@ -114,8 +114,8 @@ def _notes(draft: Draft, factor: float, patch: np.ndarray, grouped: bool) -> lis
         notes.append(f'the file names no group of lines: all {unnamed} faces of the boundary are "{WALL}"')
     elif unnamed:
         notes.append(f'{unnamed} of {patch.size} faces of the boundary are in no group: they are "{WALL}"')
-    extent = factor * np.ptp(draft.points, axis=0).max()
-    if draft.unit == "m" and not SMALL <= extent <= LARGE:
+    extent = factor * np.ptp(sketch.points, axis=0).max()
+    if sketch.unit == "m" and not SMALL <= extent <= LARGE:
         guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'
         notes.append(f"the mesh is {extent:.6g} m across: is the file in another unit? then say so, perhaps {guess}")
     return notes

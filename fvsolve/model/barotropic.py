@@ -17,12 +17,12 @@ from fvsolve.model.start import PRESSURE_SCALE, STORED, Start
 class BarotropicStart(Start):
     """Potentials are rho_ref (h(p) + g z); what densities change in drops is lagged until nothing moves."""
 
-    def __init__(self, scene) -> None:
-        super().__init__(scene)
-        self.st, self.floats = scene.tables.settings[0], scene.tables.floats
-        self.rho, self.g = scene.fluid.density, self.case.gravity
+    def __init__(self, draft) -> None:
+        super().__init__(draft)
+        self.st, self.floats = draft.tables.settings[0], draft.tables.floats
+        self.rho, self.g = draft.fluid.density, self.case.gravity
         self.jets = {name: self.jet(row, *2 * [self.rho * float(row["area"])]) for name, row in
-                     zip(scene.pipe_names, self.pipes, strict=True)}  # fmt: skip
+                     zip(draft.pipe_names, self.pipes, strict=True)}  # fmt: skip
         self.end_flow = end_flow
         if self.st["floor"] > 0.0:
             from fvsolve.kernels.cavitating_nodes import end_flow_cavitating
@@ -41,11 +41,11 @@ class BarotropicStart(Start):
             before = now
             self.correct()
         if np.max(moves) > 1e-9:
-            scene, worst = self.scene, int(np.argmax(moves))
-            names = [*self.case.places, *scene.pipe_names, *scene.column_names, *scene.valve_names, *self.case.links]
-            scene.fault("numerics.initial", f"no steady state was found: {names[worst]} moves with the densities; "
+            draft, worst = self.draft, int(np.argmax(moves))
+            names = [*self.case.places, *draft.pipe_names, *draft.column_names, *draft.valve_names, *self.case.links]
+            draft.fault("numerics.initial", f"no steady state was found: {names[worst]} moves with the densities; "
                         'look at the heads around it, or use initial = "rest"')  # fmt: skip
-            self.scene.check()
+            self.draft.check()
 
     def jet(self, row, m_from: float, m_to: float) -> tuple[float, float]:
         """What a pipe's flow M loses over M^2 [Pa s2/kg2] where it leaves at its `from` end and at its `to` end.
@@ -67,7 +67,7 @@ class BarotropicStart(Start):
             return self.case.ambient_pressure if node.pressure is None else node.pressure
         if row["kind"] == rec.TANK:
             return head_pressure(self.st, self.floats, float(node.level))
-        value = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
+        value = schedule_value(self.draft.tables, int(row["schedule"]), self.t)
         return head_pressure(self.st, self.floats, value - row["elevation"]) if row["head_given"] else value
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
@@ -79,16 +79,16 @@ class BarotropicStart(Start):
     def correct(self) -> None:
         """What drops differ from those of a constant density, at the present answer."""
         potential = self.answer.potential
-        names = self.scene.pipe_names
-        for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
+        names = self.draft.pipe_names
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
             flow, i, j = float(self.pipe_flow[k]), int(row["from_node"]), int(row["to_node"])
             row["flow"] = flow
             row["drag"] = self.pipe_drop(row)
             b_to = self.march(row, mesh, flow)[2]
             if not math.isfinite(b_to):
-                self.scene.fault(f"links.{names[k]}", "no steady state: its pressure falls below what the density law "
+                self.draft.fault(f"links.{names[k]}", "no steady state: its pressure falls below what the density law "
                                  'can hold; look at the heads at its ends, or use initial = "rest"')  # fmt: skip
-                self.scene.check()
+                self.draft.check()
             lost = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
             self.jets[names[k]] = self.jet(row, *self.ends)
             plain = row["drag"] / row["area"] * mesh.length + self.jets[names[k]][flow > 0.0] * abs(flow) * flow
@@ -157,8 +157,8 @@ class BarotropicStart(Start):
         return faces, centers
 
     def fill_pipes(self) -> None:
-        profile, self.driven = self.scene.tables.profile, {}
-        for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
+        profile, self.driven = self.draft.tables.profile, {}
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
             flow = row["flow"] = float(self.pipe_flow[k])
             row["drag"] = self.pipe_drop(row)
             faces, centers = self.match(row, mesh, flow)
@@ -172,9 +172,9 @@ class BarotropicStart(Start):
                 near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
                 row[f"{name}_base"] = into if near else sign * flow
                 row[f"{name}_mass"] = mass if near else m0
-            boiling, _ = law.mass_of_pressure(self.st, self.floats, row, cavity_pressure(self.scene.fluid))
+            boiling, _ = law.mass_of_pressure(self.st, self.floats, row, cavity_pressure(self.draft.fluid))
             profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
-            self.scene.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
+            self.draft.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
             self.flux(row, faces, profile)
 
     def flux(self, row, faces, profile) -> None:
@@ -187,14 +187,14 @@ class BarotropicStart(Start):
         return law.pressure_of_mass(self.st, self.floats, row, float(m))
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
-        row, mesh = self.pipes[k], self.scene.meshes[k]
+        row, mesh = self.pipes[k], self.draft.meshes[k]
         z = self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
         return self.pressure_of_mass(row, self.mass_at(k, fraction)), z
 
     def mass_at(self, k: int, fraction: float) -> float:
         """Mass per length of the profile at a fraction of pipe k, linear between faces and centres."""
-        row, mesh = self.pipes[k], self.scene.meshes[k]
-        profile, n = self.scene.tables.profile, mesh.cells
+        row, mesh = self.pipes[k], self.draft.meshes[k]
+        profile, n = self.draft.tables.profile, mesh.cells
         both = np.empty(2 * n + 1)
         both[0::2], both[1::2] = (
             profile[row["face"] : row["face"] + n + 1],
@@ -222,12 +222,12 @@ class BarotropicStart(Start):
         return float(self.valves[k]["conductance"]) * rho / self.rho, drop
 
     def fill_valves(self) -> None:
-        out = np.zeros(int(self.scene.tables.layout[0]["size"]))
+        out = np.zeros(int(self.draft.tables.layout[0]["size"]))
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
             if row["open"] > 0.0 and row["law"] < rec.CURVE:
-                target = valve_target(self.scene.tables, out, k, float(row["open"]))[0]
+                target = valve_target(self.draft.tables, out, k, float(row["open"]))[0]
                 follows = row["transition"] > 0.0 or row["law"] == rec.POWER
                 asked = target if follows else np.sign(target) * np.sqrt(abs(target))
                 if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):

@@ -40,17 +40,17 @@ def build(case) -> Model:
     """
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; wanted what load() gives")
-    scene = Scene(case)
-    scene.nodes()
-    scene.links()
-    scene.settle()
-    return scene.model()
+    draft = Draft(case)
+    draft.nodes()
+    draft.links()
+    draft.settle()
+    return draft.model()
 
 
 LINE = 8  # floats of a cache line
 
 
-class Scene:
+class Draft:
     """The tables of one model while they are filled."""
 
     def __init__(self, case) -> None:

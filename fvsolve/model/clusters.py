@@ -10,9 +10,9 @@ from fvsolve.kernels import records as rec
 from fvsolve.steady import union
 
 
-def sort_nodes(scene) -> None:
+def sort_nodes(draft) -> None:
     """Sort nodes and valves into those with closed roots and those that Newton solves together."""
-    nodes, valves = scene.node_table, scene.valve_table
+    nodes, valves = draft.node_table, draft.valve_table
     inner = nodes["kind"] == rec.JUNCTION
     group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in valves
                                if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
@@ -24,18 +24,18 @@ def sort_nodes(scene) -> None:
                 if k not in touched[group[i]]:
                     touched[group[i]].append(k)
     known = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
-    integers = scene.integers = []
+    integers = draft.integers = []
     clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
     nodes["solve"] = rec.ALONE
     for root, ks in touched.items():
         soft = np.all(nodes["admittance"][members[root]] > 0.0)
         plain = np.all(valves["law"][ks] == rec.ROOT)
-        single = len(ks) == 1 and soft and plain and scene.case.fluid.law == "linear"
+        single = len(ks) == 1 and soft and plain and draft.case.fluid.law == "linear"
         nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
         valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
-        if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(scene, members[root], ks):
-            soften(scene, ks)
+        if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(draft, members[root], ks):
+            soften(draft, ks)
         if single:
             continue
         nodes["row"][members[root]] = np.arange(len(members[root]))
@@ -45,100 +45,100 @@ def sort_nodes(scene) -> None:
         valves["solve"][k] = rec.CLUSTER
         clusters.append((len(integers), 0, len(integers), 1))
         integers.append(int(k))
-    if scene.case.fluid.law != "linear":
+    if draft.case.fluid.law != "linear":
         for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
             nodes["row"][i] = 0
             clusters.append((len(integers), 1, len(integers) + 1, 0))
             integers.append(int(i))
-    gates(scene)
-    refuse_loose_air_valves(scene, members)
+    gates(draft)
+    refuse_loose_air_valves(draft, members)
     for k in np.flatnonzero(known):
-        soften(scene, [k])
-    scene.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
+        soften(draft, [k])
+    draft.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
         if nodes["solve"][i] == rec.ALONE:
-            name = list(scene.case.places)[i]
-            scene.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
+            name = list(draft.case.places)[i]
+            draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
 
 
-def gates(scene) -> None:
+def gates(draft) -> None:
     """Note the valves of every node that they and rigid columns join, and nothing else, and how many columns."""
-    nodes, valves, columns = scene.node_table, scene.valve_table, scene.column_table
+    nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
     nodes["gates"] = -1
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
     for i in np.flatnonzero(bare):
         held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
-        if any(senses(scene, int(valves["device"][k])) for k in held):
+        if any(senses(draft, int(valves["device"][k])) for k in held):
             continue
         met = sum(i in (c["from_node"], c["to_node"]) for c in columns)
-        if met > 0 and held and asks_nothing(scene, i):
-            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = len(scene.integers), len(held), met
-            scene.integers += held
+        if met > 0 and held and asks_nothing(draft, i):
+            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = len(draft.integers), len(held), met
+            draft.integers += held
 
 
-def refuse_loose_air_valves(scene, members) -> None:
+def refuse_loose_air_valves(draft, members) -> None:
     """Places that valves join to one another and to nothing else: rigid columns alone lead to an air valve there."""
-    nodes, valves, names = scene.node_table, scene.valve_table, list(scene.case.places)
+    nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
     for group in members.values():
         ways = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
-        air = [v for v in ways if v["device"] >= 0 and scene.devices[v["device"]][2].vessel]
+        air = [v for v in ways if v["device"] >= 0 and draft.devices[v["device"]][2].vessel]
         known = [v for v in ways if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
         if len(group) > 1 and air and len(known) == len(air) and not np.any(nodes["admittance"][group] > 0.0):
             place, other = (names[i] for i in sorted(group, key=lambda i: i != air[0]["from_node"])[:2])
-            scene.fault(f"nodes.{place}", f"a valve joins this air valve to {other}, and only rigid columns lead on, "
+            draft.fault(f"nodes.{place}", f"a valve joins this air valve to {other}, and only rigid columns lead on, "
                         f"so nothing sets their pressure while it is shut; give {other} a chamber volume, or make one "
                         "of the columns a pipe")  # fmt: skip
 
 
-def senses(scene, device: int) -> bool:
+def senses(draft, device: int) -> bool:
     """Whether a device goes by the pressure of a place, and is no vessel."""
-    return device >= 0 and scene.device_table["node"][device] >= 0 and not scene.devices[device][2].vessel
+    return device >= 0 and draft.device_table["node"][device] >= 0 and not draft.devices[device][2].vessel
 
 
-def asks_nothing(scene, i: int) -> bool:
-    node = list(scene.case.places.values())[i]
+def asks_nothing(draft, i: int) -> bool:
+    node = list(draft.case.places.values())[i]
     schedule = node.demand if node.kind == "junction" else node.flow
     return not np.any(schedule.value)
 
 
-def carries_its_column(scene, members, ks) -> bool:
+def carries_its_column(draft, members, ks) -> bool:
     """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
-    ends = np.concatenate((scene.column_table["from_node"], scene.column_table["to_node"]))
-    plain = scene.valve_table["law"][ks[0]] == rec.ROOT
+    ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
+    plain = draft.valve_table["law"][ks[0]] == rec.ROOT
     return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
 
 
 UNSEEN = 10.0  # tolerances of a vessel: that grows with what it has deviated, nine times its scale are foreseen
 
 
-def soften(scene, ks) -> None:
+def soften(draft, ks) -> None:
     """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10.
 
     At a bladder accumulator, whose neck holds the least of pressures in hardly any mass, below a drop of 1 Pa; and
     below one that error control does not see (`unseen_drop`).
     """
-    places, unseen = list(scene.case.places.values()), unseen_drop(scene, ks)
+    places, unseen = list(draft.case.places.values()), unseen_drop(draft, ks)
     for k in ks:
-        row = scene.valve_table[k]
+        row = draft.valve_table[k]
         if row["transition"] == 0.0 and row["law"] <= rec.TWO_WAY:
-            link = scene.case.conduits[scene.valve_names[k]]
+            link = draft.case.conduits[draft.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            row["transition"] = scene.law.transition_flow(scene.valve_names[k], link, 10.0, scene.fault)
+            row["transition"] = draft.law.transition_flow(draft.valve_names[k], link, 10.0, draft.fault)
             row["unseen"] = max(1.0 if neck else 0.0, unseen)
 
 
-def unseen_drop(scene, ks) -> float:
+def unseen_drop(draft, ks) -> float:
     """The drop [Pa] whose end moves no vessel by more than a few tolerances of a step; 0 without error control.
 
     Below it a root has no bound of slopes, and linearly implicit steps jump to and fro, none wrong by more than the
     tolerance and none nearer to rest: a chamber of 10 l took 1e6 of them in 10 s.
     """
-    rtol, nodes = scene.case.numerics.rtol, scene.node_table
-    ends = {int(scene.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}
+    rtol, nodes = draft.case.numerics.rtol, draft.node_table
+    ends = {int(draft.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}
     vessels = [nodes[i] for i in ends if nodes[i]["y"] >= 0 and nodes[i]["stiffness"] > 0.0]
     if rtol is None or not vessels:
         return 0.0
     stiffness = sum(float(row["stiffness"]) for row in vessels)
-    least = min(scene.scale[row["y"]] for row in vessels)
-    return UNSEEN * rtol * math.sqrt(len(scene.scale)) * least * stiffness
+    least = min(draft.scale[row["y"]] for row in vessels)
+    return UNSEEN * rtol * math.sqrt(len(draft.scale)) * least * stiffness

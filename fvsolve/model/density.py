@@ -32,9 +32,9 @@ def density_of(fluid, pressure: float) -> float:
     return density(settings[0], np.array(floats), float(pressure))
 
 
-def coarse_for_cavities(scene) -> list[Notice]:
+def coarse_for_cavities(draft) -> list[Notice]:
     """A note where the pipe that waves take longest to pass has few cells for the cavities that the law follows."""
-    air, pipes = scene.fluid.air, scene.meshes
+    air, pipes = draft.fluid.air, draft.meshes
     if air is None or not air.cavitation or not pipes:
         return []
     longest = max(pipes, key=lambda pipe: pipe.length / pipe.wave_speed)

@@ -167,7 +167,7 @@ class Model(Shown):
     def functions(self):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
         from fvsolve.kernels.functions import functions
-        from fvsolve.kernels.rooms import Scene
+        from fvsolve.kernels.rooms import Cast
 
         kinds = tuple(int(kind) for kind in np.unique(self.tables.devices["kind"]))
         law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))
@@ -177,9 +177,9 @@ class Model(Shown):
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
         alone = bool(basins and patches) and not (self.cells or valves or kinds or any(there))
         outlets = bool((self.tables.valves["law"] == rec.POWER).any())
-        scene = Scene(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many.scalars,
+        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many.scalars,
                       self.case.numerics.scheme in FIFTH, spread, valves, alone, outlets)  # fmt: skip
-        return functions(scene)
+        return functions(cast)
 
     @property
     def layout(self):

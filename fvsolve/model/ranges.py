@@ -15,22 +15,22 @@ FEWEST = {"upwind5": 3, "weno5": 3}  # cells that a scheme of five needs to be w
 SHORT = 0.1  # of the longest travel time: pipes that may have fewer
 
 
-def flow_notices(scene: Any) -> list[Notice]:
+def flow_notices(draft: Any) -> list[Notice]:
     """Notices of velocity, of laminar water, of cells; one each for all pipes, at the worst of them."""
-    return [*_quick(scene), *_laminar(scene), *(_coarse(scene) if scene.pipe_names else ())]
+    return [*_quick(draft), *_laminar(draft), *(_coarse(draft) if draft.pipe_names else ())]
 
 
-def _moving(scene: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
+def _moving(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Names of the pipes and rigid columns of the file, their flows at the start [kg/s] and areas [m2]."""
-    tables = ((scene.pipe_names, scene.pipe_table), (scene.column_names, scene.column_table))
+    tables = ((draft.pipe_names, draft.pipe_table), (draft.column_names, draft.column_table))
     rows = [(name, row["flow"], row["area"]) for names, table in tables for name, row in zip(names, table, strict=True)
-            if name in scene.case.links]  # fmt: skip
+            if name in draft.case.links]  # fmt: skip
     return [row[0] for row in rows], *np.array([row[1:] for row in rows]).reshape(-1, 2).T
 
 
-def _quick(scene: Any) -> list[Notice]:
-    names, flow, area = _moving(scene)
-    speed = np.abs(flow) / (scene.fluid.density * area)
+def _quick(draft: Any) -> list[Notice]:
+    names, flow, area = _moving(draft)
+    speed = np.abs(flow) / (draft.fluid.density * area)
     if not (speed > QUICKEST).any():
         return []
     worst = int(np.argmax(speed))
@@ -39,9 +39,9 @@ def _quick(scene: Any) -> list[Notice]:
     return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), QUICKEST)]
 
 
-def _laminar(scene: Any) -> list[Notice]:
+def _laminar(draft: Any) -> list[Notice]:
     """Where the quickest flow of water in wide pipes is laminar: a flow or a viscosity in other units."""
-    (names, flow, area), fluid = _moving(scene), scene.fluid
+    (names, flow, area), fluid = _moving(draft), draft.fluid
     if not names or not fluid.viscosity or not WATERY[0] <= fluid.density <= WATERY[1]:
         return []
     bore = np.sqrt(4.0 / np.pi * area)
@@ -55,17 +55,17 @@ def _laminar(scene: Any) -> list[Notice]:
     return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
 
 
-def _coarse(scene: Any) -> list[Notice]:
-    scheme, cells = scene.case.numerics.scheme, scene.pipe_table["cells"]
-    travel = cells * scene.pipe_table["dx"] / scene.pipe_table["speed"]
+def _coarse(draft: Any) -> list[Notice]:
+    scheme, cells = draft.case.numerics.scheme, draft.pipe_table["cells"]
+    travel = cells * draft.pipe_table["dx"] / draft.pipe_table["speed"]
     few = (cells < FEWEST.get(scheme, 0)) & (travel > SHORT * travel.max())
     if not few.any():
         return []
     worst = int(np.argmax(np.where(few, travel, 0.0)))
     fewest = FEWEST[scheme]
-    text = (f"{_all(scene.pipe_names, few)}: fewer than {fewest} cells, where {scheme} has no room and is of first "
+    text = (f"{_all(draft.pipe_names, few)}: fewer than {fewest} cells, where {scheme} has no room and is of first "
             f'order; {fewest} cells at least, or scheme = "upwind"')  # fmt: skip
-    return [Notice("range", f"links.{scene.pipe_names[worst]}", text, "cells", float(cells[worst]), float(fewest))]
+    return [Notice("range", f"links.{draft.pipe_names[worst]}", text, "cells", float(cells[worst]), float(fewest))]
 
 
 def _all(names: list[str], chosen: np.ndarray) -> str:

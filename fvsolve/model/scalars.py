@@ -13,30 +13,30 @@ from fvsolve.steppers.methods import METHODS
 STORES = (rec.TANK, rec.CHAMBER)
 
 
-def lower_scalars(scene) -> None:
+def lower_scalars(draft) -> None:
     """Fill the table of scalars, states for their amounts and schedules for their values."""
-    case, pipes, nodes, basins = scene.case, scene.pipe_table, scene.node_table, scene.basin_table
-    scene.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
-    for row, (name, scalar) in zip(scene.scalar_table, case.scalars.items(), strict=True):
+    case, pipes, nodes, basins = draft.case, draft.pipe_table, draft.node_table, draft.basin_table
+    draft.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
+    for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
         for key in ("diffusivity", "decay", "ambient", "initial"):
             row[key] = getattr(scalar, key)
-        names = [f"{mesh.name}.{name}[{i}]" for mesh in scene.meshes for i in range(mesh.cells)]
-        row["y"] = scene.states(names, 1.0)
-        row["places"], places = len(scene.integers), []
+        names = [f"{mesh.name}.{name}[{i}]" for mesh in draft.meshes for i in range(mesh.cells)]
+        row["y"] = draft.states(names, 1.0)
+        row["places"], places = len(draft.integers), []
         for place, node, kind in zip(case.places, case.places.values(), nodes["kind"], strict=True):
             given = node.scalars.get(name)
             if kind in STORES:
-                places.append(scene.states([f"{place}.{name}"], 1.0))
+                places.append(draft.states([f"{place}.{name}"], 1.0))
             else:
-                places.append(-1 if given is None else scene.schedules.add(given))
-        scene.integers += places
+                places.append(-1 if given is None else draft.schedules.add(given))
+        draft.integers += places
         row["least"], row["greatest"] = bounds(case, name)
         if scalar.decay > 0.0:
-            row["loss"] = sum(scene.scalar_table["losses"])
-            row["losses"] = 1 if explicit(case.numerics.method) else scene.size - row["y"] + sum(basins["n"])
-        basins["lost"] = scene.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
+            row["loss"] = sum(draft.scalar_table["losses"])
+            row["losses"] = 1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
+        basins["lost"] = draft.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
     if len(case.scalars):
-        pipes["center"] = scene.cells + pipes["cell"]
+        pipes["center"] = draft.cells + pipes["cell"]
 
 
 def explicit(method: str) -> bool:
@@ -58,38 +58,38 @@ def bounds(case, name: str) -> tuple[float, float]:
     return min(said), max(said)
 
 
-def settle_scalars(scene) -> None:
+def settle_scalars(draft) -> None:
     """Masses of the profile per length, and sizes that states are measured against, once the profile is known."""
-    profile, rho = scene.tables.profile, scene.fluid.density
-    for k, row in enumerate(scene.pipe_table if len(scene.case.scalars) else ()):
-        strain = (scene.profiles[k] - scene.fluid.pressure) / (rho * row["speed"] ** 2)
+    profile, rho = draft.tables.profile, draft.fluid.density
+    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
+        strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
-    scale = np.array(scene.scale)
-    for row in scene.scalar_table:
+    scale = np.array(draft.scale)
+    for row in draft.scalar_table:
         typical = max(abs(row["least"]), abs(row["greatest"])) or 1.0
-        for pipe in scene.pipe_table:
+        for pipe in draft.pipe_table:
             at = row["y"] + pipe["cell"]
             scale[at : at + pipe["cells"]] = typical * rho * pipe["area"]
-        for node, place in zip(scene.node_table, places_of(scene, row), strict=True):
+        for node, place in zip(draft.node_table, places_of(draft, row), strict=True):
             if node["kind"] in STORES:
                 scale[place] = typical * max(node["mass"], scale[node["y"]])
-    scene.scale = scale.tolist()
+    draft.scale = scale.tolist()
 
 
-def places_of(scene, row) -> np.ndarray:
+def places_of(draft, row) -> np.ndarray:
     """Of a scalar at every node, where its amount or its schedule is."""
-    return np.array(scene.integers[row["places"] : row["places"] + len(scene.node_table)], dtype=int)
+    return np.array(draft.integers[row["places"] : row["places"] + len(draft.node_table)], dtype=int)
 
 
-def start_amounts(scene, found: np.ndarray) -> None:
+def start_amounts(draft, found: np.ndarray) -> None:
     """Amounts of all scalars at the start, into the state."""
-    case, profile = scene.case, scene.tables.profile
-    for row, (name, scalar) in zip(scene.scalar_table, case.scalars.items(), strict=True):
-        for pipe, mesh in zip(scene.pipe_table, scene.meshes, strict=True):
+    case, profile = draft.case, draft.tables.profile
+    for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
+        for pipe, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
             cells = np.arange(mesh.cells)
             value = case.links[mesh.name].scalars.get(name, scalar.initial)
             found[row["y"] + pipe["cell"] + cells] = value * profile[pipe["center"] + cells]
-        for node, part, place in zip(scene.node_table, case.places.values(), places_of(scene, row), strict=True):
+        for node, part, place in zip(draft.node_table, case.places.values(), places_of(draft, row), strict=True):
             if node["kind"] in STORES:
                 value = part.scalars[name].first if name in part.scalars else scalar.initial
                 found[place] = value * node["mass"]

@@ -27,14 +27,14 @@ PRESSURE_SCALE = 1e5
 SNAP = 1e-12  # flows below this share of the scene's are zero
 
 
-def start_profile(scene) -> dict[str, Any]:
+def start_profile(draft) -> dict[str, Any]:
     """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
-    if scene.case.fluid.law == "linear":
-        start = Start(scene)
+    if draft.case.fluid.law == "linear":
+        start = Start(draft)
     else:
         from fvsolve.model.barotropic import BarotropicStart
 
-        start = BarotropicStart(scene)
+        start = BarotropicStart(draft)
     start.solve()
     start.report_split()
     start.freeze_factors()
@@ -43,25 +43,25 @@ def start_profile(scene) -> dict[str, Any]:
     start.fill_columns()
     start.fill_valves()
     start.begin_devices()
-    probe_offsets(scene, start)
-    return {**start.report(), "unsteady": add_terms(scene)}
+    probe_offsets(draft, start)
+    return {**start.report(), "unsteady": add_terms(draft)}
 
 
 class Start:
     """The steady problem of one scene under the linear law and its answer."""
 
-    def __init__(self, scene) -> None:
-        self.scene, self.case = scene, scene.case
-        self.nodes, self.pipes = scene.node_table, scene.pipe_table
-        self.columns, self.valves, self.pistons = scene.column_table, scene.valve_table, scene.piston_table
+    def __init__(self, draft) -> None:
+        self.draft, self.case = draft, draft.case
+        self.nodes, self.pipes = draft.node_table, draft.pipe_table
+        self.columns, self.valves, self.pistons = draft.column_table, draft.valve_table, draft.piston_table
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
-        scene.tables.settings[0]["limit"] = self.t
-        self.weight = scene.fluid.density * self.case.gravity
+        draft.tables.settings[0]["limit"] = self.t
+        self.weight = draft.fluid.density * self.case.gravity
         sizes = [
             1e-9,
-            *(scene.fluid.density * self.pipes["area"]),
-            *(scene.fluid.density * self.columns["area"]),
+            *(draft.fluid.density * self.pipes["area"]),
+            *(draft.fluid.density * self.columns["area"]),
         ]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
@@ -84,7 +84,7 @@ class Start:
 
     def density_at(self, i: int) -> float:
         """Density [kg/m3] at node i."""
-        return self.scene.fluid.density
+        return self.draft.fluid.density
 
     def given_pressure(self, row, node) -> float:
         """Pressure [Pa] of a reservoir or tank at the start."""
@@ -94,11 +94,11 @@ class Start:
             return self.case.ambient_pressure + self.weight * (node.depth or 0.0)
         if row["kind"] == rec.TANK:
             return self.case.ambient_pressure + self.weight * node.level
-        return schedule_value(self.scene.tables, int(row["schedule"]), self.t)
+        return schedule_value(self.draft.tables, int(row["schedule"]), self.t)
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
-        random, devices = Random(0), list(zip(self.scene.devices, self.scene.device_table, strict=True))
+        random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
         for turn in range(REVISIONS):
             self.balance()
             revised = (device.revise(self, part, row) for (_, part, device), row in devices)
@@ -108,10 +108,10 @@ class Start:
             if turn % ROUND == ROUND - 1:
                 self.scatter(random)
         self.report_faults(self.held)
-        names = listing([name for name, _, device in self.scene.devices])
-        self.scene.fault("numerics.initial", f"no steady state was found in which {names} stay as they are; "
+        names = listing([name for name, _, device in self.draft.devices])
+        self.draft.fault("numerics.initial", f"no steady state was found in which {names} stay as they are; "
                          'try initial = "rest"')  # fmt: skip
-        self.scene.check()
+        self.draft.check()
 
     def scatter(self, random: Random) -> None:
         """Let those that regulate stand as chance has it: from where they stood no revision led on."""
@@ -140,9 +140,9 @@ class Start:
         self.held, self.demand = self.givens()
         held = self.held
         pipes = [self.wall_edge(name, row, row["dx"] * row["cells"]) for name, row in
-                 zip(self.scene.pipe_names, self.pipes, strict=True)]  # fmt: skip
+                 zip(self.draft.pipe_names, self.pipes, strict=True)]  # fmt: skip
         columns = [self.wall_edge(name, row, row["length"]) for name, row in
-                   zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
+                   zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
         valves = [self.valve_edge(k) for k in range(len(self.valves))]
         leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
         self.edges = [*pipes, *columns, *valves, *leaks]
@@ -171,7 +171,7 @@ class Start:
             elif row["kind"] == rec.MOVING and not self.touched(i):
                 held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
             elif row["kind"] == rec.JUNCTION:
-                demand[i] = schedule_value(self.scene.tables, int(row["schedule"]), self.t)
+                demand[i] = schedule_value(self.draft.tables, int(row["schedule"]), self.t)
         return held, np.zeros_like(demand) if self.rest else demand
 
     def touched(self, i: int) -> bool:
@@ -183,7 +183,7 @@ class Start:
         """A pipe or column: drop = (L / A) drag(M)."""
         law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
         per = length / row["area"]
-        least = drag_slope(*law, 1e-6 * self.scene.fluid.density * float(row["area"]))
+        least = drag_slope(*law, 1e-6 * self.draft.fluid.density * float(row["area"]))
         link = self.case.links[name]
 
         extra, (back, ahead) = self.extra.get(name, 0.0), self.jets.get(name, (0.0, 0.0))
@@ -199,16 +199,16 @@ class Start:
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
         if link.initial_flow is not None:
-            return Edge(i, j, None, link.initial_flow * self.scene.fluid.density, drop=drop)
+            return Edge(i, j, None, link.initial_flow * self.draft.fluid.density, drop=drop)
         free = row["friction"] == rec.FRICTION_NONE
-        first = 0.0 if free else self.scene.fluid.density * row["area"]  # so that free loops get the least norm
+        first = 0.0 if free else self.draft.fluid.density * row["area"]  # so that free loops get the least norm
         return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:
         """A valve: M |M| = G dP, with the chord of the root as slope."""
         row = self.valves[k]
         if row["device"] >= 0:
-            own = self.scene.devices[row["device"]][2].edge(self, k)
+            own = self.draft.devices[row["device"]][2].edge(self, k)
             if own is not None:
                 return own
         g = self.conductance(k)
@@ -238,7 +238,7 @@ class Start:
 
     def outlet_edge(self, k: int, g: float) -> Edge:
         """A way out, M = f(drop), with its own chord as slope."""
-        row, floats, denser, wider = self.valves[k], self.scene.tables.floats, *self.dense_of.get(k, (1.0, 1.0))
+        row, floats, denser, wider = self.valves[k], self.draft.tables.floats, *self.dense_of.get(k, (1.0, 1.0))
         i, j, at = int(row["from_node"]), int(row["to_node"]), int(row["data"])
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
@@ -255,13 +255,13 @@ class Start:
     def conductance(self, k: int) -> float:
         """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""
         if self.valves[k]["device"] < 0:
-            return valve_conductance(self.scene.tables, k, self.t)
+            return valve_conductance(self.draft.tables, k, self.t)
         return 0.0 if k in self.shut else float(self.valves[k]["conductance"])
 
     def leak_edge(self, k: int) -> Edge:
         """What leaks past a piston: M = rho leakage dP."""
         row = self.pistons[k]
-        g = row["leakage"] * self.scene.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
+        g = row["leakage"] * self.draft.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
         i, j = int(row["a"]), int(row["b"])
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
@@ -269,39 +269,39 @@ class Start:
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
         """Mass flow from A to B past a piston, as kernels.mechanics.leak_flow has it [kg/s]."""
-        return self.scene.fluid.density * row["leakage"] * (p_a - p_b)
+        return self.draft.fluid.density * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
         """What no steady state can meet, each by its name."""
         names = list(self.case.places)
         for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
-            drawn = self.demand[i] / self.scene.fluid.density
+            drawn = self.demand[i] / self.draft.fluid.density
             what = f"{drawn:.4g} m3/s are drawn here but every way to it" if drawn > 0.0 else (
                 f"{-drawn:.4g} m3/s come in here but every way out")  # fmt: skip
-            self.scene.fault(
+            self.draft.fault(
                 f"nodes.{names[i]}",
                 f'no steady state: {what} is shut; open a valve, or use initial = "rest"',
             )
-        for name, row in zip(self.scene.pipe_names, self.pipes, strict=True):
+        for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
             free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
             if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
                 a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
-                self.scene.fault(
+                self.draft.fault(
                     f"links.{name}",
                     f"no steady state: it has no friction, and heads of {a:.6g} m and {b:.6g} m at its ends; "
                     'give it friction or initial_flow, or use initial = "rest"',
                 )
-        if not self.scene.faults and not self.answer.converged:
-            self.scene.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
+        if not self.draft.faults and not self.answer.converged:
+            self.draft.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
                              'and frictionless ways between unequal heads, or use "rest"')  # fmt: skip
-        self.scene.check()
+        self.draft.check()
 
     def report_split(self) -> None:
         """Columns that no flow holds still, and the loops in which no friction says how the flow divides."""
         held = {i: -1 for i, given in enumerate(self.held) if not np.isnan(given)}  # all of them one: ways between them
-        rows = [*zip(self.scene.pipe_names, self.pipes, strict=True),
-                *zip(self.scene.column_names, self.columns, strict=True)]  # fmt: skip
+        rows = [*zip(self.draft.pipe_names, self.pipes, strict=True),
+                *zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
         ends = {name: [held.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")] for name, row in rows
                 if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
         swing = [
@@ -313,19 +313,19 @@ class Start:
         ]
         for name in swing:
             text = f"{name}: without friction between unequal heads no flow is steady; it starts from rest and swings"
-            self.scene.warnings.append(Notice("start", f"links.{name}", text))
+            self.draft.warnings.append(Notice("start", f"links.{name}", text))
         loops, before = {name: pair for name, pair in ends.items() if name not in swing}, None
         while self.answer.split and loops != before:  # what ends in a place that no other touches is in none
             before, touched = loops, Counter(end for pair in loops.values() for end in pair)
             loops = {name: pair for name, pair in loops.items() if min(touched[end] for end in pair) > 1}
         if self.answer.split and (loops or not swing):
             text = f"{listing(loops) or 'ways'}: loops without friction, in which flow is the least-norm split"
-            self.scene.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
+            self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:
         """`steady` friction by roughness: the factor of the starting flow, at rest the fully rough one."""
-        rows = [*zip(self.scene.pipe_names, self.pipes, self.pipe_flow, strict=True),
-                *zip(self.scene.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
+        rows = [*zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
+                *zip(self.draft.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
         for name, row, flow in rows:
             if row["friction"] != rec.FRICTION_ROUGH or self.case.links[name].friction.model != "steady":
                 continue
@@ -336,7 +336,7 @@ class Start:
                 e = row["roughness"]
                 factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
                 text = f"{name}: no flow at the start; its steady factor is the fully rough one, {factor:.4g}"
-                self.scene.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
+                self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
             row["loss"] += row["rough"] * factor
             row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
 
@@ -346,7 +346,7 @@ class Start:
             if row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH):
                 row["pressure"] = self.given_pressure(row, node)
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
-        fluid = self.scene.fluid
+        fluid = self.draft.fluid
         chambers = np.isin(self.nodes["kind"], STORED)
         self.nodes["mass"][chambers] = fluid.density * self.nodes["volume"][chambers] * (
             1.0 + (self.nodes["pressure"][chambers] - fluid.pressure) / fluid.bulk_modulus)  # fmt: skip
@@ -357,16 +357,16 @@ class Start:
 
     def fill_pipes(self) -> None:
         """Straight lines between the pressures of the ends; what friction does not hold of them drives the flow."""
-        profile, self.driven = self.scene.tables.profile, {}
-        for k, (row, mesh) in enumerate(zip(self.pipes, self.scene.meshes, strict=True)):
+        profile, self.driven = self.draft.tables.profile, {}
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
             row["flow"] = self.pipe_flow[k]
             row["drag"] = self.pipe_drop(row)
             p = self.answer.potential[[row["from_node"], row["to_node"]]]
             self.drive_pipe(mesh, row, p[0] - p[1])
             slope = row["drag"] / row["area"]
             cells = slice(int(row["cell"]), int(row["cell"]) + mesh.cells)
-            pressure = self.scene.profiles[k] = p[0] - slope * mesh.x - self.weight * mesh.elevation
-            profile[cells] = (self.scene.fluid.vapor_pressure - pressure) * row["admittance"]
+            pressure = self.draft.profiles[k] = p[0] - slope * mesh.x - self.weight * mesh.elevation
+            profile[cells] = (self.draft.fluid.vapor_pressure - pressure) * row["admittance"]
 
     def drive_pipe(self, mesh, row, change: float) -> bool:
         """Let a pipe hold a change of potential [Pa] that its friction does not; False where friction does."""
@@ -379,7 +379,7 @@ class Start:
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""
-        row, mesh = self.pipes[k], self.scene.meshes[k]
+        row, mesh = self.pipes[k], self.draft.meshes[k]
         z = self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
         potential = self.answer.potential[row["from_node"]] - row["drag"] / row["area"] * fraction * mesh.length
         return potential - self.weight * z, z
@@ -413,7 +413,7 @@ class Start:
 
     def fill_outlet(self, row, flow: float) -> None:
         """The drop at which a way out carries its flow exactly; none where its flow does not obey its law."""
-        floats, at, g = self.scene.tables.floats, int(row["data"]), float(row["open"])
+        floats, at, g = self.draft.tables.floats, int(row["data"]), float(row["open"])
         asked = emitter_flow(floats, at, g, float(row["drop"]), FREE)
         if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
             row["open"] = 0.0
@@ -424,7 +424,7 @@ class Start:
 
     def begin_devices(self) -> None:
         """Let every device fill in what depends on the profile."""
-        for (_, part, device), row in zip(self.scene.devices, self.scene.device_table, strict=True):
+        for (_, part, device), row in zip(self.draft.devices, self.draft.device_table, strict=True):
             self.moving += device.begin(self, part, row)
 
     def slack(self, end: str) -> float:
@@ -436,8 +436,8 @@ class Start:
         return float(self.valves[k]["conductance"]), float(self.valves[k]["drop"])
 
     def report(self) -> dict[str, Any]:
-        moving = start_bodies(self.scene, self) + self.moving
-        fluid, net = self.scene.fluid, self.nodes["inflow"].copy()
+        moving = start_bodies(self.draft, self) + self.moving
+        fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
         for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
@@ -456,14 +456,14 @@ class Start:
                 moving.append(f"junction {name}: {flow:.4g} m3/s more flow in than out")
         for name, pressure in self.driven.items():
             moving.append(f"pipe {name}: {pressure:.4g} Pa drive it, unbalanced by friction")
-        for name, row in zip(self.scene.column_names, self.columns, strict=True):
+        for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
                 moving.append(f"rigid column {name}: {row['offset']:.4g} Pa drive it unbalanced")
-        for k, (name, row) in enumerate(zip(self.scene.valve_names, self.valves, strict=True)):
+        for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
                 if self.conductance(k) > 0.0:
                     moving.append(f"valve {name}: open with {row['drop']:.4g} Pa across it and no flow")
         if self.case.numerics.initial == "equilibrium":
             for text in moving:
-                self.scene.fault("numerics.initial", f'"equilibrium" wants nothing to move, but {text}')
+                self.draft.fault("numerics.initial", f'"equilibrium" wants nothing to move, but {text}')
         return {"moving": moving}

@@ -118,18 +118,18 @@ def _weights(w, value, tolerance, n):
     return float(np.max(np.abs(shares @ m - wanted[: w.size]))), m, n
 
 
-def reserve(scene, row) -> None:
+def reserve(draft, row) -> None:
     """Room for the terms of a pipe, which are known once its flow at the start is."""
-    row["term"] = len(scene.floats)
-    scene.floats += [0.0] * (2 * MOST_TERMS)
+    row["term"] = len(draft.floats)
+    draft.floats += [0.0] * (2 * MOST_TERMS)
 
 
-def add_terms(scene) -> dict[str, dict]:
+def add_terms(draft) -> dict[str, dict]:
     """Terms and states of all pipes with unsteady friction, from the flows of the start; what `check` shows of them."""
-    found, settings, floats = {}, scene.tables.settings[0], scene.tables.floats
-    numerics, fluid = scene.case.numerics, scene.fluid
-    for name, row, mesh in zip(scene.pipe_names, scene.pipe_table, scene.meshes, strict=True):
-        law = scene.case.links[name].friction
+    found, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
+    numerics, fluid = draft.case.numerics, draft.fluid
+    for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):
+        law = draft.case.links[name].friction
         if law.model != "unsteady":
             continue
         unit = 4.0 * fluid.viscosity / (fluid.density * mesh.diameter**2)  # tau per time [1/s]
@@ -137,20 +137,20 @@ def add_terms(scene) -> dict[str, dict]:
         weighting = law.weighting or ("zielke" if reynolds < LAMINAR else "vardy-brown")
         if weighting == "vardy-brown" and reynolds == 0.0:
             what = "vardy-brown is a weighting at the Reynolds number of the start, and nothing flows there"
-            scene.fault(f"links.{name}.friction.weighting", f"{what}; give an initial flow, or zielke")
+            draft.fault(f"links.{name}.friction.weighting", f"{what}; give an initial flow, or zielke")
             continue
         cell, span = unit * row["dx"] / row["speed"], unit * (numerics.end - numerics.start)
         accuracy = ACCURACY if law.accuracy is None else law.accuracy
         try:
             m, n, highest = terms(weighting, reynolds, (law.roughness or 0.0) / mesh.diameter, cell, span, accuracy)
         except ArithmeticError as error:
-            scene.fault(f"links.{name}.friction.accuracy", f"{error}; give a greater accuracy or more cells")
+            draft.fault(f"links.{name}.friction.accuracy", f"{error}; give a greater accuracy or more cells")
             continue
         gain, rate = 4.0 * unit * m, unit * n
         floats[row["term"] : row["term"] + 2 * m.size] = np.column_stack([gain, rate]).ravel()
         row["terms"] = m.size
         names = [f"{name}.memory{k}[{i}]" for k in range(m.size) for i in range(mesh.cells)]
-        row["memory"] = scene.states(names, 1e5 * row["admittance"])
+        row["memory"] = draft.states(names, 1e5 * row["admittance"])
         waves = row["speed"] / row["dx"] * row["quicker"]  # upwind ones reach twice that, so the rest counts half
         quickest = float(max(waves, 0.5 * rate[-1]) + 0.5 * gain.sum())
         settings["rate"] = max(settings["rate"], quickest)

@@ -13,8 +13,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
 from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import automatic
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import automatic, slots
 from fvsolve.units import show
 
 
@@ -39,11 +38,11 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     held = hold(model, inputs or {})
     loop = Loop(held, lambda: model.structure)  # which does not depend on what is held
     loop.now[:] = state.y
-    loop.memory[told.T] = state.t
+    loop.memory[slots.T] = state.t
     known = state.memory.size == 2 + loop.armed.size
     loop.armed[:] = state.memory[2:] if known else 0.0
-    loop.on_switch = lambda: loop.stop_columns(loop.orders[told.END])
-    adaptive = loop.orders[told.CONTROL] == told.TOLERANCE
+    loop.on_switch = lambda: loop.stop_columns(loop.orders[slots.END])
+    adaptive = loop.orders[slots.CONTROL] == slots.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
@@ -51,14 +50,14 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         loop.stop_columns(end)
         loop.begin(end, NO_LIMIT)
         if first and adaptive and known:
-            loop.memory[[told.STEP, told.ERROR_OLD]] = state.memory[:2]
+            loop.memory[[slots.STEP, slots.ERROR_OLD]] = state.memory[:2]
         code = loop.run(NO_LIMIT)
-        while code == told.CHUNK and automatic.wants_change(loop.stepper):
+        while code == slots.CHUNK and automatic.wants_change(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
-        if code != told.DONE:
+        if code != slots.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
-    return State(loop.t, loop.now.copy(), np.append(loop.memory[[told.STEP, told.ERROR_OLD]], loop.armed))
+    return State(loop.t, loop.now.copy(), np.append(loop.memory[[slots.STEP, slots.ERROR_OLD]], loop.armed))
 
 
 class Input(NamedTuple):

@@ -13,8 +13,7 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.limits.drives import lumped, spreads
 from fvsolve.limits.step import DOUBTFUL, WRONG
-from fvsolve.steppers import automatic
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.tableau import method_named
 
@@ -54,12 +53,12 @@ class Halves:
     def look(self, loop) -> None:
         """At an accepted state, if it is time: take the last step again."""
         memory = loop.memory
-        steps, h = memory[told.STEPS], memory[told.LAST]
+        steps, h = memory[slots.STEPS], memory[slots.LAST]
         if not self.which.size or steps < self.kept[1]:
             return
         self.kept[1] = steps + 1.0  # the next one, if this says nothing
-        end = loop.orders[told.END]
-        whole = self.step if loop.t < end else min(self.step, end - memory[told.T_MARK])
+        end = loop.orders[slots.END]
+        whole = self.step if loop.t < end else min(self.step, end - memory[slots.T_MARK])
         if h < WHOLE * whole:
             return
         before, now = loop.before[self.which], loop.now[self.which]

@@ -14,8 +14,7 @@ from fvsolve.model import Model
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
 from fvsolve.solve.meeting import let_go, shut_places
-from fvsolve.steppers import automatic
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.ledger import SUMS
 from fvsolve.steppers.stepper import Stepper, arguments
 from fvsolve.steppers.structure import Structure
@@ -58,33 +57,33 @@ class Loop:
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
-        self.orders[told.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
-        self.orders[told.STOP_AT], self.orders[told.LEAPS] = NO_LIMIT, leaps
-        for control, key in ((told.COURANT, "courant"), (told.FIXED_STEP, "step"), (told.TOLERANCE, "rtol")):
+        self.orders[slots.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
+        self.orders[slots.STOP_AT], self.orders[slots.LEAPS] = NO_LIMIT, leaps
+        for control, key in ((slots.COURANT, "courant"), (slots.FIXED_STEP, "step"), (slots.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
-                self.orders[told.CONTROL], self.orders[told.SIZE] = control, getattr(numerics, key)
+                self.orders[slots.CONTROL], self.orders[slots.SIZE] = control, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
-            self.orders[told.CONTROL] = told.FIXED_STEP
-            self.orders[told.SIZE] = numerics.courant / model.wave_rate
-        given = self.orders[told.CONTROL] == told.FIXED_STEP
-        model.tables.settings[0]["step"] = self.orders[told.SIZE] if given else 0.0
+            self.orders[slots.CONTROL] = slots.FIXED_STEP
+            self.orders[slots.SIZE] = numerics.courant / model.wave_rate
+        given = self.orders[slots.CONTROL] == slots.FIXED_STEP
+        model.tables.settings[0]["step"] = self.orders[slots.SIZE] if given else 0.0
 
     @property
     def now(self) -> np.ndarray:
         """The present state y (a view)."""
-        return self.stepper.y[self.flags[told.NOW]]
+        return self.stepper.y[self.flags[slots.NOW]]
 
     @property
     def before(self) -> np.ndarray:
         """The state before the last step (a view)."""
-        return self.stepper.y[self.flags[told.OLD]]
+        return self.stepper.y[self.flags[slots.OLD]]
 
     @property
     def t(self) -> float:
         """The present time [s]."""
-        return float(self.memory[told.T])
+        return float(self.memory[slots.T])
 
     def begin(self, end: float, stop_at: float) -> None:
         """Start a segment that ends at `end` [s]: no step is remembered across a kink."""
@@ -93,23 +92,23 @@ class Loop:
 
     def resume(self, end: float, stop_at: float) -> None:
         """Go on in a segment that ends at `end` [s]; rows due from `stop_at` on are not written by the loop."""
-        self.orders[told.END], self.orders[told.STOP_AT] = end, stop_at
-        self.flags[told.PHASE], self.flags[told.BEHIND] = told.FRESH, 0
+        self.orders[slots.END], self.orders[slots.STOP_AT] = end, stop_at
+        self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
         self.settle()
         self.model.tables.settings[0]["limit"] = end
 
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
-        self.orders[told.BUDGET] = budget
-        code = told.SWITCHED
-        while code == told.SWITCHED:
+        self.orders[slots.BUDGET] = budget
+        code = slots.SWITCHED
+        while code == slots.SWITCHED:
             before = self.armed.copy()
             code = self.stepper.call(
                 self.leap, self.observe, self.record, self.events, self.rhs, self.model.handle,
                 int(self.model.layout["supply"]), self.armed,
             )  # fmt: skip
-            if code == told.SWITCHED:
-                code = told.SWITCHED if self.switch(before) else told.CHATTERS
+            if code == slots.SWITCHED:
+                code = slots.SWITCHED if self.switch(before) else slots.CHATTERS
                 self.on_switch()
         return code
 
@@ -141,7 +140,7 @@ class Loop:
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
         self.crowd.append(self.t)
-        step = self.orders[told.SIZE] if self.orders[told.CONTROL] == told.FIXED_STEP else 0.0
+        step = self.orders[slots.SIZE] if self.orders[slots.CONTROL] == slots.FIXED_STEP else 0.0
         crowded = len(self.crowd) == self.crowd.maxlen and self.t - self.crowd[0] <= max(self.span, step)
         return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size and not crowded
 
@@ -174,17 +173,17 @@ class Loop:
 
     def take_rows(self) -> np.ndarray:
         """Rows written since the last call, as a copy."""
-        count = int(self.flags[told.ROWS])
-        self.flags[told.ROWS] = 0
+        count = int(self.flags[slots.ROWS])
+        self.flags[slots.ROWS] = 0
         return self.stepper.rows[:count].copy()
 
     def step_back(self) -> None:
         """Return to the state before the last step, unless that step is in the ledgers: then its end was sound."""
-        if self.flags[told.BEHIND] == 1 and self.memory[told.UNBOOKED] > 0.0:
-            self.memory[told.T] -= self.memory[told.LAST]
-            self.memory[told.UNBOOKED] = 0.0
-            self.flags[told.NOW], self.flags[told.OLD] = self.flags[told.OLD], self.flags[told.NOW]
-            self.flags[told.BEHIND] = 0
+        if self.flags[slots.BEHIND] == 1 and self.memory[slots.UNBOOKED] > 0.0:
+            self.memory[slots.T] -= self.memory[slots.LAST]
+            self.memory[slots.UNBOOKED] = 0.0
+            self.flags[slots.NOW], self.flags[slots.OLD] = self.flags[slots.OLD], self.flags[slots.NOW]
+            self.flags[slots.BEHIND] = 0
 
 
 def leap_allowed(model: Model, method: Method) -> bool:

@@ -23,8 +23,7 @@ from fvsolve.solve.summary import (
     mass_ledger,
     run_downs,
 )
-from fvsolve.steppers import automatic
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.ledger import SUMS
 from fvsolve.units import show
 
@@ -83,13 +82,13 @@ class Run:
         self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
         orders = self.loop.orders
-        orders[told.START], orders[told.EVERY] = self.start, output.every or (self.end - self.start) / 1000
-        orders[told.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
-        orders[told.FIELD_COUNT] = output.fields
+        orders[slots.START], orders[slots.EVERY] = self.start, output.every or (self.end - self.start) / 1000
+        orders[slots.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
+        orders[slots.FIELD_COUNT] = output.fields
         self.segment, self.fresh = 0, state.memory.size == 0
         self.changes: list[tuple[float, float, float]] = []  # of method, under `auto`
         self.loop.now[:] = state.y
-        self.loop.memory[told.T] = state.t
+        self.loop.memory[slots.T] = state.t
         for array in (model.tables.extremes, model.tables.envelope):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         model.tables.marks[:] = np.nan
@@ -189,12 +188,12 @@ class Run:
         """Count the rows and frames that are due at a jump or at the end, which are written apart."""
         memory, orders = self.loop.memory, self.loop.orders
         near = 1e-12 * max(abs(t), abs(self.end))
-        if orders[told.EVERY] > 0:
-            while orders[told.START] + memory[told.NEXT_OUTPUT] * orders[told.EVERY] <= t + near:
-                memory[told.NEXT_OUTPUT] += 1
-        if orders[told.FIELD_EVERY] > 0 and memory[told.NEXT_FIELD] <= orders[told.FIELD_COUNT]:
-            if orders[told.START] + memory[told.NEXT_FIELD] * orders[told.FIELD_EVERY] <= t + near:
-                memory[told.NEXT_FIELD] += 1
+        if orders[slots.EVERY] > 0:
+            while orders[slots.START] + memory[slots.NEXT_OUTPUT] * orders[slots.EVERY] <= t + near:
+                memory[slots.NEXT_OUTPUT] += 1
+        if orders[slots.FIELD_EVERY] > 0 and memory[slots.NEXT_FIELD] <= orders[slots.FIELD_COUNT]:
+            if orders[slots.START] + memory[slots.NEXT_FIELD] * orders[slots.FIELD_EVERY] <= t + near:
+                memory[slots.NEXT_FIELD] += 1
                 self.frame(t, self.loop.now, out)
 
     # the run ------------------------------------------------------------------------------------------------
@@ -213,9 +212,9 @@ class Run:
     def open(self) -> None:
         out = self.row(self.start, self.start)
         self.loop.switched.clear()  # as what it starts is no event
-        if self.loop.orders[told.FIELD_EVERY] > 0:
+        if self.loop.orders[slots.FIELD_EVERY] > 0:
             self.frame(self.start, self.loop.now, out)
-        self.loop.memory[told.NEXT_OUTPUT] = self.loop.memory[told.NEXT_FIELD] = 1.0
+        self.loop.memory[slots.NEXT_OUTPUT] = self.loop.memory[slots.NEXT_FIELD] = 1.0
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self) -> None:
@@ -259,29 +258,29 @@ class Run:
     def steps(self) -> str:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         while True:
-            before, steps, busy = time.perf_counter(), self.loop.memory[told.STEPS], time.thread_time()
+            before, steps, busy = time.perf_counter(), self.loop.memory[slots.STEPS], time.thread_time()
             code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
             self.processor += time.thread_time() - busy
-            self.left = max(1.0, self.left - (self.loop.memory[told.STEPS] - steps))
+            self.left = max(1.0, self.left - (self.loop.memory[slots.STEPS] - steps))
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
             self.flush()
             self.soundness.halves.look(self.loop)
             grown = self.soundness.look(self.loop.t, self.loop.now)
-            if grown and code != told.CHATTERS:  # which names the parts
+            if grown and code != slots.CHATTERS:  # which names the parts
                 return grown
-            if code == told.FIELD:
-                count = self.loop.memory[told.NEXT_FIELD] - 1
-                due = self.start + count * self.loop.orders[told.FIELD_EVERY]
+            if code == slots.FIELD:
+                count = self.loop.memory[slots.NEXT_FIELD] - 1
+                due = self.start + count * self.loop.orders[slots.FIELD_EVERY]
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
-            elif code == told.CHUNK and automatic.wants_change(self.loop.stepper):
+            elif code == slots.CHUNK and automatic.wants_change(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
-            elif code == told.CHUNK and self.left <= 1.0:
+            elif code == slots.CHUNK and self.left <= 1.0:
                 self.pause(self.spent)
                 self.left, self.spent = self.budget, 0.0
-            elif code == told.DONE:
+            elif code == slots.DONE:
                 return ""
-            elif code not in (told.CHUNK, told.ROWS_FULL):
+            elif code not in (slots.CHUNK, slots.ROWS_FULL):
                 return self.failure(code)
 
     def pause(self, spent: float) -> None:
@@ -290,7 +289,7 @@ class Run:
         most = FEW if self.soundness.predicted else 1e9
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
         if self.progress is not None:
-            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[told.STEPS]))
+            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[slots.STEPS]))
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
             self.save()
 
@@ -301,7 +300,7 @@ class Run:
     def failure(self, code: int) -> str:
         """Where, when and what to try; gas that expands far is more than the mixture law alone can follow."""
         said, fluid = self.what_failed(code), self.model.case.fluid
-        numbers = code in (told.BAD_VALUE, told.NEWTON_STUCK, told.TINY_STEP)
+        numbers = code in (slots.BAD_VALUE, slots.NEWTON_STUCK, slots.TINY_STEP)
         if numbers and fluid.law == "mixture" and not self.model.cavitates:
             said += "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation)"
         return said
@@ -310,35 +309,35 @@ class Run:
         """What, where and when, and what to try."""
         model, loop = self.model, self.loop
         place = ""
-        if code == told.BAD_VALUE:
+        if code == slots.BAD_VALUE:
             bad = np.flatnonzero(~np.isfinite(loop.now))
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == told.BAD_STATUS and loop.out[rec.WHERE] >= 0:
+        elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {loop.t:.6g} s"
-        if code == told.CHATTERS:
+        if code == slots.CHATTERS:
             first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
             found = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
             who = listing(names) if names else "a leak, or a demand that follows the pressure,"
             remedy = ", or ".join(found) or "give its place the volume of a chamber"
             return f"stopped: {who} opens and shuts without end at {when}; {remedy}"
-        if code == told.STOPPED:
+        if code == slots.STOPPED:
             what = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
             return f"stopped: {what} at {when}, as below_vapor asks"
-        if code in (told.BAD_VALUE, told.BAD_STATUS):
+        if code in (slots.BAD_VALUE, slots.BAD_STATUS):
             loop.step_back()
-        if code == told.NEWTON_STUCK:
-            worst = model.state_names[int(loop.memory[told.WORST])]
+        if code == slots.NEWTON_STUCK:
+            worst = model.state_names[int(loop.memory[slots.WORST])]
             return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; look for a "
                     "jump in what acts there, or try an explicit method")  # fmt: skip
-        if code == told.TINY_STEP:
+        if code == slots.TINY_STEP:
             return f"stopped: the step shrank to nothing at {when}; try a larger rtol, or courant in place of it"
-        if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
+        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
             return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
-        if code == told.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
+        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
             return f"stopped: the piston has left no volume{place} at {when}; give it an end-stop"
-        if code == told.BAD_STATUS:
+        if code == slots.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"
 
@@ -347,7 +346,7 @@ class Run:
         name = self.model.case.numerics.method
         if name != automatic.AUTO:
             return [{"time": self.start, "method": name, "why": "as numerics.method says"}]
-        return automatic.account(self.start, self.changes, self.loop.orders[told.PRICE])
+        return automatic.account(self.start, self.changes, self.loop.orders[slots.PRICE])
 
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop

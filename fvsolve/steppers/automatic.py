@@ -5,7 +5,7 @@ Knows which two methods, what their steps cost and how to say why one gave way t
 
 from __future__ import annotations
 
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
@@ -29,21 +29,21 @@ def price(structure: Structure) -> float:
 
 def watch(stepper: Stepper, structure: Structure) -> None:
     """Have the loop watch stiffness."""
-    stepper.orders[told.WATCH], stepper.orders[told.PRICE] = 1.0, price(structure)
+    stepper.orders[slots.WATCH], stepper.orders[slots.PRICE] = 1.0, price(structure)
 
 
 def wants_change(stepper: Stepper) -> bool:
     """Whether the loop came back because the other kind of step would be cheaper."""
-    return stepper.memory[told.CASES] < 0.0
+    return stepper.memory[slots.CASES] < 0.0
 
 
 def change(stepper: Stepper) -> tuple[float, float, float]:
     """Go on by the other method; returns when, with which spectral radius [1/s] and after which step [s]."""
     memory = stepper.memory
     stepper.use(method_named(IMPLICIT if stepper.method.explicit else EXPLICIT))
-    memory[told.SWITCHES] += 1.0
-    memory[told.CASES] = 0.0
-    return float(memory[told.T]), float(memory[told.RADIUS]), float(memory[told.LAST])
+    memory[slots.SWITCHES] += 1.0
+    memory[slots.CASES] = 0.0
+    return float(memory[slots.T]), float(memory[slots.RADIUS]), float(memory[slots.LAST])
 
 
 def account(start: float, changes: list[tuple[float, float, float]], price: float) -> list[dict]:

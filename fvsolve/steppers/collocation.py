@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.polynomial import Polynomial
 
 
 def lagrange(c: Sequence) -> list[Polynomial]:

@@ -3,7 +3,7 @@
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.steppers.orders import (
+from fvsolve.steppers.slots import (
     CASES,
     CONTROL,
     COURANT,

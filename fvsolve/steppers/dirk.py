@@ -25,7 +25,7 @@ from fvsolve.steppers.newton import (
     smoothed_error,
     verdict,
 )
-from fvsolve.steppers.orders import (
+from fvsolve.steppers.slots import (
     CALLS,
     CONTROL,
     DAMPED,

@@ -4,7 +4,7 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.orders import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
+from fvsolve.steppers.slots import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
 from fvsolve.steppers.step import combine, error_norm
 
 

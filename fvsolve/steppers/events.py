@@ -1,7 +1,7 @@
 """Events: functions that fall through zero, and the step that ends there. Knows no model."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.orders import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
+from fvsolve.steppers.slots import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
 
 EVENT_TOLERANCE = 1e-13
 JUMP = 1e-6  # share of an event function, and of a given step: what is less is no jump, and not looked at

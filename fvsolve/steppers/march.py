@@ -12,7 +12,9 @@ from fvsolve.steppers.coefficients import error_of, row_of, weights_of
 from fvsolve.steppers.control import closing_step, grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
 from fvsolve.steppers.ledger import book, book_error
-from fvsolve.steppers.orders import (
+from fvsolve.steppers.rows import emit, next_due
+from fvsolve.steppers.signatures import function_types
+from fvsolve.steppers.slots import (
     BAD_STATUS,
     BAD_VALUE,
     BEHIND,
@@ -66,8 +68,6 @@ from fvsolve.steppers.orders import (
     WHERE,
     T,
 )
-from fvsolve.steppers.rows import emit, next_due
-from fvsolve.steppers.signatures import function_types
 from fvsolve.steppers.step import add_stored, all_finite, copy
 
 

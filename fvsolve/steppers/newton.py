@@ -16,7 +16,7 @@ import numpy as np
 
 from fvsolve.jit import inner
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.orders import (
+from fvsolve.steppers.slots import (
     CALLS,
     CONTROL,
     DAMPED,

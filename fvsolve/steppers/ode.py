@@ -12,8 +12,7 @@ import numpy as np
 from numba import objmode, types
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers import automatic
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.march import compiled
 from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.signatures import compiled_as
@@ -59,9 +58,9 @@ def integrate(
     scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
     stepper = Stepper(method, y0.size, 0, lambda: _full(y0.size), scale)
     orders, memory = stepper.orders, stepper.memory
-    stepper.y[0], memory[told.T] = y0, t[0]
-    orders[told.CONTROL] = told.FIXED_STEP if step is not None else told.TOLERANCE
-    orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
+    stepper.y[0], memory[slots.T] = y0, t[0]
+    orders[slots.CONTROL] = slots.FIXED_STEP if step is not None else slots.TOLERANCE
+    orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
     if watched:
         automatic.watch(stepper, _full(y0.size))
     functions, _PYTHON[id(f)] = _prepared(f, t[0], y0)
@@ -77,25 +76,25 @@ def integrate(
 def _stepped(stepper: Stepper, functions: tuple, key: int, t, y0) -> np.ndarray:
     """States at t : float64[len(t), n], by dense output, or by stepping onto them where that is much less accurate."""
     orders, memory, flags = stepper.orders, stepper.memory, stepper.flags
-    method, fixed, handle = stepper.method, orders[told.CONTROL] != told.TOLERANCE, np.array([key])
+    method, fixed, handle = stepper.method, orders[slots.CONTROL] != slots.TOLERANCE, np.array([key])
     lands = stepper.dense_order < (method.order - 2 if fixed else method.error_order - 1)
     stops = t[1:] if lands else t[-1:]
     stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, y0.size + 1))
     found = np.empty((t.size, y0.size))
     found[0] = y0
     for i, stop in enumerate(stops, t.size - len(stops)):
-        orders[told.END], kept = stop, memory[told.STEP]
-        flags[told.PHASE], flags[told.BEHIND] = told.FRESH, 0
-        code = told.CHUNK
-        while code == told.CHUNK:
+        orders[slots.END], kept = stop, memory[slots.STEP]
+        flags[slots.PHASE], flags[slots.BEHIND] = slots.FRESH, 0
+        code = slots.CHUNK
+        while code == slots.CHUNK:
             if automatic.wants_change(stepper):
                 automatic.change(stepper)
-            orders[told.BUDGET] = NO_LIMIT
+            orders[slots.BUDGET] = NO_LIMIT
             code = stepper.call(*functions, handle, WHERE, stepper.none)
-        if code != told.DONE:
+        if code != slots.DONE:
             raise FvsolveError(_failure(stepper.method, code, memory)) from _RAISED.get(key)
-        found[i] = stepper.y[flags[told.NOW]]
-        memory[told.STEP] = 0.0 if fixed else memory[told.STEP] or kept
+        found[i] = stepper.y[flags[slots.NOW]]
+        memory[slots.STEP] = 0.0 if fixed else memory[slots.STEP] or kept
     if not lands:
         found[1:-1] = stepper.rows[: t.size - 2, 1:]
     return found
@@ -121,9 +120,9 @@ def _full(n):
 
 
 def _failure(method, code, memory) -> str:
-    when = f"{method.name} stopped at t = {memory[told.T]:.6g}: "
-    if code == told.NEWTON_STUCK:
-        return when + f"Newton did not converge, worst in y[{int(memory[told.WORST])}]; try another rtol or method"
+    when = f"{method.name} stopped at t = {memory[slots.T]:.6g}: "
+    if code == slots.NEWTON_STUCK:
+        return when + f"Newton did not converge, worst in y[{int(memory[slots.WORST])}]; try another rtol or method"
     return when + "the solution is not finite or the step shrank to nothing; try a smaller step or a larger rtol"
 
 

@@ -12,7 +12,7 @@ from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
 from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew
-from fvsolve.steppers.orders import (
+from fvsolve.steppers.slots import (
     CALLS,
     CONTROL,
     FACTORS,

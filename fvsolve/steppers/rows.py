@@ -1,7 +1,7 @@
 """Rows and fields: when the next is due, and what is written of those a step has passed. Knows no step and no model."""
 
 from fvsolve.jit import njit
-from fvsolve.steppers.orders import (
+from fvsolve.steppers.slots import (
     DONE,
     EVERY,
     FIELD,

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fvsolve.jit import argument, beside
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.steppers.coefficients import coefficients
 from fvsolve.steppers.ledger import SUMS
 from fvsolve.steppers.march import compiled
@@ -30,8 +30,8 @@ class Stepper:
     ) -> None:
         self.structure, self.scale, self.march = structure, scale, compiled()
         self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(SUMS * ledgers)
-        self.memory, self.orders = np.zeros(told.MEMORY), np.zeros(told.ORDERS)
-        self.flags = np.array([told.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
+        self.memory, self.orders = np.zeros(slots.MEMORY), np.zeros(slots.ORDERS)
+        self.flags = np.array([slots.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
         self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
@@ -55,10 +55,10 @@ class Stepper:
             structure = self.structure()
             self.attempt = attempt_of(method.kind, structure.kind)
             self.solve_by(structure, s, n, ledgers)
-        self.orders[told.ORDER] = method.control_order
-        self.orders[told.FSAL] = method.explicit and method.first_same_as_last
-        self.orders[told.KIND] = KINDS[method.kind][1]
-        self.flags[told.PHASE], self.flags[told.BEHIND] = told.FRESH, 0
+        self.orders[slots.ORDER] = method.control_order
+        self.orders[slots.FSAL] = method.explicit and method.first_same_as_last
+        self.orders[slots.KIND] = KINDS[method.kind][1]
+        self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
 
     def solve_by(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
         """Room and functions for Newton's linear algebra."""
@@ -71,10 +71,10 @@ class Stepper:
             q, pairs = s - 1, pairs_of(self.method)
         reals = max(q - 2 * pairs, 1)  # stages that are solved in turn want one, whatever the method
         size, self.shape = structure.store_size, structure.shape
-        self.work = np.zeros(told.HEADER + structure.nnz + n + 2 * ledgers + q * q)
-        self.work[told.STORE] = size
+        self.work = np.zeros(slots.HEADER + structure.nnz + n + 2 * ledgers + q * q)
+        self.work[slots.STORE] = size
         self.vectors = np.zeros((s + newton.STAGES + 3 * q, n))
-        self.kept = told.HEADER + structure.nnz
+        self.kept = slots.HEADER + structure.nnz
         self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
         self.algebra = (
             *arguments(structure.functions()),
@@ -89,7 +89,7 @@ class Stepper:
 
     def forget(self) -> None:
         """Remember nothing over a kink but what has been counted."""
-        self.memory[[told.STEP, told.ERROR_OLD, told.CASES, told.LEFT]] = 0.0
+        self.memory[[slots.STEP, slots.ERROR_OLD, slots.CASES, slots.LEFT]] = 0.0
         if self.work.size:
             from fvsolve.steppers.newton import forget
 
@@ -108,12 +108,14 @@ class Stepper:
             view[...] = memory[: view.size].reshape(view.shape)
             memory = memory[view.size :]
         if self.work.size:
-            self.work[told.SHIFT] = -abs(self.work[told.SHIFT])  # to be factored once more, which is not counted again
+            self.work[slots.SHIFT] = -abs(
+                self.work[slots.SHIFT]
+            )  # to be factored once more, which is not counted again
         return memory
 
     def counts(self) -> dict[str, int]:
         """How much work the run was."""
-        return {name: int(self.memory[at]) for name, at in told.COUNTS.items()}
+        return {name: int(self.memory[at]) for name, at in slots.COUNTS.items()}
 
     def once(self, rhs, handle, where: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
         """The state after a single step of h from y at t, whatever step was before; NaN where it is not to be had.
@@ -121,14 +123,14 @@ class Stepper:
         Of what is remembered a Newton step takes the Jacobian alone, a linearly implicit one nothing.
         """
         self.y[0] = y
-        self.memory[told.STEPS] += 1.0
+        self.memory[slots.STEPS] += 1.0
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.supply[0] = self.out[where : where + self.supply.shape[1]]
         error = self.attempt(
             rhs, *self.algebra, handle, self.coefficients, self.shape, t, h, self.y, 0, 1, self.k, self.supply, where,
             self.out, self.scale, self.orders, self.memory, self.work, self.vectors, self.store, self.store_complex,
         )  # fmt: skip
-        return self.y[1].copy() if error != told.NEWTON_FAILED else np.full(y.size, np.nan)
+        return self.y[1].copy() if error != slots.NEWTON_FAILED else np.full(y.size, np.nan)
 
     def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
         """March on; returns one of the codes of `steppers.orders`."""
@@ -149,10 +151,10 @@ def arguments(functions: tuple) -> tuple:
 
 # Kinds of methods: the file of their steps, and what they are to the loop.
 KINDS = {
-    "explicit": ("erk", told.EXPLICIT),
-    "diagonal": ("dirk", told.NEWTON_SOLVED),
-    "full": ("irk", told.NEWTON_SOLVED),
-    "linear": ("ros", told.LINEARLY_IMPLICIT),
+    "explicit": ("erk", slots.EXPLICIT),
+    "diagonal": ("dirk", slots.NEWTON_SOLVED),
+    "full": ("irk", slots.NEWTON_SOLVED),
+    "linear": ("ros", slots.LINEARLY_IMPLICIT),
 }
 
 

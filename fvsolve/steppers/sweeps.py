@@ -16,7 +16,7 @@ import numpy as np
 from fvsolve.jit import inner
 from fvsolve.steppers.coefficients import nodes_of, row_of
 from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, reach, tight
-from fvsolve.steppers.orders import CONTROL, TOLERANCE
+from fvsolve.steppers.slots import CONTROL, TOLERANCE
 from fvsolve.steppers.step import copy
 
 MOST = 40

@@ -14,8 +14,8 @@ from fvsolve.doors import COUNT, ROW, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
 from fvsolve.steppers.collocation import collocation, extrapolated
-from fvsolve.steppers.exact.algebraic import MIXED, Algebraic
-from fvsolve.steppers.exact.expression import digits, root, value_of
+from fvsolve.steppers.numbers.algebraic import MIXED, Algebraic
+from fvsolve.steppers.numbers.expression import digits, root, value_of
 from fvsolve.units import show
 
 METHODS: dict[str, Method] = {}  # some under two names: `gauss-2` is `implicit-midpoint`

@@ -120,7 +120,7 @@ def _once(model, y, run) -> Outcome:
     )  # fmt: skip
 
 
-Told = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
+Progress = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
 
 
 def without_basins(case, study: str) -> None:

@@ -9,14 +9,14 @@ from fvsolve.kernels import records as rec
 FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
 
 
-def lower_basins(scene) -> None:
+def lower_basins(draft) -> None:
     """Fill the tables of basins and their patches, and states for their cells."""
-    scene.basins, scene.basin_table, scene.patch_table = [], np.zeros(0, rec.BASIN), np.zeros(0, rec.PATCHES)
-    if scene.case.meshes:
+    draft.basins, draft.basin_table, draft.patch_table = [], np.zeros(0, rec.BASIN), np.zeros(0, rec.PATCHES)
+    if draft.case.meshes:
         from fvsolve.model.basins import free_surface, liquid, transport  # noqa: F401
         from fvsolve.model.basins.basin import lower
 
-        lower(scene)
+        lower(draft)
 
 
 def at_start(basins: list, size: int) -> np.ndarray:

@@ -48,7 +48,7 @@ class Basin:
 
     # what a physics says ------------------------------------------------------------------------------------
 
-    def lower(self, scene, row) -> None:
+    def lower(self, draft, row) -> None:
         """Fill what its law needs of the row, and reserve what its kernels work in."""
         raise NotImplementedError
 
@@ -154,57 +154,57 @@ class Basin:
         at = int(self.row["y"])
         return y[at : at + len(self.quantities) * self.n].reshape(-1, self.n)
 
-    def lower_common(self, scene, row) -> None:
+    def lower_common(self, draft, row) -> None:
         """Fill what all kinds need."""
-        numerics, mesh, before = self.case.numerics, self.mesh, scene.plane_size + len(scene.integers)
+        numerics, mesh, before = self.case.numerics, self.mesh, draft.plane_size + len(draft.integers)
         self.row, row["n"] = row, self.n
         row["scheme"] = rec.UPWIND if numerics.scheme == "upwind" else FIFTH.get(numerics.scheme, rec.MUSCL)
         row["limiter"], row["wide"] = LIMITERS[numerics.limiter]
-        row["area"] = scene.to_plane(mesh.area)
+        row["area"] = draft.to_plane(mesh.area)
         if self.is_grid:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
-            row["spacing"] = scene.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
+            row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
             if row["scheme"] not in (rec.UPWIND, rec.MUSCL):
                 text = f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; muscl is taken there"
-                scene.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
+                draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
                 row["scheme"] = rec.MUSCL
             floats, self.integers = lower_mesh(mesh)
-            row["mesh"], row["faces"] = scene.to_plane(floats), mesh.left.size
-            row["links"] = len(scene.integers)
-            scene.integers += self.integers.tolist()
+            row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
+            row["links"] = len(draft.integers)
+            draft.integers += self.integers.tolist()
         given = self.reflects()
-        row["reflect"], row["outer_given"] = scene.to_plane(given), given.size
+        row["reflect"], row["outer_given"] = draft.to_plane(given), given.size
         row["outer"] = mesh.left.size - mesh.inner
-        row["through"] = scene.to_plane(np.zeros(given.size)) if given.size else -1
-        row["unused"] = scene.to_plane(np.zeros(len(self.quantities) * self.n if given.size else 0))
+        row["through"] = draft.to_plane(np.zeros(given.size)) if given.size else -1
+        row["unused"] = draft.to_plane(np.zeros(len(self.quantities) * self.n if given.size else 0))
         row["carried"] = row["flows"] = -1
-        self.lower(scene, row)
+        self.lower(draft, row)
         if self.scalars:
-            self.lower_scalars(scene, row)
-        row["y"] = scene.size
+            self.lower_scalars(draft, row)
+        row["y"] = draft.size
         for what, scale in zip(self.quantities, self.scales(), strict=True):
-            scene.states([f"{self.name}.{what}[{i}]" for i in range(self.n)], scale)
-        row["carried"] = scene.size if self.scalars else -1
+            draft.states([f"{self.name}.{what}[{i}]" for i in range(self.n)], scale)
+        row["carried"] = draft.size if self.scalars else -1
         for name in self.scalars:
-            scene.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
-        self.memory = 8 * (scene.plane_size + len(scene.integers) + scene.size - before)
+            draft.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
+        self.memory = 8 * (draft.plane_size + len(draft.integers) + draft.size - before)
         place = f"nodes.{self.name}"
-        scene.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
+        draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
 
-    def lower_scalars(self, scene, row) -> None:
+    def lower_scalars(self, draft, row) -> None:
         """Reserve what scalars are carried by and in, and values beyond the boundary."""
         mesh, grid = self.mesh, self.mesh.grid
-        row["outside"] = scene.to_plane(np.zeros(len(self.scalars) * int(row["outer"])))
+        row["outside"] = draft.to_plane(np.zeros(len(self.scalars) * int(row["outer"])))
         if self.is_grid:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
             toil = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
         else:
             flows, toil = mesh.left.size, self.n + advection_faces.work_size(self.integers)
         if row["flows"] < 0:
-            row["flows"] = scene.to_plane(np.zeros(flows))
-        row["toil"] = scene.to_plane(np.zeros(toil))
+            row["flows"] = draft.to_plane(np.zeros(flows))
+        row["toil"] = draft.to_plane(np.zeros(toil))
         may = self.may_leave(row)
         if may:
             numerics = self.case.numerics
@@ -212,7 +212,7 @@ class Basin:
             limited = f", {numerics.limiter}" if row["scheme"] == rec.MUSCL else ""
             what = f"basin {self.name}: scalars may leave their bounds ({scheme}{limited}; {numerics.method}): "
             key, why, value, limit = may
-            scene.warnings.append(Notice("bounds", f"nodes.{self.name}", what + why, key, value, limit))
+            draft.warnings.append(Notice("bounds", f"nodes.{self.name}", what + why, key, value, limit))
 
     def may_leave(self, row) -> tuple[str, str, float | None, float | None] | None:
         """Why scalars may leave the bounds that the case states: (key, text, value, limit); None where they cannot."""
@@ -268,34 +268,34 @@ class Basin:
         """Mass that holds a scalar, per depth : float64[n] [kg/m]."""
         raise NotImplementedError
 
-    def lower_patch(self, scene, patch: str, row) -> None:
+    def lower_patch(self, draft, patch: str, row) -> None:
         """Fill the row of a patch that links may join."""
         cells = behind(self.mesh, patch)
-        row["first"], row["count"], row["area"] = len(scene.integers), cells.size, self.mesh.area[cells].sum()
-        scene.integers += cells.tolist()
+        row["first"], row["count"], row["area"] = len(draft.integers), cells.size, self.mesh.area[cells].sum()
+        draft.integers += cells.tolist()
         own, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner
         numbers = np.argsort(self.ring())[own - outer] if self.is_grid else own - outer
-        row["ring"], row["faces"], behind_faces = len(scene.integers), own.size, self.mesh.left[own]
-        scene.integers += [*numbers.tolist(), *behind_faces.tolist()]
+        row["ring"], row["faces"], behind_faces = len(draft.integers), own.size, self.mesh.left[own]
+        draft.integers += [*numbers.tolist(), *behind_faces.tolist()]
         length = self.mesh.length[own]
         row["length"] = length.sum()
-        row["normals"] = scene.to_plane(np.array([*self.mesh.normal[own].T, length / self.mesh.area[behind_faces]]))
+        row["normals"] = draft.to_plane(np.array([*self.mesh.normal[own].T, length / self.mesh.area[behind_faces]]))
         stated = self.part.patches.get(patch)
         row["open"] = self.opens(patch)
         given = stated.scalars if stated is not None else {}
-        row["values"] = len(scene.integers)
-        scene.integers += [scene.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
+        row["values"] = len(draft.integers)
+        draft.integers += [draft.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
 
 
-def lower(scene) -> None:
+def lower(draft) -> None:
     """Fill the tables of basins and their patches, and states for their cells."""
-    case = scene.case
-    scene.basins = [Basin.physics[case.nodes[name].physics](case, name) for name in case.meshes]
-    scene.basin_table = np.zeros(len(scene.basins), rec.BASIN)
-    for basin, row in zip(scene.basins, scene.basin_table, strict=True):
-        basin.lower_common(scene, row)
+    case = draft.case
+    draft.basins = [Basin.physics[case.nodes[name].physics](case, name) for name in case.meshes]
+    draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
+    for basin, row in zip(draft.basins, draft.basin_table, strict=True):
+        basin.lower_common(draft, row)
     patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]
-    scene.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
-    for row, (name, place) in zip(scene.patch_table, patches, strict=True):
-        row["basin"], row["node"] = names.index(place.basin), scene.node_index[name]
-        scene.basins[row["basin"]].lower_patch(scene, place.patch, row)
+    draft.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
+    for row, (name, place) in zip(draft.patch_table, patches, strict=True):
+        row["basin"], row["node"] = names.index(place.basin), draft.node_index[name]
+        draft.basins[row["basin"]].lower_patch(draft, place.patch, row)

@@ -51,7 +51,7 @@ class FreeSurface(Basin, physics="free-surface"):
         flow = SCALE * np.sqrt(self.case.gravity * SCALE)
         return [SCALE, flow, flow]
 
-    def lower(self, scene, row) -> None:
+    def lower(self, draft, row) -> None:
         plan = np.zeros((shallow.PLANS, self.n))
         plan[0], plan[1] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
         part, weight = self.part, self.case.properties.density * self.case.gravity
@@ -60,20 +60,20 @@ class FreeSurface(Basin, physics="free-surface"):
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning
         if self.is_grid:
-            self.lower_grid(scene, row)
+            self.lower_grid(draft, row)
         else:
-            self.lower_faces(scene, row)
-        row["plan"] = scene.to_plane(plan)
+            self.lower_faces(draft, row)
+        row["plan"] = draft.to_plane(plan)
 
-    def lower_grid(self, scene, row) -> None:
+    def lower_grid(self, draft, row) -> None:
         row["kind"] = rec.SHALLOW_GRID
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
         row["unsplit"] = SHORES if dry and row["scheme"] in FIFTH.values() else UNSPLIT
-        row["work"] = scene.to_plane(np.zeros(shallow.WORK))
+        row["work"] = draft.to_plane(np.zeros(shallow.WORK))
 
-    def lower_faces(self, scene, row) -> None:
+    def lower_faces(self, draft, row) -> None:
         row["kind"], row["unsplit"] = rec.SHALLOW_FACES, UNSPLIT
-        row["work"] = scene.to_plane(np.zeros(shallow_faces.work_size(self.integers)))
+        row["work"] = draft.to_plane(np.zeros(shallow_faces.work_size(self.integers)))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start

@@ -46,27 +46,27 @@ class Liquid(Basin, physics="liquid"):
         own = self.density * self.speed
         return (patch.impedance - own) / (patch.impedance + own)
 
-    def lower(self, scene, row) -> None:
+    def lower(self, draft, row) -> None:
         row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
         height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
         row["rest"] = self.part.pressure - self.case.ambient_pressure + height
         row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
         if self.waves is not None:
-            self.lower_waves(scene, row)
+            self.lower_waves(draft, row)
         if self.is_grid:
             row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.TABLE_GRID if self.waves else rec.LIQUID_GRID
             size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
-            row["work"] = scene.to_plane(np.zeros(size))
+            row["work"] = draft.to_plane(np.zeros(size))
         else:
             row["kind"] = rec.TABLE_FACES if self.waves else rec.LIQUID_FACES
-            row["work"] = scene.to_plane(np.zeros(liquid_faces.work_size(self.integers)))
+            row["work"] = draft.to_plane(np.zeros(liquid_faces.work_size(self.integers)))
 
-    def lower_waves(self, scene, row) -> None:
+    def lower_waves(self, draft, row) -> None:
         """The table of its waves; a wall cannot make them quicker than the fluid's own."""
         if self.waves.speed > (1.0 + 1e-9) * self.waves.own_speed:
-            scene.fault(f"nodes.{self.name}.wave_speed", f"{self.speed:.6g} m/s is faster than sound in the fluid, "
+            draft.fault(f"nodes.{self.name}.wave_speed", f"{self.speed:.6g} m/s is faster than sound in the fluid, "
                         f"{self.waves.own_speed:.6g} m/s; wanted at most that, or another law")  # fmt: skip
-        row["table"] = scene.to_plane(self.waves.table())
+        row["table"] = draft.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
         """Pressure above that at rest [Pa], of deviations of the density."""

@@ -13,15 +13,15 @@ from fvsolve.model.velocity import face_flows, grid_flows, velocity_flows
 class Transport(Basin, physics="transport"):
     """Nothing moves but what is carried; depth 1."""
 
-    def lower(self, scene, row) -> None:
+    def lower(self, draft, row) -> None:
         given, mesh = self.part.velocity, self.mesh
-        flows = self.flows(scene)
+        flows = self.flows(draft)
         row["thickness"], row["density"] = self.part.thickness or 1.0, self.case.properties.density
         row["kind"], row["period"] = rec.CARRIED_GRID if self.is_grid else rec.CARRIED_FACES, given.period or 0.0
         if self.is_grid:
             grid = mesh.grid
             flow_x, flow_y = grid_flows(mesh, flows)
-            row["flows"] = scene.to_plane(np.concatenate([flow_x, flow_y]))
+            row["flows"] = draft.to_plane(np.concatenate([flow_x, flow_y]))
             kx, ky = 1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)
             along, across = abs(flow_x).reshape(grid.ny, -1), abs(flow_y).reshape(-1, grid.nx)
             through = np.maximum(along[:, 1:], along[:, :-1]) + np.maximum(across[1:], across[:-1])
@@ -29,7 +29,7 @@ class Transport(Basin, physics="transport"):
             worst = np.unravel_index(np.argmax(kx * ky[:, None] * through), through.shape)
             self.share = float(np.maximum(along[:, 1:], along[:, :-1])[worst] / max(through[worst], 1e-300))
         else:
-            row["flows"], inner = scene.to_plane(flows), mesh.inner
+            row["flows"], inner = draft.to_plane(flows), mesh.inner
             through = np.bincount(mesh.left, np.abs(flows), self.n)
             through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
             row["fastest"], self.share = (0.5 * through / mesh.area).max(), 1.0
@@ -41,12 +41,12 @@ class Transport(Basin, physics="transport"):
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
             at = mesh.middle[own[np.argmax(flows[own] != 0.0)]]
             what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
-            scene.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
-            scene.check()
+            draft.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
+            draft.check()
         row["unsplit"] = self.unsplit(row, passing)
         if passing:
             inward = -flows[mesh.inner :]
-            row["through"] = scene.to_plane(inward[self.ring()] if self.is_grid else inward)
+            row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
 
     def unsplit(self, row, passing: list[str]) -> float:
         """What counts as rate over what leaves a cell, so that Euler steps of Courant number 1 keep bounds."""
@@ -57,7 +57,7 @@ class Transport(Basin, physics="transport"):
     def opens(self, patch: str) -> bool:
         return patch in self.passing
 
-    def flows(self, scene) -> np.ndarray:
+    def flows(self, draft) -> np.ndarray:
         """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
         given, mesh = self.part.velocity.given, self.mesh
         if self.part.velocity.way == "u, v":
@@ -67,8 +67,8 @@ class Transport(Basin, physics="transport"):
         try:
             return face_flows(mesh, given)
         except (ValueError, TypeError, CaseError) as error:
-            scene.fault(f"nodes.{self.name}.velocity", str(error))
-            scene.check()
+            draft.fault(f"nodes.{self.name}.velocity", str(error))
+            draft.check()
             raise
 
     def scales(self) -> list[float]:

@@ -20,10 +20,10 @@ class Accumulator(Device, kind="accumulator"):
     events = ("is empty", "holds fluid again")
     remedy = "give it a connection, whose loss brakes what comes and goes"
 
-    def place(self, scene, name, node, row) -> None:
-        row["y"] = scene.states([f"{name}.mass"], 0.1 * scene.fluid.density * node.volume)
+    def place(self, draft, name, node, row) -> None:
+        row["y"] = draft.states([f"{name}.mass"], 0.1 * draft.fluid.density * node.volume)
 
-    def numbers(self, scene, name, part) -> list[float]:
+    def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
 
     def settle(self, model, row, y, scale) -> None:
@@ -33,8 +33,8 @@ class Accumulator(Device, kind="accumulator"):
             scale[at] = -(1e5 / floats[law.NECK] + ROUNDED * abs(floats[law.EMPTY]))
 
     def begin(self, start, part, row) -> list[str]:
-        scene, fluid = start.scene, start.scene.fluid
-        node = scene.node_table[row["node"]]
+        draft, fluid = start.draft, start.draft.fluid
+        node = draft.node_table[row["node"]]
         p, dense = float(node["pressure"]), self.density(start)
         neck = NECK * part.volume if part.precharge is not None else 0.0
         first = part.precharge if part.precharge is not None else p
@@ -46,15 +46,15 @@ class Accumulator(Device, kind="accumulator"):
         empty = dense(p + shed) * neck - mass
         if fluid.law == "linear":
             empty = shed / stiff if neck and shed > 0.0 else -fluid.density * (part.volume - gas)
-        floats = scene.tables.floats
+        floats = draft.tables.floats
         floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, room, stiff, empty, shed]
         node["mass"] = mass
         node["stiffness"] = stiff if shed > 0.0 and neck else part.exponent * p / (fluid.density * gas)
         if neck and shed >= 0.0:
-            name = list(scene.case.places)[row["node"]].removesuffix(".inside")
+            name = list(draft.case.places)[row["node"]].removesuffix(".inside")
             text = (f"{name}: empty at the start, where its precharge, {first:.6g} Pa, is not below the pressure, "
                     f"{p:.6g} Pa")  # fmt: skip
-            scene.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
+            draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
         return []
 
     def above(self, model, part, row) -> float:
@@ -78,8 +78,8 @@ class Accumulator(Device, kind="accumulator"):
 
     def density(self, start):
         """rho(p) [kg/m3] of the case's law."""
-        if start.scene.fluid.law == "linear":
-            return lambda p: start.scene.fluid.density
+        if start.draft.fluid.law == "linear":
+            return lambda p: start.draft.fluid.density
         from fvsolve.kernels.density import density
 
         return lambda p: density(start.st, start.floats, float(p))

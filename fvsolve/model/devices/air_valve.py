@@ -22,21 +22,21 @@ class AirValve(Device, kind="air-valve"):
     events = ("opens", "shuts")
     remedy = "give it another volume"
 
-    def place(self, scene, name, node, row) -> None:
-        row["density"] = scene.law.tank_density
-        row["y"] = scene.states([f"{name}.mass"], row["density"] * node.volume)
+    def place(self, draft, name, node, row) -> None:
+        row["density"] = draft.law.tank_density
+        row["y"] = draft.states([f"{name}.mass"], row["density"] * node.volume)
 
     def gate(self, name: str) -> str:
         return name.removesuffix(".inside") + ".connection"
 
-    def numbers(self, scene, name, part) -> list[float]:
+    def numbers(self, draft, name, part) -> list[float]:
         heat = GAS_CONSTANT * part.temperature
-        held = scene.case.ambient_pressure * part.volume / heat
+        held = draft.case.ambient_pressure * part.volume / heat
         ways = [part.discharge_coefficient * math.pi / 4.0 * d**2 for d in (part.inlet, part.outlet)]
         return [part.volume, held, heat, *ways]
 
-    def scales(self, scene, name, part) -> list[float]:
-        return [self.numbers(scene, name, part)[law.AIR]]
+    def scales(self, draft, name, part) -> list[float]:
+        return [self.numbers(draft, name, part)[law.AIR]]
 
     def revise(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -54,7 +54,7 @@ class AirValve(Device, kind="air-valve"):
         if short <= law.RELUCTANCE:
             return []
         text = f"{name}: the air valve is open at the start, {short:.4g} Pa below ambient"
-        start.scene.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(short), 0.0))
+        start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(short), 0.0))
         return [f"air valve {name}: {short:.4g} Pa below ambient, so it opens"]
 
     def squares(self, model, part, row, y, out):

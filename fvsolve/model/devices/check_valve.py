@@ -19,7 +19,7 @@ class CheckValve(Device, kind="check-valve"):
     def of(self, part) -> Device:
         return self if not part.moves else CheckLag() if part.natural_frequency is None else CheckSwing()
 
-    def numbers(self, scene, name, part) -> list[float]:
+    def numbers(self, draft, name, part) -> list[float]:
         return [part.cracking_pressure]
 
     def revise(self, start, part, row) -> bool:

@@ -34,26 +34,26 @@ class Device:
         """What lowers this part: itself, but where its keys ask for other states."""
         return self
 
-    def restriction(self, scene, name: str, link: Any, row) -> None:
+    def restriction(self, draft, name: str, link: Any, row) -> None:
         """Fill the VALVE row of a link."""
-        scene.restriction(name, link, row)
+        draft.restriction(name, link, row)
 
-    def place(self, scene, name: str, node: Any, row) -> None:
+    def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
 
     def gate(self, name: str) -> str | None:
         """The link that a vessel opens and shuts beside."""
         return None
 
-    def numbers(self, scene, name: str, part: Any) -> list[float]:
+    def numbers(self, draft, name: str, part: Any) -> list[float]:
         """Its numbers, in the order in which its kernel reads them; those of the start come with `begin`."""
         return []
 
-    def states_of(self, scene, name: str, part: Any) -> tuple[str, ...]:
+    def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of what one holds."""
         return self.states
 
-    def scales(self, scene, name: str, part: Any) -> list[float]:
+    def scales(self, draft, name: str, part: Any) -> list[float]:
         """What counts as a small deviation of each of its states."""
         return []
 
@@ -92,30 +92,30 @@ class Device:
         return 0.0
 
 
-def lower_devices(scene) -> None:
+def lower_devices(draft) -> None:
     """Fill the table of devices of a scene, with their states, numbers and event functions."""
-    scene.devices = [(name, part, Device.kinds[part.kind].of(part)) for name, part in parts_of(scene.case)]
-    table = scene.device_table = np.zeros(len(scene.devices), rec.DEVICE)
+    draft.devices = [(name, part, Device.kinds[part.kind].of(part)) for name, part in parts_of(draft.case)]
+    table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
-    for k, ((name, part, device), row) in enumerate(zip(scene.devices, table, strict=True)):
-        states = device.states_of(scene, name, part)
+    for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
+        states = device.states_of(draft, name, part)
         row["kind"], row["states"] = device.code, len(states)
-        if name in scene.valve_names:
-            row["valve"] = scene.valve_names.index(name)
-            scene.valve_table["device"][row["valve"]] = k
-        elif name in scene.node_index:
-            row["node"] = scene.node_index[name]
-            row["row"] = scene.node_table[row["node"]]["row"]
+        if name in draft.valve_names:
+            row["valve"] = draft.valve_names.index(name)
+            draft.valve_table["device"][row["valve"]] = k
+        elif name in draft.node_index:
+            row["node"] = draft.node_index[name]
+            row["row"] = draft.node_table[row["node"]]["row"]
         if (gate := device.gate(name)) is not None:
-            row["valve"] = scene.valve_names.index(gate)
-            scene.valve_table["device"][row["valve"]] = k
-        row["data"] = len(scene.floats)
-        scene.floats += device.numbers(scene, name, part)
-        for state, scale in zip(states, device.scales(scene, name, part), strict=True):
-            at = scene.states([f"{name}.{state}"], scale)
+            row["valve"] = draft.valve_names.index(gate)
+            draft.valve_table["device"][row["valve"]] = k
+        row["data"] = len(draft.floats)
+        draft.floats += device.numbers(draft, name, part)
+        for state, scale in zip(states, device.scales(draft, name, part), strict=True):
+            at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
-        row["event"] = limits.EVENTS * scene.tanks + len(scene.events)
-        scene.events += [(name.removesuffix(".inside"), text) for text in device.events]
+        row["event"] = limits.EVENTS * draft.tanks + len(draft.events)
+        draft.events += [(name.removesuffix(".inside"), text) for text in device.events]
 
 
 def parts_of(case) -> list[tuple[str, Any]]:

@@ -26,13 +26,13 @@ class Lifting(Device, kind=""):
     events = STOPS
     remedy = "give it a greater overpressure"
 
-    def numbers(self, scene, name, part) -> list[float]:
+    def numbers(self, draft, name, part) -> list[float]:
         """At the start: lift, where the pressures draw it, what it feels; then its span, and how its disc moves."""
         frequency = part.natural_frequency or 0.0
         return [0.0, 0.0, 0.0, part.overpressure, part.time_constant or 0.0, 2.0 * math.pi * frequency,
                 part.damping_ratio or 0.0]  # fmt: skip
 
-    def scales(self, scene, name, part) -> list[float]:
+    def scales(self, draft, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
     def settle(self, model, row, y, scale) -> None:
@@ -43,7 +43,7 @@ class Lifting(Device, kind=""):
             y[row["y"] + 1] = 0.0
 
     def part(self, start, k: int):
-        return start.scene.devices[start.valves[k]["device"]][1]
+        return start.draft.devices[start.valves[k]["device"]][1]
 
     def felt(self, start, k: int) -> float:
         """What lifts it beyond its first opening, in the solution just found [Pa]."""
@@ -86,21 +86,21 @@ class Lifting(Device, kind=""):
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
-        valve, name = start.valves[k], start.scene.valve_names[k]
+        valve, name = start.valves[k], start.draft.valve_names[k]
         lifts = k not in start.shut and start.modes[k] == LIFTING
         x = 0.0 if k in start.shut else opening_of(start, k) if lifts else 1.0
         self.fill(start, row, x, x if lifts else self.felt(start, k) / part.overpressure)
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
-        start.scene.tables.floats[row["data"] + 2] = start.law_of(k)[1]
+        start.draft.tables.floats[row["data"] + 2] = start.law_of(k)[1]
         self.tell(start, name, x)
         target = self.felt(start, k) / part.overpressure
         return [f"{name}: shut, though the pressure lifts it"] if start.rest and target > SMALL_LIFT else []
 
     def fill(self, start, row, x: float, target: float) -> None:
         """Its lift at the start, and where the pressures draw it."""
-        start.scene.tables.floats[row["data"] : row["data"] + 2] = x, target
+        start.draft.tables.floats[row["data"] : row["data"] + 2] = x, target
 
     def tell(self, start, name: str, x: float) -> None:
         """What its user may not expect."""
@@ -131,7 +131,7 @@ class ReliefDisc(Lifting, kind=""):
     def tell(self, start, name, x):
         if x > 0.0:
             text = f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1"
-            start.scene.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
+            start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
 
 
 class ReliefSwing(ReliefDisc, kind=""):
@@ -155,16 +155,16 @@ class Relief(ReliefDisc, kind="relief-valve"):
     def of(self, part) -> Device:
         return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
 
-    def restriction(self, scene, name, link, row) -> None:
-        scene.restriction(name, link, row)
+    def restriction(self, draft, name, link, row) -> None:
+        draft.restriction(name, link, row)
         row["law"] = rec.ROOT if link.moves else rec.LIFT
 
-    def numbers(self, scene, name, part) -> list[float]:
-        scene.valve_table["data"][scene.valve_names.index(name)] = len(scene.floats)
+    def numbers(self, draft, name, part) -> list[float]:
+        draft.valve_table["data"][draft.valve_names.index(name)] = len(draft.floats)
         return [0.0, part.overpressure, 0.0]
 
     def fill(self, start, row, x, target):
-        start.scene.tables.floats[row["data"]] = target
+        start.draft.tables.floats[row["data"]] = target
 
 
 class CheckDisc(Lifting, kind=""):
@@ -189,13 +189,13 @@ class CheckDisc(Lifting, kind=""):
 
     def tell(self, start, name, x):
         """A disc beside other valves does not lead the column that they hold together."""
-        valve, nodes = start.valves[start.scene.valve_names.index(name)], start.nodes
+        valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
             nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
         ):
             text = (f"{name}: its disc and other valves hold a rigid column: its lift and flow are not to be trusted "
                     "from where it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
-            start.scene.warnings.append(Notice("range", f"links.{name}", text))
+            start.draft.warnings.append(Notice("range", f"links.{name}", text))
 
     def next(self, x, back, now):
         return "shut" if back and now != "shut" else super().next(x, back, now)

@@ -33,41 +33,41 @@ class Pump(Device, kind="pump"):
     events = ("check valve shuts", "check valve opens")
     remedy = "give it a check-valve with a time_constant behind it, in place of its own"
 
-    def states_of(self, scene, name, part) -> tuple[str, ...]:
-        return ("speed",) if part.trip is not None or torques_on(scene.case, name) else ()
+    def states_of(self, draft, name, part) -> tuple[str, ...]:
+        return ("speed",) if part.trip is not None or torques_on(draft.case, name) else ()
 
-    def scales(self, scene, name, part) -> list[float]:
-        return [SMALL_SPEED for _ in self.states_of(scene, name, part)]
+    def scales(self, draft, name, part) -> list[float]:
+        return [SMALL_SPEED for _ in self.states_of(draft, name, part)]
 
-    def restriction(self, scene, name, link, row) -> None:
-        weight = scene.fluid.density * scene.case.gravity
+    def restriction(self, draft, name, link, row) -> None:
+        weight = draft.fluid.density * draft.case.gravity
         flow, head = rated_point(link, weight)
-        row["law"], row["data"] = rec.CURVE, len(scene.floats)
-        scene.floats += curve_numbers(link, weight)
-        row["conductance"] = (scene.fluid.density * flow) ** 2 / (weight * head)
+        row["law"], row["data"] = rec.CURVE, len(draft.floats)
+        draft.floats += curve_numbers(link, weight)
+        row["conductance"] = (draft.fluid.density * flow) ** 2 / (weight * head)
 
-    def numbers(self, scene, name, part) -> list[float]:
-        rated, torques = part.rated_speed or 1.0, torques_on(scene.case, name)
+    def numbers(self, draft, name, part) -> list[float]:
+        rated, torques = part.rated_speed or 1.0, torques_on(draft.case, name)
         mode = law.TURNED if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
-        scene.device_table["schedule"][scene.device_names.index(name)] = scene.schedules.add(part.speed)
-        given = [x for torque in torques for x in (scene.schedules.add(torque.torque), 0.0)]
-        own = shaft_points(part, scene.fluid.density * scene.case.gravity)
+        draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
+        given = [x for torque in torques for x in (draft.schedules.add(torque.torque), 0.0)]
+        own = shaft_points(part, draft.fluid.density * draft.case.gravity)
         numbers = {
-            law.MODE: mode, law.CHECK: part.check_valve, law.TRIP: self.trip(scene, name, part),
+            law.MODE: mode, law.CHECK: part.check_valve, law.TRIP: self.trip(draft, name, part),
             law.INERTIA: (part.inertia or np.inf) * rated, law.RATED: rated, law.COUNT_OR_TORQUE: own[0],
             law.GIVEN: len(torques), law.KNOWN: self.resists(part),
         }  # fmt: skip
         return [float(numbers.get(k, 0.0)) for k in range(law.OWN_NUMBERS)] + given + own[1:]
 
-    def trip(self, scene, name, part) -> int:
+    def trip(self, draft, name, part) -> int:
         """The schedule that is 0 before and 1 after the trip; its speed has a kink there and no jump."""
         if part.trip is None:
             return -1
-        kinks, start = dict(scene.schedules.breaks), scene.case.numerics.start
+        kinks, start = dict(draft.schedules.breaks), draft.case.numerics.start
         if part.trip < start:
-            scene.fault(f"links.{name}.trip", f"{part.trip:g} s lies before the start at {start:g} s")
-        made = scene.schedules.add(Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0)))
-        scene.schedules.breaks[part.trip] = kinks.get(part.trip, False)
+            draft.fault(f"links.{name}.trip", f"{part.trip:g} s lies before the start at {start:g} s")
+        made = draft.schedules.add(Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0)))
+        draft.schedules.breaks[part.trip] = kinks.get(part.trip, False)
         return made
 
     def resists(self, part) -> bool:
@@ -82,8 +82,8 @@ class Pump(Device, kind="pump"):
 
     def speed_at(self, start, k: int) -> float:
         """Relative speed at the start."""
-        row = start.scene.device_table[start.valves[k]["device"]]
-        return float(schedule_value(start.scene.tables, int(row["schedule"]), start.t))
+        row = start.draft.device_table[start.valves[k]["device"]]
+        return float(schedule_value(start.draft.tables, int(row["schedule"]), start.t))
 
     def edge(self, start, k: int):
         row = start.valves[k]
@@ -95,9 +95,9 @@ class Pump(Device, kind="pump"):
         if start.rest:
             row["open"] = 0.0
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        floats, at, g = start.scene.tables.floats, int(row["data"]), float(row["conductance"])
+        floats, at, g = start.draft.tables.floats, int(row["data"]), float(row["conductance"])
         rho, gravity = start.density_at(i), start.case.gravity
-        ratio = rho / start.scene.fluid.density
+        ratio = rho / start.draft.fluid.density
 
         def newton(flow, present):
             a, s = curves.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
@@ -108,7 +108,7 @@ class Pump(Device, kind="pump"):
 
     def lift(self, start, row, flow: float) -> float:
         """What a pump adds at a mass flow [Pa]."""
-        floats, rho = start.scene.tables.floats, start.density_at(int(row["from_node"]))
+        floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
         return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
 
@@ -126,37 +126,37 @@ class Pump(Device, kind="pump"):
         return shuts
 
     def begin(self, start, part, row) -> list[str]:
-        k, scene = int(row["valve"]), start.scene
-        valve, name, moving = start.valves[k], scene.valve_names[k], []
-        ratio = start.density_at(int(valve["from_node"])) / scene.fluid.density
+        k, draft = int(row["valve"]), start.draft
+        valve, name, moving = start.valves[k], draft.valve_names[k], []
+        ratio = start.density_at(int(valve["from_node"])) / draft.fluid.density
         if valve["open"] > 0.0:
             drop = -self.lift(start, valve, float(valve["flow"]))
             near = 1e-6 * (abs(drop) + abs(self.lift(start, valve, 0.0))) + 1e-3
             if abs(drop - valve["drop"] * ratio) > near:
                 valve["open"] = 0.0
-            elif scene.case.fluid.law == "linear":
+            elif draft.case.fluid.law == "linear":
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
-        start.scene.warnings += [*drawn_backwards(start, name, part, valve), *quick(scene, name, part)]
+        start.draft.warnings += [*drawn_backwards(start, name, part, valve), *quick(draft, name, part)]
         return moving + self.let_go(start, part, row, valve)
 
     def let_go(self, start, part, row, valve) -> list[str]:
         """The speed from which a shaft runs free, and what does not hold it; returns what moves, in words."""
-        scene, floats, at = start.scene, start.scene.tables.floats, int(row["data"])
-        name, settings = scene.valve_names[row["valve"]], scene.tables.settings[0]
+        draft, floats, at = start.draft, start.draft.tables.floats, int(row["data"])
+        name, settings = draft.valve_names[row["valve"]], draft.tables.settings[0]
         if floats[at + law.MODE] == law.TRIPPING:
             limit, settings["limit"] = float(settings["limit"]), part.trip
-            floats[at + law.HELD] = schedule_value(scene.tables, int(row["schedule"]), float(part.trip))
+            floats[at + law.HELD] = schedule_value(draft.tables, int(row["schedule"]), float(part.trip))
             settings["limit"] = limit
         if floats[at + law.MODE] != law.TURNED:
             return []
         rho = start.density_at(int(valve["from_node"]))
-        speed, flow, dense = float(valve["drive"]), float(valve["flow"]) / rho, rho / scene.fluid.density
+        speed, flow, dense = float(valve["drive"]), float(valve["flow"]) / rho, rho / draft.fluid.density
         taken = law.fluid_torque(floats, at, int(valve["data"]), speed, flow, dense)
         first, total = at + law.OWN_NUMBERS, 0.0
         for k in range(int(floats[at + law.GIVEN])):
-            value = schedule_value(scene.tables, int(floats[first + 2 * k]), start.t)
+            value = schedule_value(draft.tables, int(floats[first + 2 * k]), start.t)
             floats[first + 2 * k + 1], total = value, total + value
         left = total - taken if abs(total - taken) > SNAP * (abs(total) + abs(taken)) else 0.0
         floats[at + law.HELD], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, taken, left
@@ -177,14 +177,14 @@ def drawn_backwards(start, name: str, part, valve) -> list[Notice]:
     return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
 
 
-def quick(scene, name: str, part) -> list[Notice]:
+def quick(draft, name: str, part) -> list[Notice]:
     """A note on a pump whose rated flow is too quick for every pipe beside it; pumping stations have 1 to 4 m/s (Sanks,
     Pumping Station Design)."""
-    pipes = [one for one in scene.case.links.values() if one.kind in ("pipe", "rigid-column")]
+    pipes = [one for one in draft.case.links.values() if one.kind in ("pipe", "rigid-column")]
     wide = max((one.diameter for one in pipes if {one.from_, one.to} & {part.from_, part.to}), default=None)
     if wide is None or part.power is not None:
         return []
-    flow = rated_point(part, scene.fluid.density * scene.case.gravity)[0]
+    flow = rated_point(part, draft.fluid.density * draft.case.gravity)[0]
     speed = flow / (math.pi / 4.0 * wide**2)
     if speed <= QUICKEST:
         return []

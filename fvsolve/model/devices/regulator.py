@@ -44,36 +44,36 @@ class Regulator(Device, kind=""):
     remedy = "give it a longer time_constant"
     key, end, verb = "set_pressure", "", ""  # what is set, at which end it is sensed, what it does
 
-    def numbers(self, scene, name, part) -> list[float]:
-        scale = 1.0 if self.end else scene.fluid.density
+    def numbers(self, draft, name, part) -> list[float]:
+        scale = 1.0 if self.end else draft.fluid.density
         schedule = getattr(part, self.key)
-        row = scene.device_table[scene.device_names.index(name)]
-        row["schedule"] = scene.schedules.add(schedule, scale)
+        row = draft.device_table[draft.device_names.index(name)]
+        row["schedule"] = draft.schedules.add(schedule, scale)
         if self.end:
-            self.reach(scene, name, part)
+            self.reach(draft, name, part)
         band = part.band if self.end else schedule.first * scale
         return [0.0, 0.0, 0.0, band, part.time_constant]
 
-    def reach(self, scene, name, part) -> None:
+    def reach(self, draft, name, part) -> None:
         """A fault where no source can bring the pressure that is set."""
-        nodes, case = scene.case.nodes.values(), scene.case
+        nodes, case = draft.case.nodes.values(), draft.case
         if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
             return  # pressure comes from elsewhere too
-        weight, place = scene.fluid.density * case.gravity, getattr(part, "to" if self.end == "to" else "from_")
+        weight, place = draft.fluid.density * case.gravity, getattr(part, "to" if self.end == "to" else "from_")
         best, source = max(head_of(case, weight, other) for other in case.nodes)
         least = float(np.min(part.set_pressure.value))
         head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
         if head > best:
             what = f"{least:.6g} Pa at {place} is a head of {head:.4g} m, above every source: {source} has {best:.4g} m"
-            scene.fault(f"links.{name}.set_pressure", f"{what}; it would never {self.verb}, set it lower")
+            draft.fault(f"links.{name}.set_pressure", f"{what}; it would never {self.verb}, set it lower")
 
-    def scales(self, scene, name, part) -> list[float]:
+    def scales(self, draft, name, part) -> list[float]:
         return [0.1]
 
     def given(self, start, k: int) -> float:
         """What is set at the start: a pressure [Pa], or a mass flow [kg/s]."""
-        row = start.scene.device_table[start.valves[k]["device"]]
-        return schedule_value(start.scene.tables, int(row["schedule"]), start.t)
+        row = start.draft.device_table[start.valves[k]["device"]]
+        return schedule_value(start.draft.tables, int(row["schedule"]), start.t)
 
     def target(self, start, k: int) -> float:
         """The same, of a pressure as a potential [Pa]."""
@@ -122,7 +122,7 @@ class Regulator(Device, kind=""):
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
-        valve, floats, at = start.valves[k], start.scene.tables.floats, int(row["data"])
+        valve, floats, at = start.valves[k], start.draft.tables.floats, int(row["data"])
         shut, active = k in start.shut, self.mode(start, k) == ACTIVE
         error = self.error(start, k)
         if active and not shut:
@@ -146,8 +146,8 @@ class Regulator(Device, kind=""):
 
     def refuse(self, start, k: int) -> None:
         """A fault: nothing that it could do keeps what it senses as set."""
-        name = start.scene.valve_names[k]
-        start.scene.fault(f"links.{name}.{self.key}", "no steady state: what is drawn beyond it hangs on it alone, "
+        name = start.draft.valve_names[k]
+        start.draft.fault(f"links.{name}.{self.key}", "no steady state: what is drawn beyond it hangs on it alone, "
                           'and leaves it nothing to set; change the demand, or use initial = "rest"')  # fmt: skip
 
 

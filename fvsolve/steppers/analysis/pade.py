@@ -6,7 +6,7 @@ from fractions import Fraction
 from math import factorial
 
 from fvsolve.doors import AMOUNT, door
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.polynomial import Polynomial
 
 
 @door(k=AMOUNT, m=AMOUNT)

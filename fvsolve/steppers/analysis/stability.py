@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.steppers.analysis.stability_function import StabilityFunction, chopped
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
-from fvsolve.steppers.exact.sturm import first_sign_change, nowhere_negative, roots_right
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import first_sign_change, nowhere_negative, roots_right
 
 ANGLE_BITS = 36  # of the cosine of the angle of A(alpha)
 

@@ -12,7 +12,7 @@ import numpy as np
 from fvsolve.doors import Kind, door, is_array
 from fvsolve.steppers.analysis.pade import pade
 from fvsolve.steppers.analysis.trees import short
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.steppers.tableau import Method, method_named
 
 NOTHING = Polynomial([])

@@ -22,7 +22,7 @@ from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, 
 from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
-from fvsolve.studies.outcome import Told, names, prepared, refusal
+from fvsolve.studies.outcome import Progress, names, prepared, refusal
 from fvsolve.studies.points import Points
 
 WRONG = 1.0  # an error as great as all that the component does
@@ -117,7 +117,7 @@ def chart(
     step: Sequence[float] | None = None,
     target: float | None = None,
     out: str | Path | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> Chart:
     """Run a case over schemes x methods x cells (or tolerances) and lay error against cost.
 
@@ -137,7 +137,7 @@ def toml(value) -> str:
 class _Study:
     """One chart while it is made."""
 
-    def __init__(self, case, set: Mapping | None, points: Points, progress: Told) -> None:
+    def __init__(self, case, set: Mapping | None, points: Points, progress: Progress) -> None:
         from fvsolve.case import load
 
         self.case: Case = load(case, set)

@@ -18,7 +18,7 @@ from fvsolve.studies.accuracy.plane import unit_of
 from fvsolve.studies.accuracy.reference import ROUNDING, WORTH, Reference, of_run, reference
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.accuracy.timing import lasting
-from fvsolve.studies.outcome import Outcome, Told, outcome, prepared
+from fvsolve.studies.outcome import Outcome, Progress, outcome, prepared
 from fvsolve.studies.points import Points
 
 BEST_OF, BRIEF = 2, 1.0  # timings of a row; [s] that the first may take for there to be a second
@@ -50,7 +50,7 @@ class Judge:
             found.append((self.case.numerics.start, True))
         return found
 
-    def study(self, points: Points | None, progress: Told) -> Order:
+    def study(self, points: Points | None, progress: Progress) -> Order:
         """Run all rows, coarsest first, and fit; those that `points` has are reused.
 
         Under "auto", where a finer run fails or is no better than what it would judge, each row judges the one before.
@@ -65,7 +65,7 @@ class Judge:
             found = self.richardson(progress)
             return replace(found, notes=(f"no other reference would do: {error}", *found.notes))
 
-    def judged(self, points: Points | None, progress: Told) -> Order:
+    def judged(self, points: Points | None, progress: Progress) -> Order:
         """The study against an exact solution or a finer run."""
         rows, total = [], len(self.plan.levels) + 1
 
@@ -85,7 +85,7 @@ class Judge:
         return {"study": "order", "against": self.against, "way": self.plan.way, "what": what,
                 "levels": [level.set for level in self.plan.levels]}  # fmt: skip
 
-    def about(self, progress: Told, total: int) -> dict:
+    def about(self, progress: Progress, total: int) -> dict:
         """The reference in words and numbers."""
         progress(0, total, "reference")
         truth = self.reference()
@@ -207,7 +207,7 @@ class Judge:
 
     # Richardson ------------------------------------------------------------------------------------------------
 
-    def richardson(self, progress: Told) -> Order:
+    def richardson(self, progress: Progress) -> Order:
         """Errors of each row but the last: the sum of the differences to the next from there on, and what is left."""
         runs = []
         for k, level in enumerate(self.plan.levels):

@@ -161,12 +161,12 @@ def ladder(
     """
     from fvsolve.case import load
 
-    case, told = load(case, dict(set or {})), progress or (lambda *_: None)
+    case, tell = load(case, dict(set or {})), progress or (lambda *_: None)
     without_basins(case, "chart --models")
     asked = [(rung, law) for rung in structures(case) for law in laws(case)]
     runs, dear = [], {}  # dear: law -> the rung with cells that was given up under it
     for at, (rung, law) in enumerate(asked):
-        told(at, len(asked), f"{rung}, {law}")
+        tell(at, len(asked), f"{rung}, {law}")
         late = f"not tried: already {dear[law]} was given up" if law in dear else ""
         runs.append(Outcome(late, refused=True) if late else _run(case, rung, law))
         if runs[-1].reason.startswith(GIVEN_UP) and rung.endswith(("cell", "cells")):
@@ -175,7 +175,7 @@ def ladder(
     if at is None:
         raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
     whole, law = runs[at], asked[at][1]
-    more, own = refined(case, law, whole, target, lambda rung: told(len(asked), len(asked) + 1, f"{rung}, {law}"))
+    more, own = refined(case, law, whole, target, lambda rung: tell(len(asked), len(asked) + 1, f"{rung}, {law}"))
     richest = more[-1][1] if more else whole
     asked, runs = [*asked, *((rung, law) for rung, _ in more)], [*runs, *(one for _, one in more)]
     rungs = [_rung(*names, one, richest) for names, one in zip(asked, runs, strict=True)]
@@ -189,7 +189,7 @@ def ladder(
     return Ladder(rungs, top, target, cheapest, travel, change, strain(richest), apart(plain, whole), own)
 
 
-def refined(case, law: str, whole: Outcome, target: float, told: Callable[[str], None]) -> tuple[list, float | None]:
+def refined(case, law: str, whole: Outcome, target: float, tell: Callable[[str], None]) -> tuple[list, float | None]:
     """(rungs with 2, 4, ... times the cells as (name, run), own error of the last of them, or of `whole` without any).
 
     The error of a rung is its difference d to the next over 1 - r, where differences fall by r each time, 1/2 until
@@ -198,7 +198,7 @@ def refined(case, law: str, whole: Outcome, target: float, told: Callable[[str],
     """
     runs, gaps, ratio = [("full line", whole)], [], 0.5
     for name in finer(case, DOUBLINGS):
-        told(name)
+        tell(name)
         if DEARER * runs[-1][1].processor > PATIENCE:
             break
         one = _run(case, name, law)

@@ -13,7 +13,7 @@ from fvsolve.shown import Shown
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan
-from fvsolve.studies.outcome import Told, names, without_basins
+from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
@@ -109,7 +109,7 @@ def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
     cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
     against: str = "auto", initial: Callable | None = None, source: Callable | None = None,
-    exact: Callable | None = None, out: str | Path | Points | None = None, progress: Told | None = None,
+    exact: Callable | None = None, out: str | Path | Points | None = None, progress: Progress | None = None,
 ) -> Order | list[Order]:  # fmt: skip
     """Errors of a case over a refinement and the order at which they fall; a list where several are asked for.
 
@@ -127,14 +127,14 @@ def order(
         raise FvsolveError(
             f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}; wanted {", ".join(REFERENCES)}'
         )
-    told, found = progress or (lambda *_: None), []
+    tell, found = progress or (lambda *_: None), []
     pairs = [(scheme, method) for scheme in names(schemes) or [None] for method in names(methods) or [None]]
     with kept_in(out) as points:
         for scheme, method in pairs:
             given = {"numerics.scheme": scheme, "numerics.method": method}
             settings = {**(set or {}), **{name: value for name, value in given.items() if value is not None}}
             found.append(
-                _order(case, settings, refine, key, levels, cells, against, (initial, source, exact), points, told)
+                _order(case, settings, refine, key, levels, cells, against, (initial, source, exact), points, tell)
             )
     return found[0] if len(found) == 1 else found
 

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from fvsolve.solve.solve import Run
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.studies.outcome import Outcome, outcome
 
 MOST = 5  # runs of which the quickest counts
@@ -30,7 +30,7 @@ class Capped(Run):
 
     def check(self) -> None:
         """Give up where it has cost too much."""
-        if self.processor > self.most_seconds or self.loop.memory[told.STEPS] > self.most_steps:
+        if self.processor > self.most_seconds or self.loop.memory[slots.STEPS] > self.most_steps:
             raise GivenUp
 
     def segments(self) -> str:

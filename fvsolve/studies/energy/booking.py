@@ -8,16 +8,15 @@ from fvsolve.kernels.mechanics import motion
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.solve.loop import Loop
 from fvsolve.solve.solve import Run
-from fvsolve.steppers import automatic
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import automatic, slots
 
 ROWS = 1000  # of the table, about
 SOUND = (
-    told.CHUNK,
-    told.DONE,
-    told.ROWS_FULL,
-    told.FIELD,
-    told.STOPPED,
+    slots.CHUNK,
+    slots.DONE,
+    slots.ROWS_FULL,
+    slots.FIELD,
+    slots.STOPPED,
 )  # answers of the loop after a step that counts
 
 
@@ -30,17 +29,17 @@ class Booked(Loop):
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # the lines, then what Newton leaves
         self.supplied, self.rates = accounts.of("supplied"), accounts.of("rate")
         self.dydt, self.beside = np.zeros(self.model.y_size), self.model.new_out()
-        self.orders[told.LEAPS] = 0.0  # a leap leaves no stages behind
+        self.orders[slots.LEAPS] = 0.0  # a leap leaves no stages behind
 
     def run(self, budget: float) -> int:
         """`Loop.run`, one step at a time."""
         code, left, armed = super().run(0.0), budget, self.model.tables.armed
-        while code == told.CHUNK and left > 0.0 and not automatic.wants_change(self.stepper):
+        while code == slots.CHUNK and left > 0.0 and not automatic.wants_change(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
             first = self.stepper.k[0].copy(), self.stepper.supply[0].copy()
-            steps = self.memory[told.STEPS]
+            steps = self.memory[slots.STEPS]
             code, left = super().run(1.0), left - 1.0
-            if self.memory[told.STEPS] > steps and code in SOUND:
+            if self.memory[slots.STEPS] > steps and code in SOUND:
                 after = armed.copy()
                 armed[:] = rules  # those that the step was taken under
                 self.add(self.released(y, self.booked(t, y, *first)))
@@ -54,7 +53,7 @@ class Booked(Loop):
 
     def booked(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """What the step from (t, y), with slope and supplies there, adds to every line and leaves to Newton [J]."""
-        stepper, h = self.stepper, float(self.memory[told.LAST])
+        stepper, h = self.stepper, float(self.memory[slots.LAST])
         s, total = stepper.k.shape[0], np.zeros_like(self.total)
         a, (b, c) = (part.reshape(-1, s) for part in np.split(stepper.coefficients[: s * s + 2 * s], [s * s]))
         k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.supply[1:]])

@@ -16,7 +16,7 @@ from fvsolve.studies.failure.converged import Converged, converged
 from fvsolve.studies.failure.eigen_limit import LINEAR_TWIN, greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.outcome import Told, names, without_basins
+from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
@@ -91,7 +91,7 @@ def failures(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
     key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | Points | None = None,
-    progress: Told | None = None, set: Mapping | None = None,
+    progress: Progress | None = None, set: Mapping | None = None,
 ) -> FailureMap:  # fmt: skip
     """Run every method, under every scheme, at every step (or value of a key), and say what became of each run.
 

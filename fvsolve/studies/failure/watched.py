@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.studies.accuracy.timing import Capped
 from fvsolve.studies.outcome import Outcome, outcome
 
@@ -34,7 +34,7 @@ class Watched(Capped):
         values = np.zeros(len(model.probes))
         self.loop.observe(self.loop.t, self.loop.now, stepper.out, model.handle, values)
         self.bursts[-1].append(values)
-        apart = int(self.loop.memory[told.STEPS]) // SPARSE
+        apart = int(self.loop.memory[slots.STEPS]) // SPARSE
         self.budget = 1.0
         if apart > WINDOW and len(self.bursts[-1]) >= WINDOW:
             self.bursts.append([])

@@ -8,8 +8,8 @@ from fractions import Fraction
 
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary import plain
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
-from fvsolve.steppers.exact.sturm import odd_part
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import odd_part
 from fvsolve.studies.ports.rational import (
     Places,
     Root,

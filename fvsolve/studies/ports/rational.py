@@ -12,8 +12,8 @@ from numbers import Integral, Rational, Real
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
-from fvsolve.steppers.exact.sturm import chain
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import chain
 
 BITS = 200  # to which a root is bracketed, relative to itself, before anything is computed from it
 

@@ -22,7 +22,7 @@ from fvsolve.limits.symbol import WEIGHTS, Weights
 from fvsolve.model.schemes import LIMITERS
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.tableau import method_named
-from fvsolve.studies.outcome import Told, names
+from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
@@ -103,14 +103,14 @@ class LimitedLimit:
 @door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
 def limited_limits(
     schemes: Sequence[str] = LIMITED, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> list[LimitedLimit]:  # fmt: skip
     """Limited schemes, muscl with each limiter, and explicit methods; runs of `steps`, 10 and 100 times as many.
 
     Raises FvsolveError for names that are none, implicit methods, and a circle or a run that is too short.
     """
     check_size(cells, steps)
-    told = progress or (lambda *_: None)
+    tell = progress or (lambda *_: None)
     schemes, named = names(schemes) or LIMITED, [method_named(name) for name in names(methods) or METHODS]
     implicit = [one.name for one in named if not one.explicit]
     if implicit:
@@ -123,7 +123,7 @@ def limited_limits(
     pairs = [(*kind, one.name) for one in dict.fromkeys(named) for kind in kinds]
     found = []
     for scheme, limiter, method in pairs:
-        told(len(found), len(pairs), f"{scheme} {limiter or ''} with {method}")
+        tell(len(found), len(pairs), f"{scheme} {limiter or ''} with {method}")
         found.append(limited_limit(scheme, limiter, method, cells, steps))
     return found
 

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.kernels.records import Tables
 from fvsolve.model.energy import EnergyForm
 from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.studies.linear.frozen import Frozen
 from fvsolve.studies.stability.bracket import RISE, Limit, halved
 from fvsolve.studies.stability.growth import STEPS, THRESHOLD, looked_at
@@ -74,7 +74,7 @@ class Runs:
         own = Tables(*map(np.copy, model.tables))  # what has opened or shut in one run has not in another
         made = Loop(replace(model, case=replace(model.case, numerics=numerics), tables=own), lambda: self.structure)
         made.now[:] = y
-        made.memory[told.T] = self.at.t
+        made.memory[slots.T] = self.at.t
         made.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return made
 
@@ -87,7 +87,7 @@ class Runs:
             for n, more in zip(self.looks, self.strides, strict=True):
                 if time.monotonic() > self.latest:
                     raise TimeoutError
-                if any(run.run(more) != told.CHUNK for run in runs):
+                if any(run.run(more) != slots.CHUNK for run in runs):
                     return np.inf, n
                 apart = runs[0].now - (self.at.y if self.still else runs[1].now)
                 here = float(np.linalg.norm(self.form.forth @ apart)) / first

@@ -19,13 +19,13 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
 from fvsolve.limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.model.schemes import scheme_settings
-from fvsolve.steppers import orders as told
+from fvsolve.steppers import slots
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.ode import watchers
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
-from fvsolve.studies.outcome import Told, names
+from fvsolve.studies.outcome import Progress, names
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
@@ -66,28 +66,28 @@ class Circle:
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
         """The cells after so many steps at a Courant number; None where they do not stay finite."""
         stepper = self.stepper
-        stepper.memory[:], stepper.orders[told.CONTROL] = 0.0, told.FIXED_STEP
-        stepper.orders[[told.SIZE, told.STEP_MAX, told.STOP_AT]] = courant, NO_END, NO_END
-        stepper.orders[[told.END, told.BUDGET]] = 2.0 * courant * (steps + 1), steps
-        stepper.flags[[told.PHASE, told.BEHIND]] = told.FRESH, 0
-        stepper.y[stepper.flags[told.NOW]] = start
-        code = stepper.call(*self.functions, self.handle, told.WHERE + 1, stepper.none)
-        if code != told.CHUNK:
+        stepper.memory[:], stepper.orders[slots.CONTROL] = 0.0, slots.FIXED_STEP
+        stepper.orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = courant, NO_END, NO_END
+        stepper.orders[[slots.END, slots.BUDGET]] = 2.0 * courant * (steps + 1), steps
+        stepper.flags[[slots.PHASE, slots.BEHIND]] = slots.FRESH, 0
+        stepper.y[stepper.flags[slots.NOW]] = start
+        code = stepper.call(*self.functions, self.handle, slots.WHERE + 1, stepper.none)
+        if code != slots.CHUNK:
             return None
-        return stepper.y[stepper.flags[told.NOW]].copy()
+        return stepper.y[stepper.flags[slots.NOW]].copy()
 
 
 @door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
 def measured_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> list[Measured]:  # fmt: skip
     """Predicted and measured limits of linear schemes and explicit methods, all of them by default.
 
     Raises FvsolveError for names that are none, and for a circle or a run that is too short.
     """
     check_size(cells, steps)
-    told = progress or (lambda *_: None)
+    slots = progress or (lambda *_: None)
     schemes = names(schemes) or list(WEIGHTS)
     named = [method_named(name) for name in names(methods) or ()] or list(METHODS.values())
     pairs = [(scheme, one.name) for one in dict.fromkeys(named) if one.explicit for scheme in schemes]
@@ -95,7 +95,7 @@ def measured_limits(
         weights_of(scheme)
     found = []
     for scheme, method in pairs:
-        told(len(found), len(pairs), f"{scheme} with {method}")
+        slots(len(found), len(pairs), f"{scheme} with {method}")
         found.append(measured_limit(scheme, method, cells, steps))
     return found
 

@@ -22,7 +22,7 @@ from fvsolve.steppers.methods import AUTO
 from fvsolve.studies.linear.frozen import FROZEN_AS, Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
-from fvsolve.studies.outcome import Told, names
+from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.points import Points
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
 from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
@@ -104,7 +104,7 @@ class Side:
 def stability(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, at: float | None = None,
     before: bool = False, steps: int = STEPS, threshold: float = THRESHOLD, set=None, out: str | Path | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
 ) -> Stability:  # fmt: skip
     """One row for each scheme and method, those of the case if None, about its start or the state at `at` [s].
 
@@ -121,10 +121,10 @@ def stability(
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
     said = (AUTOMATIC,) if AUTO in asked else ()
     found, makers = [], {scheme: Maker(case, scheme, at, before, steps, threshold) for scheme in schemes}
-    told = progress or (lambda *_: None)
+    tell = progress or (lambda *_: None)
     with Points(out) as points:
         for (scheme, make), method in itertools.product(makers.items(), methods):
-            told(len(found), len(schemes) * len(methods), f"{scheme} with {method}")
+            tell(len(found), len(schemes) * len(methods), f"{scheme} with {method}")
             extra = {"study": "stability", "scheme": scheme, "method": method, "at": at,
                      "before": before, "steps": steps, "threshold": threshold}  # fmt: skip
             found.append(read(points.get(case, extra, lambda make=make, method=method: make.row(method).plain())))

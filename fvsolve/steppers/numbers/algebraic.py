@@ -6,8 +6,8 @@ import functools
 from fractions import Fraction
 from math import isqrt
 
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
-from fvsolve.steppers.exact.sturm import count_roots
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import count_roots
 
 MIXED = "{} in one tableau; wanted one root alone, or decimals of 20 digits and more in place of all"
 BITS = 160  # of the first bracket of a root: enough for most signs and every float

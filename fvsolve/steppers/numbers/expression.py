@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
-from fvsolve.steppers.exact.algebraic import Field, square_root
-from fvsolve.steppers.exact.polynomial import Polynomial
+from fvsolve.steppers.numbers.algebraic import Field, square_root
+from fvsolve.steppers.numbers.polynomial import Polynomial
 
 TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}(?!\d))?|[A-Za-z_]\w*|[-+*/^()]")
 POWER_MOST, ROOT_MOST = 64, 10**9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from fvsolve.steppers.exact.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 
 DIGITS = Fraction(1, 1 << 64)  # a root is bracketed this closely, relative to itself
 
