@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 import fvsolve
 from fvsolve.case import load
 from fvsolve.model import build
-from fvsolve.model.sparsity import sparsity
+from fvsolve.model.dependence import sparsity
 from fvsolve.steppers.differences import differences
 from fvsolve.steppers.structure import Structure
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from truth.scenes import AMBIENT, RHO, WATER, area, lake, reservoir, scene
 
 import fvsolve
-from fvsolve.model.sparsity import sparsity
+from fvsolve.model.dependence import sparsity
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve.solve import Run
 from fvsolve.studies.energy.energy import energy

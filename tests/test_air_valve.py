@@ -11,7 +11,7 @@ from truth.bores import HEAT, SMALL, bores
 from truth.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.model.sparsity import sparsity
+from fvsolve.model.dependence import sparsity
 from fvsolve.studies.energy.energy import energy
 
 LENGTH, DIAMETER = 200.0, 0.3

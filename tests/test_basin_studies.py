@@ -15,8 +15,8 @@ import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
 from fvsolve.model.basins.free_surface import FreeSurface
+from fvsolve.model.dependence import sparsity
 from fvsolve.model.energy_ledger import Accounts
-from fvsolve.model.sparsity import sparsity
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order

@@ -15,7 +15,7 @@ from truth.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
 import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
-from fvsolve.model.sparsity import sparsity
+from fvsolve.model.dependence import sparsity
 from fvsolve.studies.energy.energy import energy
 
 CASE = Path(__file__).parent.parent / "cases" / "adelaide.toml"

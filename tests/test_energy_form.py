@@ -13,8 +13,9 @@ from fvsolve.steppers import method_named, stability_function
 from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.linear.linearise import linearised
 from fvsolve.studies.stability.bounds import numerical_abscissa
-from fvsolve.studies.stability.growth import Dense, predicted
+from fvsolve.studies.stability.growth import Dense
 from fvsolve.studies.stability.stability import stability
+from fvsolve.studies.stability.system import predicted
 
 MASS, DAMPING = 10.0, 1000.0
 

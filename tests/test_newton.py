@@ -13,7 +13,7 @@ from truth.scenes import WATER, chamber, scene, valve
 import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.solve.loop import Loop
-from fvsolve.steppers import METHODS, integrate, orders
+from fvsolve.steppers import METHODS, integrate, slots
 
 CASES = Path(__file__).parent.parent / "cases"
 NAMES = [name for name, method in METHODS.items() if name == method.name]
@@ -191,13 +191,13 @@ def test_what_is_remembered_twice_has_no_factors_either(name):
     model = fvsolve.build(fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name}))
     loop = Loop(model)
     loop.begin(0.01, 1e308)
-    assert loop.run(30) == orders.CHUNK
+    assert loop.run(30) == slots.CHUNK
     memory, states = flat(loop), []
     for _ in range(2):  # stored and taken back
         again = Loop(model)
         again.stepper.remember(memory)
         memory = flat(again)
-    assert again.stepper.work[orders.SHIFT] == -loop.stepper.work[orders.SHIFT] < 0.0  # the sign of factors to be made
+    assert again.stepper.work[slots.SHIFT] == -loop.stepper.work[slots.SHIFT] < 0.0  # the sign of factors to be made
     again.now[:] = loop.now
     for one in (loop, again):
         one.resume(0.01, 1e308)

@@ -236,7 +236,7 @@ def test_torque_is_an_input():
 
 def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
     """Differences of the right-hand side about a state after the trip, column by column."""
-    from fvsolve.model.sparsity import sparsity
+    from fvsolve.model.dependence import sparsity
 
     model = fvsolve.build(fvsolve.load(line(40.0, 3.0, {}, ["pump.flow"], 6, **SHAFT, trip=0.0)))
     rng = np.random.default_rng(1)

@@ -13,7 +13,7 @@ from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
 from fvsolve.jit import njit
-from fvsolve.model.sparsity import sparsity
+from fvsolve.model.dependence import sparsity
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.signatures import function_types
 from fvsolve.steppers.structure import KINDS, Structure

@@ -20,9 +20,10 @@ from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.linear.linearise import linearise, linearised
 from fvsolve.studies.stability.bounds import field_of_values, region_limit
 from fvsolve.studies.stability.carried import Sparse, stepping
-from fvsolve.studies.stability.growth import Dense, growth, powers, predicted, step_matrix
+from fvsolve.studies.stability.growth import Dense, growth, powers, step_matrix
 from fvsolve.studies.stability.measured import Runs
 from fvsolve.studies.stability.stability import stability
+from fvsolve.studies.stability.system import predicted
 
 NUMERICS = {"method": "rk4", "step": 1e-3}
 IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-5", "lobatto-iiic-4", "tr-bdf2", "rodas-5p"]

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from truth.scenes import GRAVITY, WATER, area, lake, pipe, scene, valve
 
 import fvsolve
-from fvsolve.model.sparsity import sparsity
+from fvsolve.model.dependence import sparsity
 from fvsolve.studies.energy.energy import energy
 
 LENGTH, DIAMETER, FACTOR, SHAFT, THROAT = 2000.0, 3.0, 0.015, 80.0, 2.0

@@ -91,7 +91,7 @@ def new(
     wave_speed: Annotated[str | None, typer.Option(metavar="A", help='of all pipes (default "1200 m/s")')] = None,
 ) -> None:
     """Copy a shipped case and the files it uses; or with --from write the case NAME of an EPANET network."""
-    from fvsolve.case import shipped
+    from fvsolve.case import copying
     from fvsolve.cli import imported
 
     if source is not None:
@@ -99,7 +99,7 @@ def new(
         return
     if name is None or hour is not None or wave_speed is not None:
         raise FvsolveError("fvsolve new NAME copies a shipped case, fvsolve new --from NET.inp [--hour H] imports one")
-    for path in shipped.copy(name, file or Path(f"{name}.toml")):
+    for path in copying.copy(name, file or Path(f"{name}.toml")):
         print(path)
 
 

@@ -18,11 +18,11 @@ from fvsolve.model.devices import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
+from fvsolve.model.profile import start_profile
 from fvsolve.model.ranges import flow_notices
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import quicker, scheme_settings
-from fvsolve.model.start import start_profile
 from fvsolve.model.unsteady import reserve
 from fvsolve.parts import EDGES
 from fvsolve.parts.schedule import constant

@@ -10,8 +10,8 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import FIFTH
 from fvsolve.model.scalars import node_values, pipe_values
+from fvsolve.model.schemes import FIFTH
 from fvsolve.shown import Shown
 from fvsolve.units import show
 
@@ -196,7 +196,7 @@ class Model(Shown):
     @cached_property
     def structure(self):
         """Pattern of the Jacobian and the linear algebra that fits it, or that `numerics.linear_algebra` names."""
-        from fvsolve.model.sparsity import sparsity
+        from fvsolve.model.dependence import sparsity
         from fvsolve.steppers.structure import Structure
 
         return Structure(sparsity(self), self.case.numerics.linear_algebra)

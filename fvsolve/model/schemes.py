@@ -33,6 +33,7 @@ LIMITERS = {
     "monotonized-central": Limiter(rec.MONOTONIZED_CENTRAL, 2.0),
 }
 FROZEN_AS = {"muscl": "fromm", "weno5": "upwind5"}  # what limited schemes are where all is smooth
+FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
 ORDER = {name: degree + 1 for name, (_, degree) in (LINEAR | FAMILIES).items()}
 
 

@@ -13,25 +13,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import pattern
 from fvsolve.steady import union
 
 Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depend on
-
-
-def sparsity(model) -> csc_array:
-    """bool[n + ledger, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
-    from fvsolve.model.sparsity_scalars import scalar_pairs
-
-    n, couplings = model.y_size, Couplings(model)
-    pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
-    rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    return csc_array(
-        coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + model.ledgers, n)), dtype=bool
-    )
 
 
 class Reach(NamedTuple):

@@ -16,8 +16,6 @@ from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, flow_slope, transition_of, valve_conductance
 from fvsolve.model.bodies import start_bodies
-from fvsolve.model.probes import probe_offsets
-from fvsolve.model.unsteady import add_terms
 from fvsolve.steady import Edge, solve_steady
 
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
@@ -25,26 +23,6 @@ REVISIONS = 200  # of what devices do, at most
 AT_ONCE, ROUND = 10, 20  # of these, all of them together; after which those that regulate begin elsewhere
 PRESSURE_SCALE = 1e5
 SNAP = 1e-12  # flows below this share of the scene's are zero
-
-
-def start_profile(draft) -> dict[str, Any]:
-    """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
-    if draft.case.fluid.law == "linear":
-        start = Start(draft)
-    else:
-        from fvsolve.model.barotropic import BarotropicStart
-
-        start = BarotropicStart(draft)
-    start.solve()
-    start.report_split()
-    start.freeze_factors()
-    start.fill_nodes()
-    start.fill_pipes()
-    start.fill_columns()
-    start.fill_valves()
-    start.begin_devices()
-    probe_offsets(draft, start)
-    return {**start.report(), "unsteady": add_terms(draft)}
 
 
 class Start:

@@ -13,6 +13,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
 from fvsolve.steppers.tableau import Method
+from fvsolve.steppers.transform import transformed
 
 
 @functools.cache
@@ -28,8 +29,6 @@ def coefficients(method: Method) -> tuple[np.ndarray, np.ndarray, int]:
         dense = np.vstack([np.zeros((1, dense.shape[1])), dense]) if dense.size else dense
     flat = [a.ravel(), b, c, error]
     if method.kind == "full":
-        from fvsolve.steppers.irk import transformed
-
         try:
             flat.append(transformed(a[1:, 1:], c[1:], a[1:, 0]))
         except (np.linalg.LinAlgError, ValueError):

@@ -55,7 +55,7 @@ from fvsolve.steppers.slots import (
 from fvsolve.steppers.step import combine, copy, error_norm, small
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
-from fvsolve.steppers.sweeps import lower, sweep
+from fvsolve.steppers.sweeps import sweep
 from fvsolve.steppers.tableau import Method
 
 # Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
@@ -64,37 +64,6 @@ T, BACK, BLOCKS, SLOPES, AHEAD, LOWER, START = range(7)
 W, F, R = range(3)
 NEAR = (-0.1, -1e-2, -1e-3, -1e-4)  # where before a kink, in shares of the step to it, a step is looked at once more
 PLAIN = 1e-2  # of a defect there counts: what Newton leaves and the method errs is below a hundred tolerances
-
-
-def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
-    """[T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
-
-    Pairs in L stand as [[a, -b], [b, a]], b > 0. P, ahead : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of
-    the j-th Lagrange polynomial on c: what the last step's slopes say of this one; zero where c repeats.
-    Raises LinAlgError for a singular A, ValueError for one without a basis of eigenvectors.
-    """
-    q = len(c)
-    inverse = np.linalg.inv(a)
-    values, vectors = np.linalg.eig(inverse)
-    t, blocks = np.zeros((q, q)), np.zeros((q, q))
-    real = np.abs(values.imag) <= 1e-12 * np.abs(values)
-    at = 0
-    for i in [*np.flatnonzero(real), *np.flatnonzero(~real & (values.imag > 0))]:
-        v = vectors[:, i] / np.abs(vectors[:, i]).max()
-        if real[i]:
-            t[:, at], blocks[at, at], at = v.real, values[i].real, at + 1
-        else:  # A^-1 (u - i w) = (a + i b) (u - i w): on the basis u, w it is [[a, -b], [b, a]]
-            t[:, at], t[:, at + 1] = v.real, -v.imag
-            blocks[at : at + 2, at : at + 2] = [[values[i].real, -values[i].imag], [values[i].imag, values[i].real]]
-            at += 2
-    if at < q or np.linalg.cond(t) > 1e8:
-        raise ValueError("no basis of eigenvectors")
-    back, ahead = np.linalg.inv(t), np.zeros((q, q))
-    if len(np.unique(c)) == q:
-        lagrange = np.linalg.inv(np.vander(c - 1.0, increasing=True))  # in x, by columns
-        ahead = (lagrange / (1.0 + np.arange(q))[:, None]).T
-    parts = (t, back, blocks, t @ blocks, ahead, lower(a), back @ inverse @ a0, inverse @ a0)
-    return np.concatenate([part.ravel() for part in parts])
 
 
 @functools.cache

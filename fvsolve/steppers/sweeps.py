@@ -23,16 +23,6 @@ MOST = 40
 SLOW, FARTHEST = 0.4, 10.0  # what a sweep may leave of the change of the one before; how many changes K is led on
 
 
-def lower(a: np.ndarray) -> np.ndarray:
-    """C of A = C U (Crout): float64[q, q]; no zero may stand on its diagonal."""
-    rest, c = a.copy(), np.zeros_like(a)
-    for j in range(len(a)):
-        c[j:, j] = rest[j:, j]
-        if rest[j, j] != 0.0:
-            rest -= np.outer(rest[:, j], rest[j]) / rest[j, j]
-    return c
-
-
 @inner
 def sweep(
     rhs, factor, solve, handle, coefficients, low, shape, t, h, y, y_stage, k, supply, where, out, scale, orders,

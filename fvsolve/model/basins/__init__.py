@@ -6,8 +6,6 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 
-FIFTH = {"upwind5": rec.LINEAR, "weno5": rec.WENO5}  # on grids; other schemes of pipes are `muscl` in the plane
-
 
 def lower_basins(draft) -> None:
     """Fill the tables of basins and their patches, and states for their cells."""

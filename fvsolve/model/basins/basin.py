@@ -14,9 +14,8 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
-from fvsolve.model.basins import FIFTH
 from fvsolve.model.face_mesh import lower_mesh
-from fvsolve.model.schemes import LIMITERS
+from fvsolve.model.schemes import FIFTH, LIMITERS
 from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
 

@@ -8,8 +8,8 @@ from fvsolve.case.basins import bed_of, means, samples
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
-from fvsolve.model.basins import FIFTH
 from fvsolve.model.basins.basin import Basin
+from fvsolve.model.schemes import FIFTH
 
 SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # of levels and beds, less than which is no water

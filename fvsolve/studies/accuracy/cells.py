@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.basins import FIFTH
-from fvsolve.model.schemes import ORDER
+from fvsolve.model.schemes import FIFTH, ORDER
 from fvsolve.parts import Basin, Pipe
 from fvsolve.studies.accuracy.plane import contents
 from fvsolve.studies.outcome import prepared

@@ -13,10 +13,10 @@ from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.apart import NORMS, differences, recorded, size_of
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, order_varies, space_order, starts_with_jump
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
-from fvsolve.studies.accuracy.order import Order, Row
 from fvsolve.studies.accuracy.plane import unit_of
 from fvsolve.studies.accuracy.reference import ROUNDING, WORTH, Reference, of_run, reference
 from fvsolve.studies.accuracy.refine import Level, Plan
+from fvsolve.studies.accuracy.rows import Order, Row
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.outcome import Outcome, Progress, outcome, prepared
 from fvsolve.studies.points import Points

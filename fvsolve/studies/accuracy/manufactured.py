@@ -12,8 +12,8 @@ from fvsolve.exact.solution import Solution, averages
 from fvsolve.studies.accuracy.apart import recorded
 from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
-from fvsolve.studies.accuracy.order import Order
 from fvsolve.studies.accuracy.reference import ExactFields, ExactRows, Reference, finer_reference
+from fvsolve.studies.accuracy.rows import Order
 from fvsolve.studies.outcome import Outcome, outcome, prepared
 
 

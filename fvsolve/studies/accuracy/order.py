@@ -2,92 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from fvsolve.doors import CALL, COUNT, NAMES, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.shown import Shown
 from fvsolve.studies.accuracy.afford import affordable
-from fvsolve.studies.accuracy.fit import Fit
-from fvsolve.studies.accuracy.refine import Level, Plan
+from fvsolve.studies.accuracy.rows import Order
 from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row: its level, its errors by variable and norm, and what it cost; a failed run has its reason."""
-
-    level: Level
-    errors: dict[str, dict[str, float]]
-    seconds: float
-    rhs: int
-    cell_updates: int
-    steps: int
-    reason: str = ""
-
-    def plain(self) -> dict:
-        """As plain data."""
-        said = {"cells": self.level.cells, "size": self.level.size, "step": self.level.step, "set": self.level.set}
-        cost = {"seconds": self.seconds, "rhs": self.rhs, "cell_updates": self.cell_updates, "steps": self.steps}
-        return {**said, **cost, "reason": self.reason, "errors": self.errors}
-
-
-@dataclass(frozen=True, repr=False)
-class Order(Shown):
-    """An order study of one scheme and method.
-
-    fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> the reference's own error
-    units : of variables that are no probe's
-    kind : of the reference, "exact" | "finer" | "richardson" | "function"; notes : what must be said of the numbers
-    """
-
-    case: str
-    scheme: str
-    method: str
-    plan: Plan
-    kind: str
-    words: str
-    rows: tuple[Row, ...]
-    fits: dict[str, dict[str, Fit]]
-    own: dict[str, dict[str, float]]
-    notes: tuple[str, ...] = ()
-    units: dict[str, str] = field(default_factory=dict)
-
-    picture = "fvsolve.studies.accuracy.picture:order_picture"
-
-    def said(self) -> str:
-        return f"of {self.case!r}: {self.scheme}, {self.method}, {len(self.rows)} rows against {self.kind}"
-
-    def listed(self) -> dict[str, list]:
-        """Of every row: cells, step [s], cost, and errors by variable and norm, SI."""
-        found: dict[str, list] = {"cells": [row.level.cells for row in self.rows]}
-        found |= {"size": [row.level.size for row in self.rows], "step": [row.level.step for row in self.rows]}
-        for name, norms in self.fits.items():
-            for norm in norms:
-                key = f"{name} {norm}"
-                found[key] = [row.errors.get(name, {}).get(norm, math.nan) for row in self.rows]
-        return found | {"rhs": [row.rhs for row in self.rows], "seconds": [row.seconds for row in self.rows]}
-
-    @property
-    def variables(self) -> tuple[str, ...]:
-        """What was compared."""
-        return tuple(self.fits)
-
-    def plain(self) -> dict:
-        """As plain data, SI."""
-        return {
-            "case": self.case, "scheme": self.scheme, "method": self.method, "refine": self.plan.way,
-            "measure": self.plan.measure, "how": self.plan.words, "reference": {"kind": self.kind, "words": self.words,
-            "own_error": self.own}, "rows": [row.plain() for row in self.rows],
-            "fits": {name: {norm: one.plain() for norm, one in found.items()} for name, found in self.fits.items()},
-            "notes": list(self.notes),
-        }  # fmt: skip
 
 
 @door(

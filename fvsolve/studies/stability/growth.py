@@ -6,7 +6,7 @@ growth = max over n <= N of ||R(h J)^n|| in the energy norm; a step fails where 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -172,23 +172,3 @@ class Dense:
         """R(h J)."""
         with np.errstate(over="ignore", invalid="ignore"):
             return step_matrix(self.method, h * self.e)
-
-
-def system(
-    method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, latest: float | None = None
-) -> Any:
-    """The kind that fits the size; a large one answers until `latest` on the monotonic clock."""
-    if e.shape[0] <= DENSE:
-        return Dense(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
-    from scipy.sparse import csr_array
-
-    from fvsolve.studies.stability.carried import Sparse
-
-    return Sparse(method, csr_array(e), steps, threshold, latest)
-
-
-def predicted(one: Any) -> Limit:
-    """The greatest step below which none fails, for a linear system; looked for from 0.1 to 1e4 over ||J||."""
-    if one.size == 0.0:
-        return Limit(np.inf, np.inf)
-    return one.limit()

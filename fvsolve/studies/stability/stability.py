@@ -26,11 +26,12 @@ from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.points import Points
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
 from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
-from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD, predicted, system
+from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD
 from fvsolve.studies.stability.measured import LONGEST as RUNNING
 from fvsolve.studies.stability.measured import Runs
 from fvsolve.studies.stability.misled import notes
 from fvsolve.studies.stability.row import Row, read
+from fvsolve.studies.stability.system import predicted, system
 
 AUTOMATIC = (
     f"auto begins with {automatic.EXPLICIT}, of which its row is; a run goes on with {automatic.IMPLICIT} where that "

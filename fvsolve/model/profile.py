@@ -1,0 +1,29 @@
+"""The steady profile that a run starts from, filled into the tables of a draft. Knows its order; solves nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fvsolve.model.probes import probe_offsets
+from fvsolve.model.start import Start
+from fvsolve.model.unsteady import add_terms
+
+
+def start_profile(draft) -> dict[str, Any]:
+    """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
+    if draft.case.fluid.law == "linear":
+        start = Start(draft)
+    else:
+        from fvsolve.model.barotropic import BarotropicStart  # scenes under law linear load none of it
+
+        start = BarotropicStart(draft)
+    start.solve()
+    start.report_split()
+    start.freeze_factors()
+    start.fill_nodes()
+    start.fill_pipes()
+    start.fill_columns()
+    start.fill_valves()
+    start.begin_devices()
+    probe_offsets(draft, start)
+    return {**start.report(), "unsteady": add_terms(draft)}

@@ -1,0 +1,113 @@
+"""Every limiter is its own in every kernel that takes one; a code that is none says so."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from fvsolve.kernels import limiters, reconstruction, scalars
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.limiters import by_limiter, limited
+from fvsolve.kernels.plane import liquid, liquid_log, second_order, shallow_rows
+from fvsolve.model.schemes import LIMITERS
+
+CELLS, NONE = 40, 99
+
+
+def waves(count: int) -> list[np.ndarray]:
+    """Rows of cells, steep enough to be limited and smooth enough not to be always."""
+    x = np.linspace(0.0, 6.0, CELLS)
+    return [2.0 + np.sin(x + k) + 0.1 * np.cos(9.0 * x + k) for k in range(count)]
+
+
+def pipe_faces(code: int, backward: int) -> np.ndarray:
+    found, settings = np.zeros(CELLS - 5), np.zeros(1, rec.SETTINGS)
+    settings["limiter"] = code
+    reconstruction.faces(settings[0], rec.MUSCL, 1e-9, backward, waves(1)[0], found)
+    return found
+
+
+def pipe_scalars(code: int) -> np.ndarray:
+    found = np.zeros(CELLS)
+    by_limiter(scalars.inner_slopes, code, waves(1)[0], found)
+    return found[1:-1]
+
+
+def one_face(code: int) -> np.ndarray:
+    b, c, d = waves(3)
+    return np.array([reconstruction.value_muscl(code, *three) for three in zip(b, c, d, strict=True)])
+
+
+def carried(code: int) -> np.ndarray:
+    """Rates of what a grid's water carries, whirled about."""
+    n = 8
+    rng, rate = np.random.default_rng(4), np.zeros(n * n)
+    flows, c, outside = rng.normal(size=2 * n * (n + 1)), rng.random(n * n), rng.random(4 * n)
+    ones, work = np.ones(n), np.zeros(second_order.second_order_work(n, n))
+    along, across = flows[: n * (n + 1)], flows[n * (n + 1) :]
+    second_order.second_order_rates(rec.MUSCL, code, n, n, ones, ones, 1.0, along, across, outside, c, work, rate)
+    return rate
+
+
+def liquid_faces(code: int) -> np.ndarray:
+    found = np.zeros(CELLS)
+    liquid.faces(rec.MUSCL, code, 1e-9, *waves(5), found)
+    return found
+
+
+def liquid_carried(code: int) -> np.ndarray:
+    found = np.zeros(CELLS)
+    liquid_log.faces_carried(rec.MUSCL, code, 1e-9, *waves(8), found)
+    return found
+
+
+def shallow_sides(code: int) -> np.ndarray:
+    rng, found = np.random.default_rng(7), np.zeros(shallow_rows.PUSH + CELLS)
+    rows = [np.zeros(shallow_rows.NORTH + CELLS) for _ in range(3)]
+    for row in rows:
+        for at in (0, shallow_rows.SURFACE, shallow_rows.EAST, shallow_rows.NORTH):
+            row[at : at + CELLS] = rng.random(CELLS)
+    shallow_rows.put_limited(rec.MUSCL, code, CELLS, *rows, found)
+    return found
+
+
+KERNELS = {
+    "pipe": lambda code: pipe_faces(code, 0),
+    "pipe, backward": lambda code: pipe_faces(code, 1),
+    "pipe ends, cavities": one_face,
+    "scalars in pipes": pipe_scalars,
+    "scalars on grids": carried,
+    "liquid on grids": liquid_faces,
+    "liquid on grids, momentum": liquid_carried,
+    "free surface on grids": shallow_sides,
+}
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_no_limiter_is_another_in_any_kernel(kernel):
+    found = {name: KERNELS[kernel](one.code) for name, one in LIMITERS.items()}
+    assert all(np.all(np.isfinite(values)) for values in found.values())
+    for one, other in combinations(found, 2):
+        assert np.abs(found[one] - found[other]).max() > 1e-3, (one, other)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_a_code_that_is_no_limiter_gives_nan_and_never_another(kernel):
+    assert np.any(np.isnan(KERNELS[kernel](NONE)))
+
+
+def test_a_pair_of_halves_is_two_slopes():
+    """One division for both."""
+    a, b, c, d = (row - 2.0 for row in waves(4))
+    for limiter in (limiters.minmod, limiters.van_leer, limiters.monotonized_central):
+        for four in zip(a, b, c, d, strict=True):
+            one, two = limiters.halves(limiter, *four)
+            assert one == pytest.approx(0.5 * limiters.slope(limiter, *four[:2]), rel=1e-15)
+            assert two == pytest.approx(0.5 * limiters.slope(limiter, *four[2:]), rel=1e-15)
+
+
+def test_what_is_flat_has_no_slope():
+    assert_array_equal([limited(rec.FLAT, 1.0, 2.0), limited(rec.FLAT, -1.0, 2.0)], 0.0)
