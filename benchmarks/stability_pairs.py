@@ -14,7 +14,7 @@ import sys
 
 import numpy as np
 
-from fvsolve.model.schemes import LINEAR
+from fvsolve.schemes import LINEAR
 from fvsolve.steppers import METHODS
 from fvsolve.studies.stability.stability import stability
 
@@ -79,7 +79,7 @@ def chain(cells: int) -> dict:
 def main(cells: int = 16, steps: int = 1000) -> None:
     """Print a table for each scene and the greatest difference of all."""
     methods = [name for name, one in METHODS.items() if one.name == name and one.explicit]
-    schemes = ["upwind", *LINEAR]
+    schemes = list(LINEAR)
     worst: list[float] = []
     for make in (closed, inflow, network, chain):
         names = schemes if make is not chain else schemes[:1]

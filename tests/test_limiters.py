@@ -12,7 +12,7 @@ from fvsolve.kernels import limiters, reconstruction, scalars
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.limiters import by_limiter, limited
 from fvsolve.kernels.plane import liquid, liquid_log, second_order, shallow_rows
-from fvsolve.model.schemes import LIMITERS
+from fvsolve.model.schemes import CODES
 
 CELLS, NONE = 40, 99
 
@@ -88,7 +88,7 @@ KERNELS = {
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_no_limiter_is_another_in_any_kernel(kernel):
-    found = {name: KERNELS[kernel](one.code) for name, one in LIMITERS.items()}
+    found = {name: KERNELS[kernel](code) for name, code in CODES.items()}
     assert all(np.all(np.isfinite(values)) for values in found.values())
     for one, other in combinations(found, 2):
         assert np.abs(found[one] - found[other]).max() > 1e-3, (one, other)

@@ -8,7 +8,7 @@ from truth.scenes import WATER, junction, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model.probes import around
-from fvsolve.model.schemes import ORDER
+from fvsolve.schemes import SCHEMES
 
 CELLS = 10
 PLACES = (0.05, 0.1, 0.15, 0.3, 0.37, 0.45, 0.5, 0.6, 0.65, 0.7, 0.9, 0.95)
@@ -29,7 +29,7 @@ def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
-@pytest.mark.parametrize("scheme", ORDER)
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
     """On faces, centres and between; flow turns its sign with the direction, to rounding."""
     nodes = {"lake": reservoir(6e5), "gate": junction(), "sink": reservoir(2e5)}

@@ -11,11 +11,12 @@ from typing import Any
 from fvsolve.case import basins, ranges, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
-from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, SCHEMES, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import Fluid
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.table import plain
+from fvsolve.schemes import SCHEMES
 from fvsolve.shown import Shown
 from fvsolve.units import show
 
@@ -83,7 +84,7 @@ class Case(Shown):
     def schemes(self) -> tuple[str, ...]:
         """Schemes that can follow what its fluid does."""
         air = self.properties.air
-        return CAVITY_SCHEMES if air is not None and air.cavitation else SCHEMES
+        return CAVITY_SCHEMES if air is not None and air.cavitation else tuple(SCHEMES)
 
     @cached_property
     def places(self) -> dict[str, Node]:

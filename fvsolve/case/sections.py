@@ -29,13 +29,12 @@ from fvsolve.parts.value import (
     nonnegative,
     positive,
 )
+from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.structure import KINDS
 from fvsolve.units import show
 
-SCHEMES = ("upwind", "muscl", "upwind5", "weno5", "central", "linear-upwind", "fromm", "upwind3")
-CAVITY_SCHEMES = ("upwind", "muscl")  # the others reach over a cavity's edge
-LIMITERS = ("minmod", "van-leer", "monotonized-central")
+CAVITY_SCHEMES = tuple(name for name, one in SCHEMES.items() if one.cavities)
 
 # Every default of [numerics] and [output], chosen by docs/accuracy-and-speed.md. Steps: Courant where there are cells,
 # error control elsewhere.
@@ -111,8 +110,8 @@ class Numerics(Table):
     initial: Annotated[
         str, Choice("start", ("steady", "equilibrium", "rest"), "steady flow, nothing may move, or no flow")
     ] = "steady"
-    scheme: Annotated[str, Choice("scheme", SCHEMES, "reconstruction in the cells")] = DEFAULT_SCHEME
-    limiter: Annotated[str, Choice("limiter", LIMITERS, "of the scheme muscl")] = DEFAULT_LIMITER
+    scheme: Annotated[str, Choice("scheme", tuple(SCHEMES), "reconstruction in the cells")] = DEFAULT_SCHEME
+    limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "of the scheme muscl")] = DEFAULT_LIMITER
     method: Annotated[str | None, Choice("method", MethodNames(), "Runge-Kutta method")] = None
     courant: Annotated[float | None, Number(positive, "step, in travel times of the quickest cell")] = None
     step: Annotated[float | None, Quantity("time", positive, "fixed step [s]")] = None

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels.friction import drag_slope
-from fvsolve.limits.symbol import symbol, weights_of
-from fvsolve.model.schemes import FROZEN_AS
+from fvsolve.limits.symbol import symbol
+from fvsolve.schemes import SCHEMES
 
 PHASES = np.linspace(0.0, np.pi, 65)
 FEW = 3  # cells of a basin, below which nothing is asked
@@ -27,7 +27,7 @@ def cell_modes(model) -> Modes:
 def rubbed(model) -> Modes:
     """Waves of pipes against friction, at the flow of the start."""
     scheme, found = model.case.numerics.scheme, []
-    weights = weights_of(FROZEN_AS.get(scheme, scheme))
+    weights = SCHEMES[scheme].smooth.weights
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = slope(row)
         if g > 0.0:

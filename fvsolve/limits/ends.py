@@ -15,11 +15,10 @@ import numpy as np
 from fvsolve.kernels.ends import END_ENTERING, END_LEAVING, END_VALUE, GHOSTS
 from fvsolve.limits.plane import GROWTH
 from fvsolve.limits.symbol import weights_of
-from fvsolve.model.schemes import ORDER
+from fvsolve.schemes import ROOM, SCHEMES
 from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.tableau import method_named
 
-LOW, FIFTH = {"upwind5": "upwind3"}, 5  # cells below which fifth-order schemes take lower ones, as in `kernels.pipes`
 LONG = 40  # cells from which on the ends are too far apart to count
 WORST = (0.0, 1.0, -1.0)  # of p q, what brings the limit down most
 LOWEST, HIGHEST, RISE, HALVINGS = 1.0 / 64.0, 64.0, 1.02, 40  # of the Courant numbers that are tried
@@ -53,14 +52,14 @@ def pipe_growth(scheme: str, method: str, cells: int, courant: float, returned: 
 @functools.lru_cache(maxsize=1024)
 def pipe_modes(scheme: str, cells: int, returned: tuple[float, ...] = WORST) -> np.ndarray:
     """Eigenvalues of a pipe, in travel times of a cell, for some products of its ends' reflections : complex[m]."""
-    a, b, v = one_wave(LOW.get(scheme, scheme) if cells < FIFTH else scheme, cells)
+    a, b, v = one_wave((SCHEMES[scheme].shorter or scheme) if cells < ROOM else scheme, cells)
     roots = [sign * np.sqrt(complex(product)) for product in returned for sign in (1.0, -1.0)]
     return np.concatenate([np.linalg.eigvals(a + s * np.outer(b, v)) for s in roots])
 
 
 def one_wave(scheme: str, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(A, b, v) of one wave through a pipe, as `kernels.pipes` and `kernels.ends` close it."""
-    degree, weights = ORDER[scheme] - 1, [float(w) for w in weights_of(scheme)]
+    degree, weights = SCHEMES[scheme].degree, [float(w) for w in weights_of(scheme)]
     known = np.eye(cells + 1)  # rows: the datum, then the cells
     near, far = known, known[:0:-1]  # from the end where it enters, where it leaves
     into, out = min(degree, cells), min(degree, cells - 1)

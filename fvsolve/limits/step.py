@@ -14,12 +14,12 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
-from fvsolve.limits.ends import FIFTH, LONG, pipe_growth, pipe_limit
+from fvsolve.limits.ends import LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
 from fvsolve.limits.lumped import GROWS, Mode, lumped_modes, times
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.symbol import weights_of
-from fvsolve.model.schemes import FROZEN_AS
+from fvsolve.schemes import ROOM, SCHEMES
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
@@ -101,10 +101,10 @@ def pipe_rooms(model, method: str) -> list[Room]:
         courant = numerics.step * waves
     else:
         courant = numerics.courant * waves / (waves * model.tables.pipes["quicker"]).max()
-    cells = np.array([pipe.cells for pipe in model.pipes])
-    long = cells >= (FIFTH if numerics.scheme == "weno5" else LONG)  # at whose ends it is of a lower order where rough
+    cells, one = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
+    long = cells >= (ROOM if one.limited and one.shorter else LONG)  # at whose ends it is of a lower order where rough
     rooms = [room for k in np.flatnonzero(~long) if (room := short_pipe(model, method, int(k), float(courant[k])))]
-    inner = cells >= FIFTH if proved(model) else long  # what grows between the ends does so in few cells, too
+    inner = cells >= ROOM if proved(model) else long  # what grows between the ends does so in few cells, too
     if inner.any():
         k = int(np.argmax(np.where(inner, courant, -1.0)))
         rooms += long_pipe(model, method, k, float(courant[k]))
@@ -130,9 +130,8 @@ def proved(model) -> bool:
 
 def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
     """Pipe k of few cells, where its ends make its waves grow within the run: surely by what its own ends reflect."""
-    cells, (scheme, limited) = model.pipes[k].cells, frozen(model.case.numerics.scheme)
-    if model.case.numerics.scheme == "weno5":
-        scheme = FROZEN_AS["muscl"]  # which it is below five cells
+    cells, one = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
+    scheme, limited = frozen(one.shorter if one.limited and one.shorter else one.name)
     steps = span(model) * model.wave_rates[k] / courant
     grows = times(pipe_growth(scheme, method, cells, courant), steps)
     if grows < GROWS:
@@ -190,7 +189,7 @@ def span(model) -> float:
 
 def frozen(scheme: str) -> tuple[str, bool]:
     """The linear scheme that a scheme is where all is smooth, and whether it is another."""
-    return FROZEN_AS.get(scheme, scheme), scheme in FROZEN_AS
+    return SCHEMES[scheme].smooth.name, SCHEMES[scheme].limited
 
 
 def sound(room: Room) -> bool:

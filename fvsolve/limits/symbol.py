@@ -13,16 +13,10 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
-from fvsolve.model.schemes import FAMILIES, LINEAR
+from fvsolve.schemes import LIMITED, LINEAR, Weights
 from fvsolve.steppers.numbers.polynomial import Polynomial
 
-Weights = tuple[Fraction, ...]
-LARGEST_DENOMINATOR = 1000  # of a face weight: the table holds them as floats
-
-WEIGHTS: dict[str, Weights] = {"upwind": (Fraction(0), Fraction(0), Fraction(1), Fraction(0), Fraction(0))} | {
-    name: tuple(Fraction(w).limit_denominator(LARGEST_DENOMINATOR) for w in weights)
-    for name, (weights, _) in LINEAR.items()
-}
+WEIGHTS: dict[str, Weights] = {name: one.weights for name, one in LINEAR.items()}
 
 
 def weights_of(scheme: str) -> Weights:
@@ -30,9 +24,9 @@ def weights_of(scheme: str) -> Weights:
     if scheme in WEIGHTS:
         return WEIGHTS[scheme]
     linear = ", ".join(WEIGHTS)
-    if scheme in FAMILIES:
+    if scheme in LIMITED:
         raise FvsolveError(f'scheme "{scheme}" is not linear and has no exact limit; linear schemes are {linear}')
-    near = nearest(scheme, [*WEIGHTS, *FAMILIES])
+    near = nearest(scheme, [*WEIGHTS, *LIMITED])
     hint = f'did you mean "{near}"?' if near else f"linear schemes are {linear}"
     raise FvsolveError(f'no scheme named "{scheme}"; {hint}')
 

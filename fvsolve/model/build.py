@@ -22,10 +22,11 @@ from fvsolve.model.profile import start_profile
 from fvsolve.model.ranges import flow_notices
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schedules import Schedules
-from fvsolve.model.schemes import quicker, scheme_settings
+from fvsolve.model.schemes import scheme_settings
 from fvsolve.model.unsteady import reserve
 from fvsolve.parts import EDGES
 from fvsolve.parts.schedule import constant
+from fvsolve.schemes import quicker
 
 KINDS = ("pipe", "rigid-column", "valve", "spool-valve", "device")  # of links that carry the fluid
 

@@ -11,7 +11,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.scalars import node_values, pipe_values
-from fvsolve.model.schemes import FIFTH
+from fvsolve.schemes import SCHEMES
 from fvsolve.shown import Shown
 from fvsolve.units import show
 
@@ -177,8 +177,9 @@ class Model(Shown):
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
         alone = bool(basins and patches) and not (self.cells or valves or kinds or any(there))
         outlets = bool((self.tables.valves["law"] == rec.POWER).any())
-        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many.scalars,
-                      self.case.numerics.scheme in FIFTH, spread, valves, alone, outlets)  # fmt: skip
+        fifth = SCHEMES[self.case.numerics.scheme].on(True).order > 2
+        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many.scalars, fifth,
+                    spread, valves, alone, outlets)  # fmt: skip
         return functions(cast)
 
     @property

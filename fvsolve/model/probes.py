@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.schemes import ORDER
 from fvsolve.parts import EDGES
+from fvsolve.schemes import SCHEMES
 
 TIE = 1e-6  # of a cell, within which two sets of cells are as near
 SPOOL_FLOWS = {  # flow into the link at a port: weights of its four edges
@@ -96,7 +96,7 @@ def place(draft, row, fraction: float, degree: int | None = None) -> None:
         row["side"] = -1 if fraction == 0.0 else 1
         return
     n = int(draft.pipe_table[row["index"]]["cells"])
-    degree = min(degree or max(ORDER[draft.case.numerics.scheme] - 1, 1), n - 1)
+    degree = min(degree or max(SCHEMES[draft.case.numerics.scheme].degree, 1), n - 1)
     first, weights = around(fraction * n, degree, n)
     row["cell"], row["count"], row["weights"] = first, weights.size, len(draft.floats)
     draft.floats += weights.tolist()

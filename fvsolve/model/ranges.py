@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import Notice, listing
+from fvsolve.schemes import SCHEMES
 
 QUICKEST = 60.0  # of pipe flow [m/s]: penstocks keep below 10, jets of 180 m of head reach it
 LAMINAR, AT_REST = 2000.0, 1.0  # Reynolds numbers below which a flow is laminar, and none at all
 WIDE, WATERY = 0.05, (950.0, 1050.0)  # pipes [m] and liquids [kg/m3] in which flow is turbulent: mains, not oil drives
-FEWEST = {"upwind5": 3, "weno5": 3}  # cells that a scheme of five needs to be what it is
 SHORT = 0.1  # of the longest travel time: pipes that may have fewer
 
 
@@ -58,11 +58,11 @@ def _laminar(draft: Any) -> list[Notice]:
 def _coarse(draft: Any) -> list[Notice]:
     scheme, cells = draft.case.numerics.scheme, draft.pipe_table["cells"]
     travel = cells * draft.pipe_table["dx"] / draft.pipe_table["speed"]
-    few = (cells < FEWEST.get(scheme, 0)) & (travel > SHORT * travel.max())
+    fewest = SCHEMES[scheme].reach.behind if SCHEMES[scheme].shorter else 0  # that a scheme of five needs to be one
+    few = (cells < fewest) & (travel > SHORT * travel.max())
     if not few.any():
         return []
     worst = int(np.argmax(np.where(few, travel, 0.0)))
-    fewest = FEWEST[scheme]
     text = (f"{_all(draft.pipe_names, few)}: fewer than {fewest} cells, where {scheme} has no room and is of first "
             f'order; {fewest} cells at least, or scheme = "upwind"')  # fmt: skip
     return [Notice("range", f"links.{draft.pipe_names[worst]}", text, "cells", float(cells[worst]), float(fewest))]

@@ -10,39 +10,23 @@ but for chambers of cylinders, whose pressure is that of their bodies too. Cells
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import pattern
+from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
 
 Pairs = tuple[np.ndarray, np.ndarray]  # rows, and as many states that they depend on
 
 
-class Reach(NamedTuple):
-    """How many cells a scheme looks at, for a wave that runs forward."""
-
-    behind: int  # cells before a cell, in its rate
-    ahead: int  # cells after it
-    entering: int  # cells under the polynomial beyond an end, where the wave enters
-    leaving: int  # and where it leaves
-
-
-def reach_of(settings) -> Reach:
+def reach_of(scheme: str, settings) -> Reach:
     """Reach of a model's scheme; pipes too short for it reach no further."""
-    family, degree = settings["scheme"], int(settings["degree"])
-    if settings["floor"] > 0.0:  # both waves from both sides
-        return Reach(1, 1, 1, 3) if family == rec.UPWIND else Reach(2, 2, 3, 3)
-    if family == rec.UPWIND:
-        return Reach(1, 0, 0, 1)
-    if family == rec.MUSCL:
-        return Reach(2, 1, 1, 3)
-    if family == rec.WENO5:
-        return Reach(3, 2, 4, 5)
-    used = [k - 2 for k in range(6) if settings[f"w{k}"] != 0.0]  # cells in the value after a cell, from it
-    return Reach(1 - min(used), max(0, *used), degree, degree + 1)
+    reach = SCHEMES[scheme].reach
+    if settings["floor"] > 0.0:  # cavities: both waves from both sides
+        return Reach(reach.behind, reach.behind, 2 * reach.behind - 1, 3)
+    return reach
 
 
 class Couplings:
@@ -56,7 +40,7 @@ class Couplings:
         settings = tables.settings[0]
         self.linear = settings["law"] == rec.LAW_LINEAR
         self.upwind = settings["scheme"] == rec.UPWIND
-        self.reach = reach_of(settings)
+        self.reach = reach_of(model.case.numerics.scheme, settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
         self.bodies, self.pistons = tables.bodies["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]

@@ -15,7 +15,8 @@ from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.plane.advection import THIN, advection_work
 from fvsolve.kernels.plane.diffusion import diffusion_work
 from fvsolve.model.face_mesh import lower_mesh
-from fvsolve.model.schemes import FIFTH, LIMITERS
+from fvsolve.model.schemes import CODES, family
+from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
 
@@ -95,8 +96,7 @@ class Basin:
     @property
     def scheme(self) -> str:
         """The scheme that its kernels take."""
-        name = self.case.numerics.scheme
-        return name if name == "upwind" or (name in FIFTH and self.is_grid) else "muscl"
+        return SCHEMES[self.case.numerics.scheme].on(self.is_grid).name
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         """Fill what a probe of a field is, beside the cells that it reads; scalar fields are its physics' own."""
@@ -157,18 +157,17 @@ class Basin:
         """Fill what all kinds need."""
         numerics, mesh, before = self.case.numerics, self.mesh, draft.plane_size + len(draft.integers)
         self.row, row["n"] = row, self.n
-        row["scheme"] = rec.UPWIND if numerics.scheme == "upwind" else FIFTH.get(numerics.scheme, rec.MUSCL)
-        row["limiter"], row["wide"] = LIMITERS[numerics.limiter]
+        row["scheme"] = family(self.scheme)
+        row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].wide
         row["area"] = draft.to_plane(mesh.area)
         if self.is_grid:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
-            if row["scheme"] not in (rec.UPWIND, rec.MUSCL):
+            if self.scheme != SCHEMES[numerics.scheme].on(True).name:
                 text = f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; muscl is taken there"
                 draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
-                row["scheme"] = rec.MUSCL
             floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
             row["links"] = len(draft.integers)
@@ -207,9 +206,8 @@ class Basin:
         may = self.may_leave(row)
         if may:
             numerics = self.case.numerics
-            scheme = "muscl" if row["scheme"] == rec.MUSCL else numerics.scheme
-            limited = f", {numerics.limiter}" if row["scheme"] == rec.MUSCL else ""
-            what = f"basin {self.name}: scalars may leave their bounds ({scheme}{limited}; {numerics.method}): "
+            limited = f", {numerics.limiter}" if self.scheme == "muscl" else ""
+            what = f"basin {self.name}: scalars may leave their bounds ({self.scheme}{limited}; {numerics.method}): "
             key, why, value, limit = may
             draft.warnings.append(Notice("bounds", f"nodes.{self.name}", what + why, key, value, limit))
 

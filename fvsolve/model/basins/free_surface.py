@@ -9,7 +9,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import shallow, shallow_faces
 from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.model.basins.basin import Basin
-from fvsolve.model.schemes import FIFTH
+from fvsolve.schemes import SCHEMES
 
 SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # of levels and beds, less than which is no water
@@ -68,7 +68,7 @@ class FreeSurface(Basin, physics="free-surface"):
     def lower_grid(self, draft, row) -> None:
         row["kind"] = rec.SHALLOW_GRID
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
-        row["unsplit"] = SHORES if dry and row["scheme"] in FIFTH.values() else UNSPLIT
+        row["unsplit"] = SHORES if dry and SCHEMES[self.scheme].order > 2 else UNSPLIT
         row["work"] = draft.to_plane(np.zeros(shallow.WORK))
 
     def lower_faces(self, draft, row) -> None:

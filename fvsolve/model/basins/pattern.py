@@ -6,8 +6,9 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array, kron
 
 from fvsolve.kernels import records as rec
+from fvsolve.schemes import SCHEMES
 
-REACH, FIFTH = {rec.UPWIND: 1, rec.MUSCL: 2}, 3  # cells either way; fifth order looks at three
+WIDE = 3  # cells either way that the fifth order looks at
 
 
 def inside(basin) -> tuple[np.ndarray, np.ndarray]:
@@ -61,9 +62,9 @@ def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndar
 
 def neighbours(basin) -> csr_array:
     """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
-    found, reach = csr_array(eye_array(basin.n, dtype=bool)), REACH.get(int(basin.row["scheme"]), FIFTH)
+    found, reach = csr_array(eye_array(basin.n, dtype=bool)), SCHEMES[basin.scheme].reach.behind
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
-    if reach < FIFTH or basin.row["kind"] <= rec.SHALLOW_FACES or not basin.row["outer_given"]:
+    if reach < WIDE or basin.row["kind"] <= rec.SHALLOW_FACES or not basin.row["outer_given"]:
         edge = edge[:0]
     beside = csr_array(coo_array((np.ones(edge.size, dtype=bool), (edge, edge)), shape=found.shape))
     for ring in rings(basin):

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.schemes import FIFTH, ORDER
 from fvsolve.parts import Basin, Pipe
+from fvsolve.schemes import SCHEMES
 from fvsolve.studies.accuracy.plane import contents
 from fvsolve.studies.outcome import prepared
 
@@ -102,9 +102,8 @@ def greatest_rate(case, found: Mapping[str, tuple[int, ...]]) -> float:
 
 def space_order(case) -> int:
     """Order of the scheme in all that has cells, where all is smooth."""
-    scheme = case.numerics.scheme
-    fifth = [scheme in FIFTH and bool(basin.cells) and not basin.holes for basin in basins(case).values()]
-    return ORDER[scheme] if all(fifth) else min(ORDER[scheme], PLANE_ORDER)
+    one = SCHEMES[case.numerics.scheme]
+    return min([one.order, *(one.on(bool(basin.cells) and not basin.holes).order for basin in basins(case).values())])
 
 
 def order_varies(case) -> bool:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from fvsolve.case import load
 from fvsolve.case.case import Case
-from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME, SCHEMES
+from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.model.checks import rhs_seconds
+from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import counts, greatest_rate, total
 from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest, own_cells, with_cells, without_cells
@@ -158,7 +159,7 @@ def chosen(
 
 def known(schemes: Sequence[str] | None, methods: Sequence[str] | None) -> None:
     """Raises FvsolveError for a name that is none, with the nearest."""
-    for what, asked, names in (("scheme", schemes, SCHEMES), ("method", methods, (AUTO, *METHODS))):
+    for what, asked, names in (("scheme", schemes, tuple(SCHEMES)), ("method", methods, (AUTO, *METHODS))):
         for name in asked or ():
             if name not in names:
                 raise FvsolveError(f"no {what} {name}{did_you_mean(name, names)}; {what}s are {listing(names, 60)}")

@@ -8,7 +8,7 @@ import functools
 import numpy as np
 
 from fvsolve.errors import CaseError
-from fvsolve.model.schemes import ORDER
+from fvsolve.schemes import SCHEMES
 from fvsolve.studies.energy.energy import ROUNDING, check_port, energy
 from fvsolve.studies.energy.passivity import AUTO, checked, method_names
 from fvsolve.studies.outcome import refusal
@@ -35,7 +35,7 @@ def measured(
     """
     check_port(case, port)
     points = points or Points()
-    schemes = checked(schemes or [case.numerics.scheme], list(ORDER), "scheme")
+    schemes = checked(schemes or [case.numerics.scheme], list(SCHEMES), "scheme")
     methods = checked(methods or [case.numerics.method], [*method_names(), AUTO], "method")
     rows, total = [], len(schemes) * len(methods)
     for scheme in schemes:

@@ -17,7 +17,7 @@ import numpy as np
 
 from fvsolve.doors import CALL, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.model.schemes import LINEAR, ORDER
+from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT
 from fvsolve.studies.outcome import names
 
@@ -100,7 +100,7 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
 
     progress(done, total, next) counts the names.
     """
-    schemes = checked(schemes, list(ORDER), "scheme")
+    schemes = checked(schemes, list(SCHEMES), "scheme")
     methods = checked(methods, method_names(), "method")
     tell, total = progress or (lambda *_: None), len(schemes) + len(methods)
     of_schemes, of_methods, limits = [], [], {}
@@ -196,7 +196,7 @@ def pipe_operator(scheme: str) -> np.ndarray:
 @functools.cache
 def scheme_claim(scheme: str) -> SchemeClaim:
     """Growth of energy that the cells of a scheme alone allow."""
-    if scheme not in LINEAR and scheme != "upwind":
+    if SCHEMES[scheme].limited:
         return SchemeClaim(scheme, None, None, None)
     b = pipe_operator(scheme)
     rate = float(np.linalg.eigvalsh(b + b.T)[-1])

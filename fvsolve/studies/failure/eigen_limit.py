@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from fvsolve.schemes import LIMITED, SCHEMES
+
 GROWTH = 1e3  # within the run: what grows less is not seen
 MOST_STATES = 1200  # of a dense spectrum
-LINEAR_TWIN = {"muscl": "fromm", "weno5": "upwind5"}  # whose weights a limited scheme has in smooth flow
 
 
 def spectrum(case, set: dict) -> np.ndarray | None:
@@ -19,7 +20,7 @@ def spectrum(case, set: dict) -> np.ndarray | None:
     from fvsolve.studies.outcome import prepared
 
     model = prepared(case, set)
-    if (scheme := model.case.numerics.scheme) in LINEAR_TWIN:
+    if (scheme := model.case.numerics.scheme) in LIMITED:
         model = prepared(case, {**set, "numerics.scheme": twin(model.case, scheme)})
     if model.y_size > MOST_STATES:
         return None
@@ -30,7 +31,7 @@ def spectrum(case, set: dict) -> np.ndarray | None:
 
 def twin(case, scheme: str) -> str:
     """The linear scheme that stands for a limited one: what it is where all is smooth, or at its steepest."""
-    return LINEAR_TWIN[scheme] if LINEAR_TWIN[scheme] in case.schemes else "upwind"
+    return SCHEMES[scheme].twin if SCHEMES[scheme].twin in case.schemes else "upwind"
 
 
 def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:

@@ -11,9 +11,10 @@ import numpy as np
 
 from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, door, is_row
 from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.schemes import LIMITED
 from fvsolve.studies.failure.columns import Columns, columns, default_schemes
 from fvsolve.studies.failure.converged import Converged, converged
-from fvsolve.studies.failure.eigen_limit import LINEAR_TWIN, greatest_step, spectrum
+from fvsolve.studies.failure.eigen_limit import greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
 from fvsolve.studies.outcome import Progress, names, without_basins
@@ -120,7 +121,7 @@ def failures(
                 progress(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
             squares.append(trials.square(scheme, method, k))
         words = trials.reference(0).words
-    limited = tuple(name for name in schemes if name in LINEAR_TWIN and across.wave_rate)
+    limited = tuple(name for name in schemes if name in LIMITED and across.wave_rate)
     return FailureMap(
         case.name, across.name, tuple(across.values), schemes, methods, tuple(squares), tolerance,
         words, trials.doubt, across.wave_rate, limited,
@@ -216,9 +217,10 @@ def _explicit(method: str) -> bool:
 
 
 def _known(*asked: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    from fvsolve.case.sections import SCHEMES, MethodNames
+    from fvsolve.case.sections import MethodNames
+    from fvsolve.schemes import SCHEMES
 
-    for what, given, known in zip(("scheme", "method"), asked, (SCHEMES, tuple(MethodNames())), strict=True):
+    for what, given, known in zip(("scheme", "method"), asked, (tuple(SCHEMES), tuple(MethodNames())), strict=True):
         for name in given:
             if name not in known:
                 raise FvsolveError(f'no {what} named "{name}"{did_you_mean(name, known)}')

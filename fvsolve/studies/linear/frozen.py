@@ -10,10 +10,8 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
 from fvsolve.kernels.schedules import schedule_value
-from fvsolve.model.schemes import FROZEN_AS
+from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.studies.outcome import outcome, prepared
-
-LIMITED = ("muscl", "weno5")  # schemes without a derivative at a constant state
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +44,8 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    if "scheme" not in case.raw["numerics"] and case.numerics.scheme in FROZEN_AS:
-        linear = "upwind" if case.meshes else FROZEN_AS[case.numerics.scheme]
+    if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
+        linear = "upwind" if case.meshes else SCHEMES[case.numerics.scheme].twin
         case = load(case, {"numerics.scheme": linear})
     names = list(dict.fromkeys([*probes, *(probe.text for probe in case.probes)]))
     last = case.numerics.end if at is None else max(case.numerics.end, float(at))

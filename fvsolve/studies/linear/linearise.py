@@ -11,8 +11,9 @@ from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.model.basins.units import unit_of
+from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import Input, hold, input_schedules
-from fvsolve.studies.linear.frozen import FROZEN_AS, Frozen, frozen, has_limiter
+from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter
 from fvsolve.studies.linear.matrices import output_matrix, responses, state_matrix
 from fvsolve.studies.linear.slopes import SMOOTH, central, kinks, one_sided, settled
 from fvsolve.units import DIMENSIONS
@@ -142,7 +143,7 @@ def refuse_limiter(model) -> None:
         if model.basins and all(basin.is_grid for basin in model.basins):
             smooth = "upwind or upwind5"
         elif "upwind5" in able and not model.basins:
-            smooth = f"{FROZEN_AS[scheme]} (what {scheme} is where all is smooth), upwind or upwind5"
+            smooth = f"{SCHEMES[scheme].twin} (what {scheme} is where all is smooth), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
             f"the deviation; linearise with a linear scheme, --scheme {smooth}"

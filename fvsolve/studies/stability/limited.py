@@ -11,15 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from fractions import Fraction
 
 import numpy as np
 
 from fvsolve.doors import CALL, COUNT, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.limits.grid import AdvectionLimit, limit_of
-from fvsolve.limits.symbol import WEIGHTS, Weights
-from fvsolve.model.schemes import LIMITERS
+from fvsolve.schemes import LIMITED, LIMITERS, branches
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import Progress, names
@@ -33,27 +31,6 @@ METHODS = ("euler", "ssp-rk2", "ssp-rk3", "rk4")  # by default
 LOOKS = 25  # at the norm during a run
 FALLS = 0.05  # of the limit between the fewest and the most steps, more than an exponential explains: not sharp
 SEED = 1
-
-
-def _weights(*sixths: int) -> Weights:
-    return tuple(Fraction(x, 6) for x in sixths)
-
-
-FLAT, MEAN = {"upwind": WEIGHTS["upwind"]}, {"fromm": WEIGHTS["fromm"]}
-STEEP = {"twice behind": _weights(0, -6, 12, 0, 0), "twice ahead": _weights(0, 0, 0, 6, 0)}
-FROZEN: dict[str, dict[str, Weights]] = {  # what limited schemes are where their switches stand still
-    "minmod": FLAT | {name: WEIGHTS[name] for name in ("linear-upwind", "central")},
-    "van-leer": FLAT | MEAN | STEEP,
-    "monotonized-central": FLAT | MEAN | STEEP,
-    "weno5": {
-        "upwind5": WEIGHTS["upwind5"],
-        "stencil behind": _weights(2, -7, 11, 0, 0),
-        "upwind3": WEIGHTS["upwind3"],
-        "stencil ahead": _weights(0, 0, 2, 5, -1),
-    },
-}
-STEEPEST = {"minmod": 1, "van-leer": 2, "monotonized-central": 2}
-LIMITED = ("muscl", "weno5")
 
 
 @dataclass(frozen=True)
@@ -102,8 +79,8 @@ class LimitedLimit:
 
 @door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
 def limited_limits(
-    schemes: Sequence[str] = LIMITED, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
-    progress: Progress | None = None,
+    schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = CELLS,
+    steps: int = STEPS, progress: Progress | None = None,
 ) -> list[LimitedLimit]:  # fmt: skip
     """Limited schemes, muscl with each limiter, and explicit methods; runs of `steps`, 10 and 100 times as many.
 
@@ -111,7 +88,7 @@ def limited_limits(
     """
     check_size(cells, steps)
     tell = progress or (lambda *_: None)
-    schemes, named = names(schemes) or LIMITED, [method_named(name) for name in names(methods) or METHODS]
+    schemes, named = names(schemes) or tuple(LIMITED), [method_named(name) for name in names(methods) or METHODS]
     implicit = [one.name for one in named if not one.explicit]
     if implicit:
         raise FvsolveError(f"{implicit[0]} is implicit: limited schemes are measured with explicit methods")
@@ -136,7 +113,7 @@ def limited_limit(
     counts = tuple(n * steps for n in TIMES)
     return LimitedLimit(
         scheme, limiter, method_named(method).name,
-        {branch: limit_of(weights, branch, method) for branch, weights in FROZEN[name].items()},
+        {branch: limit_of(weights, branch, method) for branch, weights in branches(scheme, limiter).items()},
         monotone_limit(name, method), cells, counts,
         {start: tuple(measured(scheme, limiter, method, u, n) for n in counts) for start, u in starts(cells).items()},
     )  # fmt: skip
@@ -145,7 +122,7 @@ def limited_limit(
 def monotone_limit(limiter: str, method: str) -> float | None:
     """The Courant number up to which total variation cannot grow; None where nothing is known."""
     radius = analyse(method).ssp_radius
-    return radius / (1 + STEEPEST[limiter] / 2) if limiter in STEEPEST and radius > 0 else None
+    return radius / (1 + LIMITERS[limiter].steepest / 2) if limiter in LIMITERS and radius > 0 else None
 
 
 def starts(cells: int) -> dict[str, np.ndarray]:

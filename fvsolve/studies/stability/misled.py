@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.studies.linear.frozen import LIMITED, has_limiter
+from fvsolve.schemes import LIMITED
+from fvsolve.studies.linear.frozen import has_limiter
 from fvsolve.studies.stability.carried import TooLarge
 
 CLOSE = 0.02  # bounds that differ by less from the prediction need no word

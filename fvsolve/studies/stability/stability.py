@@ -17,9 +17,10 @@ import numpy as np
 from fvsolve.doors import CALL, COUNT, FLAG, NAMES, NUMBER, PATH, TABLE, door
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy import EnergyForm, energy_form
+from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.methods import AUTO
-from fvsolve.studies.linear.frozen import FROZEN_AS, Frozen, frozen, has_limiter, reweighted
+from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
 from fvsolve.studies.outcome import Progress, names
@@ -159,9 +160,7 @@ class Maker:
         if at.model.cavitates or at.model.basins:  # which have no linear scheme but this
             yield "upwind", Side(replace(self.at("upwind"), y=at.y))
             return
-        from fvsolve.studies.stability.limited import FROZEN
-
-        for name, weights in FROZEN["weno5" if self.scheme == "weno5" else at.model.case.numerics.limiter].items():
+        for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():
             if name not in self.sides:
                 cells = sum(weight != 0 for weight in weights)
                 degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")  # of the ends
@@ -225,7 +224,7 @@ class Maker:
             left_out["frozen weights"] = str(error)
         guess = sorted(starts)[len(starts) // 2] if starts else np.inf  # between the flat and the steep ones
         if left_out and not starts:
-            guess = on_a_long_pipe(FROZEN_AS.get(self.scheme, self.scheme), method) / side.rate or np.inf
+            guess = on_a_long_pipe(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
         runs = Runs(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, VISIBLE)
         row = {
             "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
