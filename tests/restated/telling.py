@@ -21,6 +21,9 @@ class Told:
 
 
 REFUSALS = ("above every source", "no steady state")
+IN_PARTS = (
+    1e-3  # of a kind: what a step errs by; rounding may decide which steps of Newton are taken in parts, as runs say
+)
 
 
 def told(source, **more) -> Told:
@@ -48,6 +51,8 @@ def alike(
     """
     assert other.ended == one.ended
     assert len(other.t) == len(one.t)
+    if within > 0.0 and any(said.result is not None and said.result.summary.get("parted") for said in (one, other)):
+        within = max(within, IN_PARTS)
     if within == 0.0:
         assert np.array_equal(other.t, one.t + later)
     else:
