@@ -15,6 +15,7 @@ from pytest import approx
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.case import sections as defaults
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys
+from fvsolve.case.schema import printed, whole
 from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 
@@ -375,6 +376,26 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
     given = two_tanks()
     given["links"]["hole"] = {"type": "valve", "from": "a", "to": "b", **size}
     assert load(given).links["hole"].flow_area() * np.sqrt(2 * 1e5 / 1000) == approx(flow, rel=1e-12)
+
+
+def test_what_the_schema_refers_to_is_what_it_says_unshared():
+    """Every reference is known, what it stands for is what stood there, and lists in a line are the same lists."""
+    made, defs = schema(), schema()["$defs"]
+
+    def expanded(part):
+        if isinstance(part, dict):
+            name = part.get("$ref", "").removeprefix("#/$defs/")
+            return (
+                expanded(defs[name])
+                if name and name not in whole()["$defs"]
+                else {k: expanded(v) for k, v in part.items()}
+            )
+        return [expanded(inner) for inner in part] if isinstance(part, list) else part
+
+    unshared = expanded({key: value for key, value in made.items() if key != "$defs"})
+    assert unshared == {key: value for key, value in whole().items() if key != "$defs"}
+    assert json.loads(printed(made)) == made
+    assert len(printed(made)) < 0.7 * len(printed(whole()))
 
 
 def test_a_parts_key_is_documented_with_its_unit():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from pathlib import Path
@@ -106,9 +105,10 @@ def new(
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a case file."""
-    from fvsolve.case import schema
+    from fvsolve.case.schema import printed
+    from fvsolve.case.schema import schema as made
 
-    print(json.dumps(schema(), indent=2))
+    print(printed(made()))
 
 
 @app.command()
