@@ -110,12 +110,12 @@ SCHEMES = {one.name: one for one in (
     Scheme("weno5", "weno5", twin="upwind5", shorter="muscl", plane="weno5", branches=(
         ("upwind5", UPWIND5), ("stencil behind", weighed(6, 2, -7, 11, 0, 0)), ("upwind3", UPWIND3),
         ("stencil ahead", weighed(6, 0, 0, 2, 5, -1)))),
-    Scheme("central", weights=weighed(2, 0, 0, 1, 1, 0)),
     Scheme("linear-upwind", weights=weighed(2, 0, -1, 3, 0, 0), own_quicker=(1.0, 1.38, 1.21, 1.11, 1.07, 1.03, 1.01)),
     Scheme("fromm", weights=weighed(4, 0, -1, 4, 1, 0), own_quicker=(1.0, 1.46, 1.19, 1.08)),
+    Scheme("central", weights=weighed(2, 0, 0, 1, 1, 0)),
     Scheme("upwind3", weights=UPWIND3, own_quicker=(1.0, 1.46, 1.61, 1.22, 1.03)),
 )}  # fmt: skip
-LINEAR = {name: one for name, one in SCHEMES.items() if not one.limited}
+LINEAR = dict(sorted(((name, one) for name, one in SCHEMES.items() if not one.limited), key=lambda pair: pair[1].order))
 LIMITED = {name: one for name, one in SCHEMES.items() if one.limited}
 
 
