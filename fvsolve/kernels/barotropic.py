@@ -1,4 +1,4 @@
-"""The right-hand side under the density laws log and table: the full momentum flux. Knows the tables.
+"""Pipes under the density laws log and table: the full momentum flux. Knows the tables; closes no node.
 
 m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope. Waves r = (c m' + M') / 2, l = (c m' - M') / 2 are
 reconstructed from their own sides; the flux is that of the state both make at a face (a linearised Riemann
@@ -6,12 +6,6 @@ solution with the reference wave speed c), less the profile's.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import (
-    close_nodes_barotropic,
-    stored_pressures_barotropic,
-    waves_inside,
-)
-from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -21,22 +15,17 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.pipes import GAUSS, both_faces
 from fvsolve.kernels.records import (
     COLUMN_FLOW,
     LEVEL,
-    OK,
     PIPE_FLOW,
     PIPE_PRESSURE,
     PRESSURE,
     RATE,
     SPOOL_FLOW,
-    STATUS,
     VALVE_FLOW,
-    WHERE,
 )
-from fvsolve.kernels.restrictions import open_scheduled
 from fvsolve.kernels.tanks import tank_level
 
 
@@ -88,34 +77,15 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 
 @njit
-def rhs_barotropic(t, y, dydt, out, handle):
-    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch.
-
-    An empty dydt asks for `out` alone, without what the pipes add to its rate.
-    """
+def rates_barotropic(t, y, dydt, out, handle):
+    """d/dt of the waves in the cells of all pipes, where rates are asked for, and their greatest rate."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
-    floats, profile, scratch = tables.floats, tables.profile, tables.scratch
-    out[STATUS], out[WHERE] = OK, -1.0
-    open_scheduled(t, out, tables)
-    waves_inside(y, out, tables)
-    clear_net(out, tables)
-    stored_pressures_barotropic(t, y, out, tables)
-    run(INFLOWS, t, y, dydt, out, handle)
-    close_nodes_barotropic(t, y, out, tables)
-    run(HOLD, t, y, dydt, out, handle)
-    net_flows(out, tables)
-    stored_rates(y, dydt, out, tables)
-    out[RATE] = quickest_node(out, tables)
-    run(BRAKE, t, y, dydt, out, handle)
-    if dydt.size == 0:
-        return
-    run(MOVE, t, y, dydt, out, handle)
-    for i in range(pipes.size):
+    for i in range(pipes.size if dydt.size > 0 else 0):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         own = pipe_rates_barotropic(
-            st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch,
-            dydt[o : o + n], dydt[o + n : o + 2 * n],
+            st, tables.floats, tables.profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4],
+            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
         )  # fmt: skip
         out[RATE] = max(out[RATE], own)
 

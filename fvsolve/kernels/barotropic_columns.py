@@ -105,6 +105,6 @@ def drive_with_lift(t, y, tables, out, k, x, which):
 def column_rates_barotropic(t, y, dydt, out, handle):
     """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
     tables = open_tables(handle)
-    for k in range(tables.columns.size):
+    for k in range(tables.columns.size if dydt.size > 0 else 0):
         at = tables.columns[k]["y"]
         dydt[at] = column_rate(t, y, tables, out, k, drive_change(tables, out, k))

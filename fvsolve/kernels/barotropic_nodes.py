@@ -34,6 +34,7 @@ from fvsolve.kernels.density import (
 )
 from fvsolve.kernels.emitters import emitter_flow, emitter_step, rule_of
 from fvsolve.kernels.ends import end_value
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.isolated import find_held, inner_row
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import (
@@ -63,8 +64,9 @@ def head_pressure(st, floats, head):
 
 
 @njit
-def stored_pressures_barotropic(t, y, out, tables):
+def store_barotropic(t, y, dydt, out, handle):
     """Deviations [Pa] of given pressures, tanks and chambers."""
+    tables = open_tables(handle)
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     for i in range(nodes.size):
         node = nodes[i]
@@ -148,8 +150,9 @@ def ends_into_nodes(out, tables, slope, final):
 
 
 @njit
-def waves_inside(y, out, tables):
+def offer_barotropic(t, y, dydt, out, handle):
     """What the cells say of both waves at both ends of every pipe, into out[ends]."""
+    tables = open_tables(handle)
     st, layout, pipes, work = tables.settings[0], tables.layout[0], tables.pipes, tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
@@ -414,12 +417,13 @@ def finish_clusters(out, tables, space):
 
 
 @njit
-def close_nodes_barotropic(t, y, out, tables):
+def close_barotropic(t, y, dydt, out, handle):
     """Pressure deviation of every node, flow of every valve and both waves at every pipe end, by Newton.
 
     All clusters that are not done take a step, then all pipe ends are evaluated again. Each stops by itself, so that
     none depends on what is elsewhere; one that nothing reaches stays as it is.
     """
+    tables = open_tables(handle)
     space = node_space(tables)
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)

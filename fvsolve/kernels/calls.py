@@ -13,11 +13,10 @@ import numpy as np
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 
-# Jobs: rows of `calls`, each ended by a zero. CLOSE is what event functions want to have run before them; within the
-# right-hand side, CLUSTERS closes nodes that several valves join, and the others see to rigid columns.
-RHS, OBSERVE, RECORD, EVENTS, POWER, STORED, CLOSE, CLUSTERS, INFLOWS, HOLD, MOVE, BRAKE, JOBS = range(13)
+# Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
+RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, JOBS = range(8)
 RATES, READS, ENERGIES = "tvvvh", "tvvhv", "tvvvhv"  # arguments: times, vectors, handles
-ARGUMENTS = dict.fromkeys((RHS, CLOSE, CLUSTERS, INFLOWS, HOLD, MOVE, BRAKE), RATES)
+ARGUMENTS = dict.fromkeys((RHS, CLOSE), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 

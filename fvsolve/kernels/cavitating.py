@@ -1,4 +1,4 @@
-"""The right-hand side under the density law mixture in pipes, where cavities open and close. Knows the tables.
+"""Pipes under the density law mixture, where cavities open and close. Knows the tables; closes no node.
 
 m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, F the integral of A dp. Pressure and velocity are
 reconstructed from both sides of a face, the flux is that of the Riemann problem there (`riemann.py`), less the
@@ -7,16 +7,11 @@ profile's; so a front moves at its own speed, be it sound's in the liquid or a c
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic import wall_force
-from fvsolve.kernels.barotropic_nodes import stored_pressures_barotropic
-from fvsolve.kernels.calls import BRAKE, HOLD, INFLOWS, MOVE, run
-from fvsolve.kernels.cavitating_nodes import balance_junctions, close_nodes_cavitating
 from fvsolve.kernels.density import local_speed, pressure_of_mass, thrust
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_volume
-from fvsolve.kernels.network import clear_net, net_flows, quickest_node, stored_rates
 from fvsolve.kernels.reconstruction import value_muscl
-from fvsolve.kernels.records import OK, RATE, STATUS, UPWIND, WHERE
-from fvsolve.kernels.restrictions import open_scheduled
+from fvsolve.kernels.records import RATE, UPWIND
 from fvsolve.kernels.riemann import face_flux
 
 DRY = 1e-8  # of a pipe's content at the reference: what a cell holds below it gets no velocity of its own
@@ -132,37 +127,26 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 
 
 @njit
-def rhs_cavitating(t, y, dydt, out, handle):
-    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch.
-
-    An empty dydt asks for `out` alone, without what the pipes add to its rate.
-    """
+def offer_cavitating(t, y, dydt, out, handle):
+    """What the cells say of the states at both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     floats, profile, scratch = tables.floats, tables.profile, tables.scratch
-    out[STATUS], out[WHERE] = OK, -1.0
-    open_scheduled(t, out, tables)
     for i in range(pipes.size):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         end_states(st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch)
-    clear_net(out, tables)
-    stored_pressures_barotropic(t, y, out, tables)
-    run(INFLOWS, t, y, dydt, out, handle)
-    close_nodes_cavitating(t, y, out, tables)
-    run(HOLD, t, y, dydt, out, handle)
-    net_flows(out, tables)
-    balance_junctions(out, tables)
-    stored_rates(y, dydt, out, tables)
-    out[RATE] = quickest_node(out, tables)
-    run(BRAKE, t, y, dydt, out, handle)
-    if dydt.size == 0:
-        return
-    run(MOVE, t, y, dydt, out, handle)
-    for i in range(pipes.size):
+
+
+@njit
+def rates_cavitating(t, y, dydt, out, handle):
+    """d/dt of the waves in the cells of all pipes, where rates are asked for, and their greatest rate."""
+    tables = open_tables(handle)
+    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    for i in range(pipes.size if dydt.size > 0 else 0):
         n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
         own = pipe_rates_cavitating(
-            st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch,
-            dydt[o : o + n], dydt[o + n : o + 2 * n],
+            st, tables.floats, tables.profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4],
+            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
         )  # fmt: skip
         out[RATE] = max(out[RATE], own)
 

@@ -15,6 +15,7 @@ from fvsolve.kernels.barotropic_nodes import (
     step_clusters,
 )
 from fvsolve.kernels.density import pressure_of_mass
+from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixture import mixture_enthalpy, mixture_volume
 from fvsolve.kernels.records import JUNCTION
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
@@ -144,8 +145,9 @@ def unbind(tables, low, high, first):
 
 
 @njit
-def close_nodes_cavitating(t, y, out, tables):
-    """`close_nodes_barotropic` above the law's floor; a cluster is done when none of its pressures changes."""
+def close_cavitating(t, y, dydt, out, handle):
+    """`close_barotropic` above the law's floor; a cluster is done when none of its pressures changes."""
+    tables = open_tables(handle)
     space, n, work = node_space(tables), tables.nodes.size, tables.scratch
     pressure, last = tables.layout[0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
@@ -165,8 +167,9 @@ def close_nodes_cavitating(t, y, out, tables):
 
 
 @njit
-def balance_junctions(out, tables):
+def balance_junctions(t, y, dydt, out, handle):
     """What Newton has left at junctions goes to their pipe ends, by what these hold: rounding, but mass is kept."""
+    tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
     left, held, some = tables.scratch[: nodes.size], tables.scratch[nodes.size : 2 * nodes.size], False
     for i in range(nodes.size):

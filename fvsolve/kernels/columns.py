@@ -84,7 +84,7 @@ def column_rates(t, y, dydt, out, handle):
     """d/dt of the flow in rigid columns under the linear law."""
     tables = open_tables(handle)
     columns, pressure = tables.columns, tables.layout[0]["pressure"]
-    for k in range(columns.size):
+    for k in range(columns.size if dydt.size > 0 else 0):
         column = columns[k]
         change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]]
         dydt[column["y"]] = column_rate(t, y, tables, out, k, change)

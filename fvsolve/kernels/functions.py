@@ -4,11 +4,10 @@ import functools
 
 from fvsolve.jit import beside, njit
 from fvsolve.kernels import calls
-from fvsolve.kernels.rooms import Cast
+from fvsolve.kernels.phases import CLOSING, PHASES, Cast
 
 READERS = "from fvsolve.kernels.functions import Cast, compile_readers; "
 MARCH = "from fvsolve.steppers.march import compiled; compiled()"
-INSIDE = {getattr(calls, name.upper()): name for name in ("clusters", "inflows", "hold", "move", "brake")}
 
 
 class Functions:
@@ -18,13 +17,11 @@ class Functions:
     """
 
     def __init__(self, cast: Cast) -> None:
-        self.cast, rates = cast, cast.functions("before", "core", "after")
+        self.cast, rates = cast, cast.functions(*PHASES)
         self.calls = calls.empty_calls(len(rates) + 2)
         with beside(f"{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.one(calls.RHS, rates, calls.rhs_in_turn)
-        for job, name in INSIDE.items():
-            self.enter(job, cast.functions(name))
-        self.enter(calls.CLOSE, cast.functions("before", "core"))
+        self.enter(calls.CLOSE, cast.functions(*CLOSING))
         self.observe = self.one(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, cast.functions("record"))
         self.enter(calls.EVENTS, cast.functions("events"))

@@ -1,58 +1,39 @@
-"""The right-hand side of a scene under the linear density law. Knows the tables; solves no steps.
+"""What all links and nodes share in a scene's right-hand side, under every density law. Knows the tables; no law.
 
 out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s], net flow into nodes
 [kg/s], four wave values a pipe (r and l at `from`, r and l at `to`), valve flows, column flows].
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.calls import BRAKE, MOVE, run
-from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
-from fvsolve.kernels.nodes import close_nodes
-from fvsolve.kernels.pipes import family_of, pipe_rates
 from fvsolve.kernels.records import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, STATUS, TANK, WHERE
 from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
 
 
 @njit(forceinline=True)
-def clear_net(out, tables):
-    """Zero in out[net], to which links then add what they carry into their nodes."""
+def begin(out, tables):
+    """No fault, and nothing in out[net], to which links then add what they carry into their nodes."""
     net = tables.layout[0]["net"]
+    out[STATUS], out[WHERE] = OK, -1.0
     for i in range(tables.nodes.size):
         out[net + i] = 0.0
 
 
-@njit(forceinline=True)
-def waves_out(y, out, tables):
-    """Outgoing waves of all pipes into out[ends], and what they carry into their nodes into out[net]."""
-    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
-    scratch = tables.scratch
-    clear_net(out, tables)
-    for i in range(pipes.size):
-        pipe = pipes[i]
-        n, at = pipe["cells"], layout["ends"] + 4 * i
-        r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
-        family = family_of(settings, n)
-        degree, limiter, small = settings["degree"], settings["limiter"], pipe["noise"]
-        for right in range(2):
-            wave = end_value(r if right == 1 else l, right, family, degree, limiter, small, scratch)
-            out[at + 1 + right] = wave
-            node = pipe["to_node"] if right == 1 else pipe["from_node"]
-            out[layout["net"] + node] += 2.0 * wave
+@njit
+def open_network(t, y, dydt, out, handle):
+    """Begin, with the conductances of restrictions that follow schedules."""
+    tables = open_tables(handle)
+    begin(out, tables)
+    open_scheduled(t, out, tables)
 
 
-@njit(forceinline=True)
-def waves_in(out, tables):
-    """Waves that the nodes send back: incoming = Y p' - outgoing."""
-    layout, pipes = tables.layout[0], tables.pipes
-    for i in range(pipes.size):
-        pipe = pipes[i]
-        at = layout["ends"] + 4 * i
-        p_from = out[layout["pressure"] + pipe["from_node"]]
-        p_to = out[layout["pressure"] + pipe["to_node"]]
-        out[at] = pipe["admittance"] * p_from - out[at + 1]
-        out[at + 3] = pipe["admittance"] * p_to - out[at + 2]
+@njit
+def open_alone(t, y, dydt, out, handle):
+    """Begin a scene of basins that no link joins: nothing flows between nodes."""
+    tables = open_tables(handle)
+    begin(out, tables)
+    out[RATE] = tables.settings[0]["rate"]
 
 
 @njit(forceinline=True)
@@ -121,6 +102,15 @@ def quickest_node(out, tables):
 
 
 @njit
+def balance_network(t, y, dydt, out, handle):
+    """Net flows into nodes, rates of what these store, and their greatest rate into out[RATE]."""
+    tables = open_tables(handle)
+    net_flows(out, tables)
+    stored_rates(y, dydt, out, tables)
+    out[RATE] = quickest_node(out, tables)
+
+
+@njit
 def quickest_valve(t, y, dydt, out, handle):
     """Let steps see how quickly stored masses answer through valves."""
     tables = open_tables(handle)
@@ -154,38 +144,3 @@ def quickest_valve(t, y, dydt, out, handle):
                 if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
     out[RATE] = rate
-
-
-@njit
-def rhs_linear(t, y, dydt, out, handle):
-    """dydt = f(t, y) of the whole scene, and `out`; pure, but for scratch. An empty dydt asks for `out` alone."""
-    tables = open_tables(handle)
-    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
-    out[STATUS], out[WHERE] = OK, -1.0
-    open_scheduled(t, out, tables)
-    waves_out(y, out, tables)
-    close_nodes(t, y, dydt, out, handle)
-    waves_in(out, tables)
-    net_flows(out, tables)
-    stored_rates(y, dydt, out, tables)
-    out[RATE] = quickest_node(out, tables)
-    run(BRAKE, t, y, dydt, out, handle)
-    if dydt.size == 0:
-        return
-    run(MOVE, t, y, dydt, out, handle)
-    for i in range(pipes.size):
-        pipe = pipes[i]
-        n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
-        pipe_rates(
-            settings,
-            pipe,
-            y[o : o + n],
-            y[o + n : o + 2 * n],
-            out[at],
-            out[at + 1],
-            out[at + 2],
-            out[at + 3],
-            tables.scratch,
-            dydt[o : o + n],
-            dydt[o + n : o + 2 * n],
-        )

@@ -5,7 +5,6 @@ Y = area / speed. A node without storage makes these and the flows of its other 
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.calls import CLUSTERS, HOLD, INFLOWS, run
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import ALONE, CHAMBER, CLUSTER, FIXED, JUNCTION, TANK
 from fvsolve.kernels.restrictions import conductance
@@ -44,6 +43,14 @@ def junction_flows(t, out, tables):
             demand = schedule_value(tables, nodes[i]["schedule"], t)
             out[layout["supply"] + i] = -demand
             out[layout["net"] + i] += nodes[i]["inflow"] - (demand - nodes[i]["demand"])
+
+
+@njit
+def store_linear(t, y, dydt, out, handle):
+    """Pressure deviations of nodes that store or are given, and what flows into the others from outside."""
+    tables = open_tables(handle)
+    stored_pressures(t, y, out, tables)
+    junction_flows(t, out, tables)
 
 
 @njit(forceinline=True)
@@ -88,14 +95,9 @@ def close_single(out, tables):
             out[layout["pressure"] + j] = pj + zj * x
 
 
-@njit(forceinline=True)
-def close_nodes(t, y, dydt, out, handle):
-    """Pressure deviation of every node and flow of every valve, from out[net] and the stored masses."""
+@njit
+def close_linear(t, y, dydt, out, handle):
+    """Pressure deviations of nodes without storage and flows of valves, but for those that several valves join."""
     tables = open_tables(handle)
-    stored_pressures(t, y, out, tables)
-    junction_flows(t, out, tables)
-    run(INFLOWS, t, y, dydt, out, handle)
     close_alone(out, tables)
     close_single(out, tables)
-    run(CLUSTERS, t, y, dydt, out, handle)
-    run(HOLD, t, y, dydt, out, handle)

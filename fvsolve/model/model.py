@@ -167,7 +167,7 @@ class Model(Shown):
     def functions(self):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
         from fvsolve.kernels.functions import functions
-        from fvsolve.kernels.rooms import Cast
+        from fvsolve.kernels.phases import Cast
 
         kinds = tuple(int(kind) for kind in np.unique(self.tables.devices["kind"]))
         law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))

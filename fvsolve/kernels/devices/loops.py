@@ -21,7 +21,7 @@ TEMPLATE = Path(__file__).parent / "template.py"
 
 @functools.cache
 def loops_of(kind: int) -> ModuleType:
-    """The module of a kind's loops: `before`, `after`, `events`, `observe`, `record`, `power` and `stored`."""
+    """The module of a kind's loops: `prepare`, `move`, `events`, `observe`, `record`, `power` and `stored`."""
     path, source = written_folder() / f"kind_{kind}.py", text(kind)
     if not path.is_file() or path.read_text(encoding="utf-8") != source:
         fresh = Path(f"{path}.{os.getpid()}")

@@ -10,7 +10,7 @@ DEVICE = 3  # rows of `power` a device
 
 
 @njit
-def before(t, y, dydt, out, handle):
+def prepare(t, y, dydt, out, handle):
     """Before nodes are closed: conductances, speeds, pressures and stiffness that devices set, from (t, y) alone."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
@@ -20,7 +20,7 @@ def before(t, y, dydt, out, handle):
 
 
 @njit
-def after(t, y, dydt, out, handle):
+def move(t, y, dydt, out, handle):
     """d/dt of what devices hold, where dydt is asked for, and their greatest rates into out[RATE]."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):

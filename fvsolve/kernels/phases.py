@@ -1,0 +1,244 @@
+"""The one list: of which pieces the right-hand side of a scene consists, phase by phase. Knows names; knows no law.
+
+Every piece is a function of (t, y, dydt, out, handle) and may ask for what earlier phases have written. An empty dydt
+asks for `out` alone. A band of rows is a handle whose tables are parts of these: a piece sees no difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from importlib import import_module
+
+from fvsolve.kernels.devices.loops import loops_of
+from fvsolve.kernels.records import (
+    ACOUSTIC_GRID,
+    CARRIED_FACES,
+    CARRIED_GRID,
+    LIQUID_FACES,
+    LIQUID_GRID,
+    SHALLOW_FACES,
+    SHALLOW_GRID,
+    TABLE_FACES,
+    TABLE_GRID,
+)
+
+HOME = "fvsolve.kernels"
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """What one member of a scene adds: functions as `module: function`, "" for none; the phases first, in order."""
+
+    prepare: str = ""  # what (t, y) alone tell: conductances, speeds, pressures of vessels
+    offer: str = ""  # what pipes say of their ends
+    store: str = ""  # pressures that are stored or given, flows from outside
+    inflow: str = ""  # what rigid columns bring into nodes
+    close: str = ""  # pressures of the other nodes, flows of restrictions
+    hold: str = ""  # pressures of nodes that columns alone hold
+    answer: str = ""  # what nodes send back into pipes
+    balance: str = ""  # net flows into nodes, rates of what these store
+    brake: str = ""  # rates that steps have to see; so far nodes are closed, which events ask for
+    move: str = ""  # rates of what stands between nodes: columns, bodies, devices
+    rates: str = ""  # of cells, in pipes and basins
+    leave: str = ""  # values of scalars with which water leaves pipes and cells
+    mix: str = ""  # and their values at nodes
+    carry: str = ""  # rates of what is carried in cells
+    # and beside the right-hand side
+    observe: str = ""  # reads probes
+    record: str = ""  # notes an accepted state
+    events: str = ""  # event functions
+    power: str = ""
+    stored: str = ""
+
+
+JOBS = tuple(field.name for field in fields(Pieces))
+PHASES = JOBS[: JOBS.index("carry") + 1]
+CLOSING = PHASES[: PHASES.index("brake") + 1]
+
+BAROTROPIC = {"store": "barotropic_nodes: store_barotropic", "close": "barotropic_nodes: close_barotropic"}
+NODES = {  # and the network, by the family of the density law
+    "linear": Pieces(store="nodes: store_linear", close="nodes: close_linear"),
+    "barotropic": Pieces(**BAROTROPIC),
+    "cavitating": Pieces(**BAROTROPIC | {"close": "cavitating_nodes: close_cavitating"}),
+}
+NETWORK = Pieces(prepare="network: open_network", balance="network: balance_network")
+LUMPED = Pieces(prepare="lumped: open_lumped", close="nodes: close_linear", balance="network: balance_network")
+ALONE = Pieces(prepare="network: open_alone")
+PIPES = {
+    "linear": Pieces(offer="linear: offer_waves", answer="linear: answer_waves", rates="linear: rates_linear"),
+    "barotropic": Pieces(offer="barotropic_nodes: offer_barotropic", rates="barotropic: rates_barotropic"),
+    "cavitating": Pieces(
+        offer="cavitating: offer_cavitating", balance="cavitating_nodes: balance_junctions",
+        rates="cavitating: rates_cavitating", record="cavitating: record_cavities",
+    ),
+}  # fmt: skip
+READ = {
+    "linear": Pieces(observe="observer: observe_linear", power="energy: power_linear", stored="energy: stored_linear"),
+    "barotropic": Pieces(
+        observe="barotropic: observe_barotropic",
+        power="energy_barotropic: power_barotropic", stored="energy_barotropic: stored_barotropic",
+    ),
+}  # fmt: skip
+MEMORY = {"power": "unsteady.energy: add_power", "stored": "unsteady.energy: add_stored"}
+COLUMNS = {"inflow": "columns: column_inflows", "brake": "columns: quickest_column"}
+MEMBERS = {
+    "pipes": Pieces(record="observer: record_pipes"),
+    "valves": Pieces(brake="network: quickest_valve"),
+    "outlets": Pieces(events="outlets: outlet_events"),
+    "closed": Pieces(events="calls: close_in_turn"),
+    "clusters": Pieces(close="clusters: close_clusters"),
+    "columns": Pieces(hold="columns: hold_columns", move="columns: column_rates", **COLUMNS),
+    "columns, barotropic": Pieces(
+        hold="barotropic_columns: hold_columns_barotropic", move="barotropic_columns: column_rates_barotropic",
+        **COLUMNS,
+    ),
+    "bodies": Pieces(
+        prepare="mechanics: chambers", move="mechanics: finish_bodies", observe="mechanics: observe_bodies",
+        record="mechanics: record_bodies", events="mechanics: body_events",
+    ),
+    "basins": Pieces(
+        observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
+    ),
+    "patches": Pieces(
+        prepare="plane.patches: patch_pressures", rates="plane.patches: patch_flows",
+        record="plane.patches: record_patches",
+    ),
+    "inflows": Pieces(brake="plane.patches: quickest_inflow"),
+    "patches, barotropic": Pieces(observe="plane.observe: observe_dense_flows"),
+    "patches, table": Pieces(
+        prepare="plane.table_rooms: table_pressures", observe="plane.table_rooms: observe_pressures"
+    ),
+    "values": Pieces(leave="plane.carried: patch_values", observe="plane.carried: observe_values"),
+    "scalars": Pieces(leave="scalars: clear_losses", observe="scalars: observe_scalars"),
+    "mixed": Pieces(mix="scalars: mix_scalars"),
+    "carried": Pieces(leave="scalars: leave_pipes", carry="scalars: carry_in_pipes"),
+    "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
+    "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
+}  # fmt: skip
+GRIDS, MESHES = (SHALLOW_GRID, CARRIED_GRID), (SHALLOW_FACES, CARRIED_FACES)
+CARRIED = {  # scalars in basins: on grids, what fifth order adds there, and what spreads; on other meshes
+    "grids": Pieces(carry="plane.carried_grids: carry_on_grids"),
+    "fifth": Pieces(carry="plane.carried_grids: add_on_grids"),
+    "spread": Pieces(carry="plane.carried_grids: spread_on_grids"),
+    "meshes": Pieces(carry="plane.carried_faces: carry_on_meshes"),
+    "all": Pieces(carry="plane.carried: settle_amounts"),
+}  # fmt: skip
+BASINS = {  # kind of basin
+    SHALLOW_GRID: Pieces(rates="plane.rooms: shallow_grids"),
+    SHALLOW_FACES: Pieces(rates="plane.rooms: shallow_meshes"),
+    ACOUSTIC_GRID: Pieces(rates="plane.rooms: acoustic_grids"),
+    LIQUID_GRID: Pieces(rates="plane.rooms: liquid_grids"),
+    LIQUID_FACES: Pieces(rates="plane.rooms: liquid_meshes"),
+    TABLE_GRID: Pieces(rates="plane.table_rooms: table_grids"),
+    TABLE_FACES: Pieces(rates="plane.table_rooms: table_meshes"),
+    CARRIED_GRID: Pieces(observe="plane.carried: observe_given_flows"),
+    CARRIED_FACES: Pieces(observe="plane.carried: observe_given_flows"),
+}
+ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
+
+
+@dataclass(frozen=True)
+class Cast:
+    """What decides which functions a scene is made of.
+
+    law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are
+    fifth : order of what carries scalars on grids; spread : whether any scalar does
+    alone : whether there is nothing but basins, and no link; outlets : whether leaks, or demands that follow pressure
+    """
+
+    law: str
+    pipes: bool
+    cavities: bool = False
+    clusters: bool = False
+    columns: bool = False
+    bodies: bool = False
+    memory: bool = False
+    kinds: tuple[int, ...] = ()
+    basins: tuple[int, ...] = ()
+    scalars: bool = False
+    fifth: bool = False
+    spread: bool = False
+    valves: bool = False
+    alone: bool = False
+    outlets: bool = False
+
+    def members(self) -> Iterator[Pieces]:
+        """Of what it consists, in the order in which pieces of one phase run."""
+        linear = self.law == "linear"
+        family = "linear" if linear else "cavitating" if self.cavities and self.pipes else "barotropic"
+        yield from (ALONE,) if self.alone else (LUMPED,) if linear and not self.pipes else (NETWORK, NODES[family])
+        yield READ["linear" if linear else "barotropic"]
+        if self.pipes:
+            yield PIPES[family]
+        if self.valves:
+            yield MEMBERS["valves"]
+        if self.kinds or self.outlets:  # whose events are read off closed nodes
+            yield MEMBERS["closed"]
+        if self.outlets:
+            yield MEMBERS["outlets"]
+        if self.clusters and linear:
+            yield MEMBERS["clusters"]
+        if self.columns:
+            yield MEMBERS["columns" if linear else "columns, barotropic"]
+        if self.bodies:
+            yield MEMBERS["bodies"]
+        for kind in self.kinds:
+            loops = loops_of(kind)
+            yield Pieces(**{job: f"{loops.__name__}: {job}" for job in JOBS if hasattr(loops, job)})
+        if self.memory:
+            yield MEMBERS["memory" if linear else "memory, barotropic"]
+        yield from self.basin_members(linear)
+        if self.scalars:
+            yield from self.scalar_members()
+        if self.pipes:
+            yield MEMBERS["pipes"]
+        yield ALWAYS
+
+    @property
+    def flowing(self) -> bool:
+        """Whether there is a basin whose flow is not given."""
+        return any(kind not in (CARRIED_GRID, CARRIED_FACES) for kind in self.basins)
+
+    def basin_members(self, linear: bool) -> Iterator[Pieces]:
+        """Of what its basins consist."""
+        for kind in self.basins:
+            yield BASINS[kind]
+        if self.basins:
+            yield MEMBERS["basins"]
+        if self.basins and not linear:
+            yield MEMBERS["patches, barotropic"]
+        if self.flowing:
+            yield MEMBERS["patches"]
+        if self.flowing and self.valves:
+            yield MEMBERS["inflows"]
+        if self.flowing and self.law == "table":
+            yield MEMBERS["patches, table"]
+
+    def scalar_members(self) -> Iterator[Pieces]:
+        """Of what carries its scalars: by the flow that rates of waves now have."""
+        if self.basins:
+            yield MEMBERS["values"]
+        yield MEMBERS["scalars"]
+        if self.flowing or not self.alone:
+            yield MEMBERS["mixed"]
+        if self.pipes:
+            yield MEMBERS["carried"]
+        if any(kind in GRIDS for kind in self.basins):
+            yield CARRIED["grids"]
+            yield CARRIED["fifth"] if self.fifth else Pieces()
+            yield CARRIED["spread"] if self.spread else Pieces()
+        if any(kind in MESHES for kind in self.basins):
+            yield CARRIED["meshes"]
+        if self.basins:
+            yield CARRIED["all"]
+
+    def functions(self, *jobs: str) -> list:
+        """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""
+        return [found(name) for job in jobs for member in self.members() if (name := getattr(member, job))]
+
+
+def found(name: str):
+    """The function of a name."""
+    module, function = name.split(": ")
+    return getattr(import_module(module if module.startswith(HOME) else f"{HOME}.{module}"), function)
