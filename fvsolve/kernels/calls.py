@@ -15,17 +15,20 @@ from fvsolve.kernels.handle import open_tables
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, JOBS = range(8)
-RATES, READS, ENERGIES = "tvvvh", "tvvhv", "tvvvhv"  # arguments: times, vectors, handles
+RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
 ARGUMENTS = dict.fromkeys((RHS, CLOSE), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 def argument_types(letters: str) -> tuple:
-    """Numba's types of arguments that are times (t), vectors (v) and a handle (h)."""
+    """Numba's types of arguments: times (t), rows of numbers (v), handles (h); V and H as calls by address pass them."""
     from numba import types
 
+    from fvsolve.kernels.vectors import Vector
+
     kinds = {"t": types.float64, "v": types.float64[::1], "h": types.int64[::1]}
+    kinds |= {"V": Vector(types.float64), "H": Vector(types.int64)}
     return tuple(kinds[letter] for letter in letters)
 
 

@@ -20,9 +20,9 @@ class Functions:
         self.cast, rates = cast, cast.functions(*PHASES)
         self.calls = calls.empty_calls(len(rates) + 2)
         with beside(f"{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
-            self.rhs = self.one(calls.RHS, rates, calls.rhs_in_turn)
+            self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))
-        self.observe = self.one(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
+        self.observe = self.all(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, cast.functions("record"))
         self.enter(calls.EVENTS, cast.functions("events"))
         self.record, self.events = compile_readers(cast)
@@ -31,19 +31,17 @@ class Functions:
         """Note the addresses of a job's functions."""
         self.calls[job, : len(functions)] = calls.listed(functions, calls.ARGUMENTS[job])
 
-    def one(self, job: int, functions: list, in_turn):
-        """One function that calls all of a job: the only one itself."""
+    def all(self, job: int, functions: list, in_turn):
+        """The function that calls all of a job."""
         self.enter(job, functions)
-        if len(functions) == 1:
-            return functions[0]
-        calls.compile_as(in_turn, calls.ARGUMENTS[job])
+        calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
         return in_turn
 
     @functools.cached_property
     def energies(self) -> tuple:
         """(power, stored), each of (t, y, dydt, out, handle, rows)."""
         power, stored = self.cast.functions("power"), self.cast.functions("stored")
-        return self.one(calls.POWER, power, calls.power_in_turn), self.one(calls.STORED, stored, calls.stored_in_turn)
+        return self.all(calls.POWER, power, calls.power_in_turn), self.all(calls.STORED, stored, calls.stored_in_turn)
 
 
 functions = functools.cache(Functions)
@@ -53,7 +51,7 @@ def compile_readers(cast: Cast) -> tuple:
     """(record, events) of a scene, compiled with all that they call."""
     for function in cast.functions("observe", "record", "events"):
         calls.compile_as(function, calls.READS)
-    calls.compile_as(calls.record_in_turn, calls.READS)
+    calls.compile_as(calls.record_in_turn, calls.READS.lower())
     calls.compile_as(calls.events_in_turn, "tvhv")
     return calls.record_in_turn, calls.events_in_turn
 

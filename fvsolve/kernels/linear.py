@@ -40,11 +40,13 @@ def answer_waves(t, y, dydt, out, handle):
 
 
 @njit
-def rates_linear(t, y, dydt, out, handle):
+def wave_rates(t, y, dydt, out, handle):
     """d/dt of the waves in the cells of all pipes, where rates are asked for."""
     tables = open_tables(handle)
     settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
-    for i in range(pipes.size if dydt.size > 0 else 0):
+    if dydt.size == 0:
+        return
+    for i in range(pipes.size):
         pipe = pipes[i]
         n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
         pipe_rates(

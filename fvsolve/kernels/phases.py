@@ -66,7 +66,7 @@ NETWORK = Pieces(prepare="network: open_network", balance="network: balance_netw
 LUMPED = Pieces(prepare="lumped: open_lumped", close="nodes: close_linear", balance="network: balance_network")
 ALONE = Pieces(prepare="network: open_alone")
 PIPES = {
-    "linear": Pieces(offer="linear: offer_waves", answer="linear: answer_waves", rates="linear: rates_linear"),
+    "linear": Pieces(offer="linear: offer_waves", answer="linear: answer_waves", rates="linear: wave_rates"),
     "barotropic": Pieces(offer="barotropic_nodes: offer_barotropic", rates="barotropic: rates_barotropic"),
     "cavitating": Pieces(
         offer="cavitating: offer_cavitating", balance="cavitating_nodes: balance_junctions",

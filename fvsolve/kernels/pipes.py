@@ -166,7 +166,7 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
     dl[n - 1] = k * (l_in - l[n - 1]) + (half * (abs(m) * m) - base)
 
 
-@njit
+@njit(forceinline=True)
 def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
     """d/dt of both waves of one pipe from its cells and the four wave values at its ends."""
     n = r.size
