@@ -22,7 +22,7 @@ COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 def argument_types(letters: str) -> tuple:
-    """Numba's types of arguments: times (t), rows of numbers (v), handles (h); V and H as calls by address pass them."""
+    """Numba's types of times (t), rows of numbers (v) and handles (h); of V and H as calls by address pass these."""
     from numba import types
 
     from fvsolve.kernels.vectors import Vector
