@@ -1,7 +1,8 @@
 """Calls of compiled functions by their addresses, so that each is compiled once and a scene is a list of them.
 
 Numba compiles whatever a function calls into it again; an address ends that. All pieces of a job take the same
-arguments: `t, y, dydt, out, handle` and, where they read a state, the vector that they fill. What they raise is lost.
+arguments: `t, y, dydt, out, handle` and, where they read a state, the vector that they fill. The law of a device is
+functions named as `HOOKS`, each taking its own. What they raise is lost.
 """
 
 from __future__ import annotations
@@ -12,12 +13,26 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import table_types
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, JOBS = range(8)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
 ARGUMENTS = dict.fromkeys((RHS, CLOSE), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
+HOOKS = {  # of the law of a device: arguments, and what it returns
+    "set": (
+        "tVVTD",
+        "",
+    ),  # t, y, out, tables, device: conductances, speeds, pressures of vessels, by (t, y) and flags
+    "move": ("tVVVTD", ""),  # t, y, dydt, out, tables, device: rates of what it holds where dydt.size > 0; out[RATE]
+    "events": ("tVVTDV", ""),  # t, y, out, tables, device, g: its event functions, from closed nodes
+    "value": ("tVVTDi", "t"),  # t, y, out, tables, device, which: its quantity of that number
+    "outside": ("VTD", "i"),  # out, tables, device: 1 where its law is not to be trusted, or PASSING
+    "power": ("tVVVTD", "ttt"),  # t, y, dydt, out, tables, device: supplied, rate of what it stores, dissipated [W]
+    "stored": ("VTD", "t"),  # y, tables, device: what it stores, since the profile [J]
+    "lead": ("tVTDtttb", "tt"),  # t, y, tables, device, p' before, p' behind, drop, ahead: as `kernels.led` asks
+}
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
@@ -25,10 +40,12 @@ def argument_types(letters: str) -> tuple:
     """Numba's types of times (t), rows of numbers (v) and handles (h); of V and H as calls by address pass these."""
     from numba import types
 
+    from fvsolve.kernels.handle import Tables
     from fvsolve.kernels.vectors import Vector
 
     kinds = {"t": types.float64, "v": types.float64[::1], "h": types.int64[::1]}
-    kinds |= {"V": Vector(types.float64), "H": Vector(types.int64)}
+    kinds |= {"V": Vector(types.float64), "H": Vector(types.int64), "i": types.int64, "b": types.boolean}
+    kinds |= {"T": Tables(), "D": table_types().devices.dtype}
     return tuple(kinds[letter] for letter in letters)
 
 
@@ -39,56 +56,103 @@ def compile_as(function, letters: str) -> None:
         function.disable_compile()
 
 
-def listed(functions: list, letters: str) -> list:
-    """The functions, compiled, as a row of `calls` holds them: addresses, or themselves where JIT is off."""
-    for function in functions:
-        compile_as(function, letters)
-    return [address_of(function) if COMPILING else function for function in functions]
+def addressed(function, letters: str):
+    """A function, compiled, as tables hold it: its address, or itself where JIT is off.
 
-
-def address_of(function) -> int:
-    """Where the machine code of a function of one signature lies; it stays there as long as the function does."""
-    (compiled,) = function.overloads.values()
+    Its machine code stays there as long as the function does.
+    """
+    if not COMPILING:
+        return function
+    compile_as(function.within, letters)
+    (compiled,) = function.within.overloads.values()
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
-def empty_calls(longest: int) -> np.ndarray:
-    """Room for rows of so many functions."""
-    return np.zeros((JOBS, longest + 1), dtype=np.int64 if COMPILING else object)
+def empty_calls(rows: int, columns: int) -> np.ndarray:
+    """Room for addresses."""
+    return np.zeros((rows, columns), dtype=np.int64 if COMPILING else object)
 
 
 if COMPILING:
     from numba.core import types
     from numba.extending import intrinsic
 
-    def called(context, builder, kind, args):
-        """Machine code of a call whose first argument is the address."""
-        shape = context.call_conv.get_function_type(types.none, kind.args[1:])
-        pointer = builder.inttoptr(args[0], shape.as_pointer())
-        context.call_conv.call_function(builder, pointer, types.none, kind.args[1:], args[1:])
-        return context.get_dummy_value()
+    def call(letters: str, returned: str = ""):
+        """(signature, generator) of a call whose first argument is the address."""
+        kinds = argument_types(letters)
+        found = argument_types(returned)
+        result = types.none if not found else found[0] if len(found) == 1 else types.Tuple(found)
+
+        def generate(context, builder, kind, args):
+            shape = context.call_conv.get_function_type(result, kinds)
+            pointer = builder.inttoptr(args[0], shape.as_pointer())
+            _, value = context.call_conv.call_function(builder, pointer, result, kinds, args[1:])
+            return value if found else context.get_dummy_value()
+
+        return result(types.int64, *kinds), generate
 
     @intrinsic
     def call_rates(typingctx, address, t, y, dydt, out, handle):
         """Call the function at an address."""
-        return types.none(types.int64, *argument_types(RATES)), called
+        return call(RATES)
 
     @intrinsic
     def call_reader(typingctx, address, t, y, out, handle, values):
         """Call the function at an address."""
-        return types.none(types.int64, *argument_types(READS)), called
+        return call(READS)
 
     @intrinsic
     def call_energies(typingctx, address, t, y, dydt, out, handle, rows):
         """Call the function at an address."""
-        return types.none(types.int64, *argument_types(ENERGIES)), called
+        return call(ENERGIES)
+
+    @intrinsic
+    def call_set(typingctx, address, t, y, out, tables, device):
+        """Call the hook at an address."""
+        return call(*HOOKS["set"])
+
+    @intrinsic
+    def call_move(typingctx, address, t, y, dydt, out, tables, device):
+        """Call the hook at an address."""
+        return call(*HOOKS["move"])
+
+    @intrinsic
+    def call_events(typingctx, address, t, y, out, tables, device, g):
+        """Call the hook at an address."""
+        return call(*HOOKS["events"])
+
+    @intrinsic
+    def call_value(typingctx, address, t, y, out, tables, device, which):
+        """Call the hook at an address."""
+        return call(*HOOKS["value"])
+
+    @intrinsic
+    def call_outside(typingctx, address, out, tables, device):
+        """Call the hook at an address."""
+        return call(*HOOKS["outside"])
+
+    @intrinsic
+    def call_power(typingctx, address, t, y, dydt, out, tables, device):
+        """Call the hook at an address."""
+        return call(*HOOKS["power"])
+
+    @intrinsic
+    def call_stored(typingctx, address, y, tables, device):
+        """Call the hook at an address."""
+        return call(*HOOKS["stored"])
+
+    @intrinsic
+    def call_lead(typingctx, address, t, y, tables, device, before, behind, drop, ahead):
+        """Call the hook at an address."""
+        return call(*HOOKS["lead"])
 else:
 
     def call_rates(function, *arguments):
         """Call a function."""
-        function(*arguments)
+        return function(*arguments)
 
     call_reader = call_energies = call_rates
+    call_set = call_move = call_events = call_value = call_outside = call_power = call_stored = call_lead = call_rates
 
 
 @njit(forceinline=True)

@@ -234,3 +234,11 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
         stored[at] = size * change * (column["flow"] + 0.5 * change)
         at += 1
     stored_bodies(y, tables, stored, at)
+
+
+@njit
+def vessel_power(dydt, out, tables, device):
+    """Rate of what a vessel stores [W]: what a mass brings, P / rho or h(p) - h(p_ambient) + g z, times its flow."""
+    i, nodes = device["node"], tables.nodes
+    p = nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i]
+    return head_at(tables.settings[0], tables.floats, nodes[i], p) * dydt[nodes[i]["y"]]

@@ -7,29 +7,42 @@ from fvsolve.kernels import calls
 from fvsolve.kernels.phases import CLOSING, PHASES, Cast
 
 READERS = "from fvsolve.kernels.functions import Cast, compile_readers; "
+HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
+READING, ENERGIES = ("value", "outside", "events"), ("power", "stored")
 MARCH = "from fvsolve.steppers.march import compiled; compiled()"
 
 
 class Functions:
     """Compiled functions of a scene: `rhs`, `observe`, `record`, `events`, and `energies` once they are asked for.
 
-    calls : int64[jobs, n]  addresses of what they call, which the handle of a model must hold
+    calls : int64[jobs, n]  addresses of pieces; hooks : int64[laws, hooks]  of functions of devices' laws; both stand
+    behind the handle of a model
     """
 
     def __init__(self, cast: Cast) -> None:
         self.cast, rates = cast, cast.functions(*PHASES)
-        self.calls = calls.empty_calls(len(rates) + 2)
+        self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
+        self.hooks = calls.empty_calls(len(cast.devices), len(calls.HOOKS))
         with beside(f"{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
+            self.hang("set", "move", *["lead"] * cast.columns)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))
         self.observe = self.all(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, cast.functions("record"))
         self.enter(calls.EVENTS, cast.functions("events"))
+        self.hang(*READING)
         self.record, self.events = compile_readers(cast)
 
     def enter(self, job: int, functions: list) -> None:
         """Note the addresses of a job's functions."""
-        self.calls[job, : len(functions)] = calls.listed(functions, calls.ARGUMENTS[job])
+        self.calls[job, : len(functions)] = [calls.addressed(one, calls.ARGUMENTS[job]) for one in functions]
+
+    def hang(self, *hooks: str) -> None:
+        """Note the addresses of these hooks of all laws."""
+        for row, law in zip(self.hooks, self.cast.laws(), strict=True):
+            for hook in hooks:
+                if (function := getattr(law, hook, None)) is not None:
+                    row[HOOK[hook]] = calls.addressed(function, calls.HOOKS[hook][0])
 
     def all(self, job: int, functions: list, in_turn):
         """The function that calls all of a job."""
@@ -40,6 +53,7 @@ class Functions:
     @functools.cached_property
     def energies(self) -> tuple:
         """(power, stored), each of (t, y, dydt, out, handle, rows)."""
+        self.hang(*ENERGIES)
         power, stored = self.cast.functions("power"), self.cast.functions("stored")
         return self.all(calls.POWER, power, calls.power_in_turn), self.all(calls.STORED, stored, calls.stored_in_turn)
 
@@ -50,7 +64,11 @@ functions = functools.cache(Functions)
 def compile_readers(cast: Cast) -> tuple:
     """(record, events) of a scene, compiled with all that they call."""
     for function in cast.functions("observe", "record", "events"):
-        calls.compile_as(function, calls.READS)
+        calls.addressed(function, calls.READS)
+    for law in cast.laws():
+        for hook in READING:
+            if (function := getattr(law, hook, None)) is not None:
+                calls.addressed(function, calls.HOOKS[hook][0])
     calls.compile_as(calls.record_in_turn, calls.READS.lower())
     calls.compile_as(calls.events_in_turn, "tvhv")
     return calls.record_in_turn, calls.events_in_turn

@@ -14,10 +14,9 @@ grown, dP is what drives both,
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.codes import CHECK_DISC, REDUCING
-from fvsolve.kernels.devices.disc import disc_speed
-from fvsolve.kernels.devices.lead import is_disc, leads
-from fvsolve.kernels.devices.regulator import stem_speed
+from fvsolve.kernels.calls import call_lead
+from fvsolve.kernels.devices.lead import leads
+from fvsolve.kernels.devices.loops import LEAD
 from fvsolve.kernels.restrictions import conductance, conductance_at
 from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, pressure_at
 
@@ -88,22 +87,6 @@ def standing_pressure(y, tables, out, k, end, solved):
 
 
 @njit
-def lift_speed(t, y, tables, device, before, behind, drop):
-    """dx/dt of what leads a column, at p' before it and behind it and a drop, and d(dx/dt) / d(what it feels)."""
-    if is_disc(device):
-        return disc_speed(y, tables, device, before, drop)
-    return stem_speed(t, tables, device, before, behind)
-
-
-@njit
-def feels(device, ahead):
-    """Whether what lifts it rises with the drop across it; ahead: its column lies before it."""
-    if device["kind"] == CHECK_DISC:
-        return True
-    return not ahead if device["kind"] == REDUCING else ahead
-
-
-@njit
 def lift_drop(drop, still, slope, heavy):
     """(drop across what leads its column, dx/dt), by Newton on its root r: r2 + heavy r dx/dt(r2) = drop.
 
@@ -138,8 +121,7 @@ def led_by_lift(t, y, tables, out, k, which, standing, inertia, other, drop):
     device, heavy = tables.devices[valve["device"]], inertia * sqrt(valve["conductance"])
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
     before, behind = (standing, other) if ahead else (other, standing)
-    still, slope = lift_speed(t, y, tables, device, before, behind, drop)
-    slope = slope if feels(device, ahead) else 0.0
+    still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
     driving, speed = lift_drop(drop, still, slope, heavy)
     if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables.settings[0]["step"] == 0.0:
         return driving, speed

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from importlib import import_module
 
-from fvsolve.kernels.devices.loops import loops_of
 from fvsolve.kernels.records import (
     ACOUSTIC_GRID,
     CARRIED_FACES,
@@ -97,6 +96,12 @@ MEMBERS = {
         prepare="mechanics: chambers", move="mechanics: finish_bodies", observe="mechanics: observe_bodies",
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
+    "devices": Pieces(
+        prepare="devices.loops: set_devices", move="devices.loops: move_devices",
+        observe="devices.loops: observe_devices", record="devices.loops: record_devices",
+        events="devices.loops: device_events",
+        power="devices.loops: power_devices", stored="devices.loops: stored_devices",
+    ),
     "basins": Pieces(
         observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
     ),
@@ -142,7 +147,8 @@ ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
 class Cast:
     """What decides which functions a scene is made of.
 
-    law : of the fluid; cavities : whether it knows them; kinds, basins : codes of the kinds that there are
+    law : of the fluid; cavities : whether it knows them; devices : modules of their laws, as rows of `hooks` lie
+    basins : codes of the kinds that there are
     fifth : order of what carries scalars on grids; spread : whether any scalar does
     alone : whether there is nothing but basins, and no link; outlets : whether leaks, or demands that follow pressure
     """
@@ -154,7 +160,7 @@ class Cast:
     columns: bool = False
     bodies: bool = False
     memory: bool = False
-    kinds: tuple[int, ...] = ()
+    devices: tuple[str, ...] = ()
     basins: tuple[int, ...] = ()
     scalars: bool = False
     fifth: bool = False
@@ -173,7 +179,7 @@ class Cast:
             yield PIPES[family]
         if self.valves:
             yield MEMBERS["valves"]
-        if self.kinds or self.outlets:  # whose events are read off closed nodes
+        if self.devices or self.outlets:  # whose events are read off closed nodes
             yield MEMBERS["closed"]
         if self.outlets:
             yield MEMBERS["outlets"]
@@ -183,9 +189,8 @@ class Cast:
             yield MEMBERS["columns" if linear else "columns, barotropic"]
         if self.bodies:
             yield MEMBERS["bodies"]
-        for kind in self.kinds:
-            loops = loops_of(kind)
-            yield Pieces(**{job: f"{loops.__name__}: {job}" for job in JOBS if hasattr(loops, job)})
+        if self.devices:
+            yield MEMBERS["devices"]
         if self.memory:
             yield MEMBERS["memory" if linear else "memory, barotropic"]
         yield from self.basin_members(linear)
@@ -232,6 +237,10 @@ class Cast:
             yield CARRIED["meshes"]
         if self.basins:
             yield CARRIED["all"]
+
+    def laws(self) -> list:
+        """The modules of the laws of its devices."""
+        return [import_module(name) for name in self.devices]
 
     def functions(self, *jobs: str) -> list:
         """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""

@@ -254,7 +254,8 @@ PISTON = np.dtype(
 
 DEVICE = np.dtype(
     [
-        ("kind", "i8"),  # which law of kernels.devices
+        ("hooks", "i8"),  # row of `hooks`: the functions of its law
+        ("mode", "i8"),  # what its law knows it as, of several kinds that share one
         ("y", "i8"),  # offset of its own states; -1 for none
         ("states", "i8"),
         ("valve", "i8"),  # the restriction that it opens and shuts; -1 for none
@@ -263,6 +264,8 @@ DEVICE = np.dtype(
         ("data", "i8"),  # offset of its numbers in `floats`
         ("schedule", "i8"),  # -1 for none
         ("row", "i8"),  # of the vessel that it fills: its number among all whose stiffness changes; -1 for none
+        ("sudden", "i8"),  # 1 where events alone open it
+        ("leads", "i8"),  # flag in `armed` that it leads the rigid column which it alone holds; -1 where it never does
     ],
     align=True,
 )
@@ -428,7 +431,8 @@ RECORDS = {
 ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare", "plane")  # int64[:], then float64[:]
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
 Tables = namedtuple("Tables", (*RECORDS, *ARRAYS, *MATRICES))
-Called = namedtuple("Called", (*Tables._fields, "calls"))  # with addresses of functions, int64[:, :]: behind a handle
+# behind a handle, with addresses of functions, int64[:, :]: of pieces, a row a job, and of devices, a row a law
+Called = namedtuple("Called", (*Tables._fields, "calls", "hooks"))
 
 
 @functools.cache
@@ -439,4 +443,5 @@ def table_types() -> Called:
     records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
     flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
     matrices = [types.Array(types.float64, 2, "C") for _ in MATRICES]
-    return Called(*records, *flats, *matrices, types.Array(types.int64, 2, "C"))
+    addresses = types.Array(types.int64, 2, "C")
+    return Called(*records, *flats, *matrices, addresses, addresses)

@@ -10,7 +10,6 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.clusters import solve_dense
-from fvsolve.kernels.devices.codes import CHECK_VALVE
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.records import JUNCTION, NO_SOLUTION, STATUS, WHERE
 from fvsolve.kernels.restrictions import conductance
@@ -29,7 +28,7 @@ def holds_shut(tables, out, k):
     if conductance(tables, out, k) > 0.0:
         return False
     device = tables.valves[k]["device"]
-    return is_vessel(tables, k) or (device >= 0 and tables.devices[device]["kind"] == CHECK_VALVE)
+    return device >= 0 and tables.devices[device]["sudden"] == 1
 
 
 @njit

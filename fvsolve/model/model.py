@@ -168,17 +168,18 @@ class Model(Shown):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.phases import Cast
+        from fvsolve.model.devices.device import laws_of
 
-        kinds = tuple(int(kind) for kind in np.unique(self.tables.devices["kind"]))
+        devices = laws_of(self.devices)
         law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))
         there = [many.clusters, many.columns, many.bodies]
         basins = tuple(int(kind) for kind in np.unique(self.tables.basins["kind"]))
         spread, valves = bool(self.tables.scalars["diffusivity"].any()), many.valves
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
-        alone = bool(basins and patches) and not (self.cells or valves or kinds or any(there))
+        alone = bool(basins and patches) and not (self.cells or valves or devices or any(there))
         outlets = bool((self.tables.valves["law"] == rec.POWER).any())
         fifth = SCHEMES[self.case.numerics.scheme].on(True).order > 2
-        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, kinds, basins, many.scalars, fifth,
+        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, devices, basins, many.scalars, fifth,
                     spread, valves, alone, outlets)  # fmt: skip
         return functions(cast)
 
@@ -192,7 +193,7 @@ class Model(Shown):
         """The tables, and what there is to call, as compiled functions take them."""
         from fvsolve.kernels.handle import make_handle
 
-        return make_handle((*self.tables, self.functions.calls))
+        return make_handle((*self.tables, self.functions.calls, self.functions.hooks))
 
     @cached_property
     def structure(self):

@@ -9,6 +9,8 @@ from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density, log_density, pressure_of_log
+from fvsolve.kernels.energy import lift
+from fvsolve.kernels.energy_barotropic import vessel_energy, vessel_power
 from fvsolve.kernels.records import LAW_LINEAR
 
 EXPONENT, GAS, ROOM, NECK, EMPTY, SHED = 0, 1, 2, 3, 4, 5  # numbers of an accumulator
@@ -73,7 +75,7 @@ def gas_and_pressure_dense(st, floats, node, at, y):
 
 
 @njit
-def set_accumulator(y, out, tables, device):
+def set(t, y, out, tables, device):
     """Its pressure and stiffness."""
     i, layout = device["node"], tables.layout[0]
     node = tables.nodes[i]
@@ -84,14 +86,14 @@ def set_accumulator(y, out, tables, device):
 
 
 @njit
-def accumulator_events(y, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g: fluid left until the bladder or vessel is empty [kg], and the same negative."""
     left = y[tables.nodes[device["node"]]["y"]] - tables.floats[device["data"] + EMPTY]
     g[device["event"]], g[device["event"] + 1] = left, -left
 
 
 @njit
-def accumulator_value(y, tables, device, which):
+def value(t, y, out, tables, device, which):
     """Gas volume [m3], gas pressure [Pa]."""
     node = tables.nodes[device["node"]]
     st, floats = tables.settings[0], tables.floats
@@ -100,3 +102,43 @@ def accumulator_value(y, tables, device, which):
     if floats[at + NECK] > 0.0 and came < floats[at + EMPTY]:  # the bladder stands in its neck, and holds its precharge
         change = floats[at + SHED]
     return node["pressure"] + change if which == 1 else floats[at + GAS] * exp(u)
+
+
+@njit
+def gas_energy(p, gas, n, ambient, u):
+    """Minus the integral of (p - ambient) dV from `gas` at p to exp(u) times as much, p V^n constant [J]."""
+    work = -p * gas * u if n == 1.0 else p * gas * expm1((1.0 - n) * u) / (n - 1.0)
+    return work + ambient * gas * expm1(u)
+
+
+@njit
+def accumulator_energy(st, floats, node, at, y):
+    """What it stores once y [kg] came in, over the profile [J]."""
+    n, gas, empty, p0 = floats[at + EXPONENT], floats[at + GAS], floats[at + EMPTY], node["pressure"]
+    neck = floats[at + NECK] if st["law"] == LAW_LINEAR else 0.0
+    first = p0 + floats[at + SHED] if floats[at + NECK] > 0.0 and empty > 0.0 else p0
+    u, change, _ = gas_and_pressure(st, floats, node, at, y)
+    found = gas_energy(first, gas, n, st["ambient"], u)
+    if st["law"] != LAW_LINEAR:
+        room = floats[at + ROOM]
+        found += vessel_energy(st, floats, node, node["mass"] + y, room - gas * exp(u), p0 + change)
+        return found - vessel_energy(st, floats, node, node["mass"], room - gas, p0)
+    came, p = min(y, empty), p0
+    if empty <= 0.0:
+        came, p = min(y - empty, 0.0), p0 + floats[at + SHED]
+    if neck > 0.0:
+        found += came * (p - st["ambient"] + 0.5 * neck * came) / st["rho"]
+    return found + lift(st, node) * y / st["rho"]
+
+
+@njit
+def stored(y, tables, device):
+    """What it stores, change since the profile [J]."""
+    node = tables.nodes[device["node"]]
+    return accumulator_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]])
+
+
+@njit
+def power(t, y, dydt, out, tables, device):
+    """(0, rate of what it stores, 0) [W]."""
+    return 0.0, vessel_power(dydt, out, tables, device), 0.0

@@ -10,6 +10,7 @@ from math import expm1, log1p, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.energy_barotropic import vessel_power
 from fvsolve.kernels.records import LAW_LINEAR, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
@@ -61,7 +62,7 @@ def air_inflow(st, floats, at, gauge):
 
 
 @njit
-def set_air_valve(y, out, tables, device):
+def set(t, y, out, tables, device):
     """Pressure and stiffness of its chamber, and whether fluid passes."""
     st, floats, layout, i = tables.settings[0], tables.floats, tables.layout[0], device["node"]
     node, k = tables.nodes[i], device["valve"]
@@ -91,7 +92,7 @@ def air_rate(y, tables, device):
 
 
 @njit
-def move_air_valve(y, dydt, out, tables, device):
+def move(t, y, dydt, out, tables, device):
     """d/dt of the air in its chamber."""
     flow, quick, _ = air_rate(y, tables, device)
     out[RATE] = max(out[RATE], quick, fluid_rate(out, tables, device))
@@ -116,7 +117,7 @@ def fluid_rate(out, tables, device):
 
 
 @njit
-def air_valve_events(y, out, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g: what is left until it opens [Pa], until it shuts, negative [kg]; and the same with the other sign."""
     st, floats, at = tables.settings[0], tables.floats, device["event"]
     node, place = tables.nodes[device["node"]], tables.valves[device["valve"]]["from_node"]
@@ -133,9 +134,31 @@ def air_valve_events(y, out, tables, device, g):
 
 
 @njit
-def air_valve_value(y, tables, device, which):
+def value(t, y, out, tables, device, which):
     """Volume [m3], mass [kg] and pressure [Pa] of the air in its chamber."""
     st, floats = tables.settings[0], tables.floats
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, device["data"], y[node["y"]], y[device["y"]])
     return volume if which == 0 else mass if which == 1 else st["ambient"] + gauge
+
+
+@njit
+def air_energy(st, floats, node, at, y_fluid, y_air):
+    """m R T (ln(p / p_ambient) - 1) + p_ambient V of the air, and the height of the fluid [J]; 0 in the profile."""
+    gauge, volume, mass = air_state(st, floats, node, at, y_fluid, y_air)
+    found = mass * floats[at + HEAT] * log1p(gauge / st["ambient"]) - gauge * volume
+    return found + st["gravity"] * (node["elevation"] - st["datum"]) * y_fluid
+
+
+@njit
+def stored(y, tables, device):
+    """What it stores, change since the profile [J]."""
+    node = tables.nodes[device["node"]]
+    return air_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]], y[device["y"]])
+
+
+@njit
+def power(t, y, dydt, out, tables, device):
+    """(0, rate of what it stores, what the air loses on its way through the orifice) [W]."""
+    potential = air_rate(y, tables, device)[2] * dydt[device["y"]]
+    return 0.0, vessel_power(dydt, out, tables, device) + potential, -potential

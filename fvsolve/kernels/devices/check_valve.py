@@ -13,7 +13,7 @@ RELUCTANCE = 1.0  # drop beyond the cracking pressure below which it stays shut:
 
 
 @njit
-def set_check_valve(out, tables, device):
+def set(t, y, out, tables, device):
     """Its conductance: whole, or none."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
@@ -27,7 +27,7 @@ def leads_on(tables, device):
 
 
 @njit
-def check_valve_events(out, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g: flow that is left while open [kg/s], drop beyond what opens it while shut [Pa]; and the same negative."""
     k, at = device["valve"], device["event"]
     left = out[tables.layout[0]["valve"] + k]
@@ -39,6 +39,6 @@ def check_valve_events(out, tables, device, g):
 
 
 @njit
-def check_valve_value(out, tables, device):
+def value(t, y, out, tables, device, which):
     """1 while it is open, 0 while it is shut."""
     return 1.0 if out[tables.layout[0]["conductance"] + device["valve"]] > 0.0 else 0.0

@@ -10,13 +10,13 @@ Where it alone holds a rigid column, it leads that from its seat (armed[event + 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.codes import RELIEF_DISC
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
 from fvsolve.kernels.devices.lead import lead_events, leads
 from fvsolve.kernels.records import CLOSING, RATE
 from fvsolve.kernels.restrictions import head_drop
 
+RELIEF, CHECK = 0, 1  # modes
 LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6  # numbers: three of the start, then its keys
 AT_REST = 1e-10  # share of its span that does not lift it off a stop: rounding must not
 SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
@@ -31,7 +31,7 @@ def disc_lift(y, tables, device):
 
 
 @njit
-def set_disc(y, out, tables, device):
+def set(t, y, out, tables, device):
     """Its conductance G x^2."""
     k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
@@ -49,19 +49,21 @@ def disc_drive(y, out, tables, device):
 def disc_push(y, tables, device, before, drop):
     """target - x, at p' before it and a drop across it."""
     floats, data = tables.floats, device["data"]
-    felt = before if device["kind"] == RELIEF_DISC else drop - floats[data + FELT]
+    felt = before if device["mode"] == RELIEF else drop - floats[data + FELT]
     return (floats[data + TARGET] - floats[data + LIFT]) + felt / floats[data + SPAN] - y[device["y"]]
 
 
 @njit
-def disc_speed(y, tables, device, before, drop):
-    """dx/dt at p' before it and a drop across it, and d(dx/dt) / d(what it feels)."""
+def lead(t, y, tables, device, before, behind, drop, ahead):
+    """dx/dt at p' before it and a drop across it, and what of it rises with the drop [1/Pa/s]."""
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at] > 0.0 or armed[at + 2] > 0.0:
         return 0.0, 0.0
     if device["states"] == 2:
         return y[device["y"] + 1], 0.0
-    return disc_push(y, tables, device, before, drop) / floats[data + TIME], disc_slope(tables, device)
+    felt = device["mode"] == CHECK or ahead
+    slope = disc_slope(tables, device) if felt else 0.0
+    return disc_push(y, tables, device, before, drop) / floats[data + TIME], slope
 
 
 @njit
@@ -72,7 +74,7 @@ def disc_slope(tables, device):
 
 
 @njit
-def move_disc(y, dydt, out, tables, device):
+def move(t, y, dydt, out, tables, device):
     """Rates of its lift and of its speed, none against a stop; its greatest rate.
 
     And -x'/x where it closes on a column into out[CLOSING]: one that flows back slams it, x ~ (time left)^(1/3), which
@@ -104,15 +106,15 @@ def disc_loop(y, out, tables, device, own):
     if leads(tables, k):
         return own
     rate = own + loop_rate(out, tables, k, before, speed)
-    if device["kind"] != RELIEF_DISC:
+    if device["mode"] != RELIEF:
         rate += loop_rate(out, tables, k, behind, speed)
-    if nodes[before]["gates"] >= 0 or (nodes[behind]["gates"] >= 0 and device["kind"] != RELIEF_DISC):
+    if nodes[before]["gates"] >= 0 or (nodes[behind]["gates"] >= 0 and device["mode"] != RELIEF):
         rate += 2.0 * speed * abs(head_drop(tables, out, k)[1]) / max(disc_lift(y, tables, device), 1e-300)
     return rate if device["states"] == 1 else sqrt(own * rate)
 
 
 @njit
-def disc_events(y, out, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g: way to its stop, to its seat, to where it leads no column any more; each both ways."""
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
@@ -133,6 +135,6 @@ def disc_events(y, out, tables, device, g):
 
 
 @njit
-def disc_value(y, tables, device):
+def value(t, y, out, tables, device, which):
     """Its lift, 0 to 1."""
     return min(max(disc_lift(y, tables, device), 0.0), 1.0)

@@ -7,29 +7,10 @@ a given step resolves what the two exchange: `kernels.led`. A disc that goes to 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.codes import CHECK_DISC, REDUCING, RELIEF_DISC, SUSTAINING
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.restrictions import head_drop
 
 LEADS = 1e-4  # lift up to which it leads its column, at least
-
-
-@njit
-def is_disc(device):
-    """Whether it is a disc on a spring."""
-    return device["kind"] == CHECK_DISC or device["kind"] == RELIEF_DISC
-
-
-@njit
-def is_stem(device):
-    """Whether it is a stem that a pressure moves."""
-    return device["kind"] == REDUCING or device["kind"] == SUSTAINING
-
-
-@njit
-def lead_flag(device):
-    """Which flag says that it leads its column."""
-    return device["event"] + (4 if is_disc(device) else 6)
 
 
 @njit
@@ -38,7 +19,7 @@ def leads(tables, k):
     if tables.valves[k]["device"] < 0:
         return False
     device = tables.devices[tables.valves[k]["device"]]
-    return (is_disc(device) or is_stem(device)) and tables.armed[lead_flag(device)] > 0.0
+    return device["leads"] >= 0 and tables.armed[device["leads"]] > 0.0
 
 
 @njit
@@ -70,7 +51,7 @@ def led_beside(out, tables, device, yielding, speed):
 @njit
 def lead_events(out, tables, device, g, x, share, speed):
     """g: way to a lift x at which it leads no column any more; to this share of it, where it takes the lead, if any."""
-    at, most = lead_flag(device), led_until(out, tables, device, speed)
+    at, most = device["leads"], led_until(out, tables, device, speed)
     if tables.armed[at] > 0.0:
         either(tables, g, at, x - most)
     else:

@@ -1,53 +1,102 @@
-"""Writes the loops over all devices of a kind from its law, so that a scene compiles its own kinds alone.
+"""What all devices of a scene do, each by the hooks of its law. Knows the tables; knows no law."""
 
-They stand in the folder of compiled code, written once and cached like any other. Knows names; knows no law.
-"""
+from fvsolve.jit import njit
+from fvsolve.kernels.calls import (
+    HOOKS,
+    call_events,
+    call_move,
+    call_outside,
+    call_power,
+    call_set,
+    call_stored,
+    call_value,
+)
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import DEVICE_VALUE
 
-from __future__ import annotations
-
-import functools
-import importlib.util
-import os
-import sys
-from pathlib import Path
-from types import ModuleType
-
-from fvsolve.jit import written_folder
-from fvsolve.kernels.devices.laws import LAWS
-
-HOME = "fvsolve.kernels.devices"
-TEMPLATE = Path(__file__).parent / "template.py"
-
-
-@functools.cache
-def loops_of(kind: int) -> ModuleType:
-    """The module of a kind's loops: `prepare`, `move`, `events`, `observe`, `record`, `power` and `stored`."""
-    path, source = written_folder() / f"kind_{kind}.py", text(kind)
-    if not path.is_file() or path.read_text(encoding="utf-8") != source:
-        fresh = Path(f"{path}.{os.getpid()}")
-        fresh.write_text(source, encoding="utf-8")
-        os.replace(fresh, path)
-    spec = importlib.util.spec_from_file_location(f"{HOME}.kind_{kind}", path)
-    made = sys.modules[spec.name] = importlib.util.module_from_spec(spec)  # where numba looks for it
-    spec.loader.exec_module(made)
-    return made
+SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, LEAD = range(len(HOOKS))  # columns of `hooks`
+PASSING = 2  # of a law's `outside`: to be known, but it passes with the shutting of a check valve
+ROWS = 3  # of `power` a device
 
 
-def text(kind: int) -> str:
-    """The source of that module: the template, with the calls of this kind in it."""
-    law = vars(LAWS[kind])
-    homes = [call.split(": ") for call in law.values() if call]
-    lines = dict.fromkeys(f"from {HOME}.{module} import {call.split('(')[0]}" for module, call in homes)
-    head, *functions = TEMPLATE.read_text(encoding="utf-8").replace("KIND = -1", f"KIND = {kind}").split("\n\n\n")
-    own = [said for function in functions if (said := filled(function, law))]
-    return "\n\n\n".join(["\n".join([*lines, head]), *own])
+@njit
+def set_devices(t, y, dydt, out, handle):
+    """Conductances, speeds, pressures and stiffness that devices set before nodes are closed."""
+    tables = open_tables(handle)
+    for k in range(tables.devices.size):
+        device = tables.devices[k]
+        hook = tables.hooks[device["hooks"], SET]
+        if hook != 0:
+            call_set(hook, t, y, out, tables, device)
 
 
-def filled(function: str, law: dict[str, str]) -> str:
-    """A function of the template with its call in place, "" where this kind has none and needs none."""
-    before, _, after = function.partition("...  # each: ")
-    asked, end, rest = after.partition("\n")
-    *into, job = asked.split(" = ")
-    if law[job]:
-        return before + " = ".join([*into, law[job].split(": ")[1]]) + end + rest
-    return before + "pass" + end + rest if job in ("power", "stored") else ""
+@njit
+def move_devices(t, y, dydt, out, handle):
+    """d/dt of what devices hold, where rates are asked for, and their greatest rates into out[RATE]."""
+    tables = open_tables(handle)
+    for k in range(tables.devices.size):
+        device = tables.devices[k]
+        hook = tables.hooks[device["hooks"], MOVE]
+        if hook != 0:
+            call_move(hook, t, y, dydt, out, tables, device)
+
+
+@njit
+def device_events(t, y, out, handle, g):
+    """Event functions of devices, from a state whose nodes are closed."""
+    tables = open_tables(handle)
+    for k in range(tables.devices.size):
+        device = tables.devices[k]
+        hook = tables.hooks[device["hooks"], EVENTS]
+        if hook != 0:
+            call_events(hook, t, y, out, tables, device, g)
+
+
+@njit
+def observe_devices(t, y, out, handle, values):
+    """Values of the probes that read devices."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        if probes[k]["kind"] == DEVICE_VALUE:
+            device = tables.devices[probes[k]["index"]]
+            hook = tables.hooks[device["hooks"], VALUE]
+            if hook != 0:
+                values[k] = call_value(hook, t, y, out, tables, device, probes[k]["side"])
+
+
+@njit
+def record_devices(t, y, out, handle, values):
+    """The first time that each device works where its law is not to be trusted, and where that passes by itself."""
+    tables = open_tables(handle)
+    marks, devices = tables.marks, tables.devices
+    first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size + tables.pistons.size
+    for k in range(devices.size):
+        hook = tables.hooks[devices[k]["hooks"], OUTSIDE]
+        beyond = call_outside(hook, out, tables, devices[k]) if hook != 0 else 0
+        at = first + k + (devices.size if beyond == PASSING else 0)
+        if beyond != 0 and marks[at] != marks[at]:
+            marks[at] = t
+
+
+@njit
+def power_devices(t, y, dydt, out, handle, power):
+    """Rows of devices, the last of `power` [W]: supplied, rate of what is stored, dissipated."""
+    tables = open_tables(handle)
+    devices, at = tables.devices, power.size - ROWS * tables.devices.size
+    for k in range(devices.size):
+        hook = tables.hooks[devices[k]["hooks"], POWER]
+        power[at], power[at + 1], power[at + 2] = 0.0, 0.0, 0.0
+        if hook != 0:
+            power[at], power[at + 1], power[at + 2] = call_power(hook, t, y, dydt, out, tables, devices[k])
+        at += ROWS
+
+
+@njit
+def stored_devices(t, y, dydt, out, handle, stored):
+    """Rows of devices, the last of `stored`, changes since the profile [J]."""
+    tables = open_tables(handle)
+    devices, first = tables.devices, stored.size - tables.devices.size
+    for k in range(devices.size):
+        hook = tables.hooks[devices[k]["hooks"], STORED]
+        stored[first + k] = call_stored(hook, y, tables, devices[k]) if hook != 0 else 0.0

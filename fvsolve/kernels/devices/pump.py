@@ -10,8 +10,8 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.curves import COUNT, LAST, LAW, OWN, SCALE, SUTER, curve_head, piecewise, suter_value
 from fvsolve.kernels.devices.check_valve import RELUCTANCE
-from fvsolve.kernels.devices.codes import PASSING
 from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.devices.loops import PASSING
 from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
@@ -45,7 +45,7 @@ def pump_speed(t, y, tables, device):
 
 
 @njit
-def set_pump(t, y, out, tables, device):
+def set(t, y, out, tables, device):
     """Its speed, and whether its check valve lets anything pass."""
     layout, k, floats = tables.layout[0], device["valve"], tables.floats
     shut = floats[device["data"] + CHECK] > 0.0 and tables.armed[device["event"]] > 0.0
@@ -84,7 +84,7 @@ def fluid_torque(floats, at, curve, n, q, dense):
 
 
 @njit
-def move_pump(t, dydt, out, tables, device):
+def move(t, y, dydt, out, tables, device):
     """d/dt of the relative speed of a shaft that runs free, and its rate."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
@@ -129,7 +129,7 @@ def shaft_rate(out, tables, device, torque):
 
 
 @njit
-def pump_powers(t, y, dydt, out, tables, device):
+def power(t, y, dydt, out, tables, device):
     """Power given to the shaft, rate of what it stores, power that the fluid takes from it [W]."""
     floats, at = tables.floats, device["data"]
     if floats[at + KNOWN] == 0.0:
@@ -144,7 +144,7 @@ def pump_powers(t, y, dydt, out, tables, device):
 
 
 @njit
-def shaft_energy(y, tables, device):
+def stored(y, tables, device):
     """Energy of a free shaft, change since it was let go [J]."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
@@ -160,7 +160,7 @@ def unreversed(valve):
 
 
 @njit
-def pump_events(out, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g of its check valve: flow left while open [kg/s], drop that opens it while shut [Pa]; and the same negative."""
     layout, k, at = tables.layout[0], device["valve"], device["event"]
     valve, floats = tables.valves[k], tables.floats
@@ -176,7 +176,7 @@ def pump_events(out, tables, device, g):
 
 
 @njit
-def pump_value(out, tables, device, which):
+def value(t, y, out, tables, device, which):
     """Its head [m], relative speed, torque of the fluid [N m], power at the shaft [W]."""
     floats = tables.floats
     n, q, _ = pump_point(out, tables, device)
@@ -189,7 +189,7 @@ def pump_value(out, tables, device, which):
 
 
 @njit
-def pump_outside(out, tables, device):
+def outside(out, tables, device):
     """1 where it works outside its curve, backwards or beyond the last flow; a Suter table has no outside.
 
     PASSING where it runs down behind a check valve: slower than at the start, forward, by a flow its curve then held.

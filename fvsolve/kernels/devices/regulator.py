@@ -8,14 +8,14 @@ states alone. Where it alone holds a rigid column, it leads that from its seat (
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING
 from fvsolve.kernels.devices.either import either
 from fvsolve.kernels.devices.feedback import loop_rate
-from fvsolve.kernels.devices.lead import is_stem, lead_events, leads
+from fvsolve.kernels.devices.lead import lead_events, leads
 from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
 
+REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
 AT_REST = 1e-10  # error, as a share of the band, that does not lift it off a stop: rounding must not
 SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
@@ -31,7 +31,7 @@ def regulator_opening(y, tables, device):
 
 
 @njit
-def set_regulator(y, out, tables, device):
+def set(t, y, out, tables, device):
     """Its conductance G x^2; none while it holds back reversed flow."""
     k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
     back = tables.armed[device["event"]] > 0.0
@@ -39,14 +39,15 @@ def set_regulator(y, out, tables, device):
 
 
 @njit
-def stem_speed(t, tables, device, before, behind):
-    """dx/dt of one that a pressure moves, at p' before it and behind it, and d(dx/dt) / d(what it senses)."""
+def lead(t, y, tables, device, before, behind, drop, ahead):
+    """dx/dt of one that a pressure moves, at p' before and behind it; what of it rises with the drop [1/Pa/s]."""
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at + 2] > 0.0 or armed[at + 4] > 0.0:
         return 0.0, 0.0
     change, slope = schedule_value(tables, device["schedule"], t) - floats[data + SET], 1.0 / stroke(tables, device)
-    error = change - behind if device["kind"] == REDUCING else before - change
-    return (floats[data + ERROR] + error) * slope, slope
+    reduces = device["mode"] == REDUCING
+    error = change - behind if reduces else before - change
+    return (floats[data + ERROR] + error) * slope, slope if ahead != reduces else 0.0
 
 
 @njit
@@ -61,9 +62,9 @@ def regulator_error(t, out, tables, device):
     layout, floats, data = tables.layout[0], tables.floats, device["data"]
     valve = tables.valves[device["valve"]]
     change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
-    if device["kind"] == FLOW_CONTROL:
+    if device["mode"] == FLOW_CONTROL:
         change -= out[layout["valve"] + device["valve"]] - valve["flow"]
-    elif device["kind"] == REDUCING:
+    elif device["mode"] == REDUCING:
         change -= out[layout["pressure"] + valve["to_node"]]
     else:
         change = out[layout["pressure"] + valve["from_node"]] - change
@@ -71,7 +72,7 @@ def regulator_error(t, out, tables, device):
 
 
 @njit
-def move_regulator(t, y, dydt, out, tables, device):
+def move(t, y, dydt, out, tables, device):
     """dx/dt, none against a stop; and its greatest rate."""
     out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
@@ -86,21 +87,21 @@ def regulator_rate(y, out, tables, device):
     """How fast the loop through what it senses can be [1/s]; where a column sets its flow, d dP / dx = -2 dP / x."""
     k, speed = device["valve"], 1.0 / stroke(tables, device)
     drop = abs(head_drop(tables, out, k)[1])
-    if not is_stem(device):
+    if device["mode"] == FLOW_CONTROL:
         return speed * sqrt(tables.valves[k]["conductance"] * drop)
-    end = tables.valves[k]["to_node"] if device["kind"] == REDUCING else tables.valves[k]["from_node"]
+    end = tables.valves[k]["to_node"] if device["mode"] == REDUCING else tables.valves[k]["from_node"]
     if tables.nodes[end]["gates"] < 0:
         return loop_rate(out, tables, k, end, speed)
     return 0.0 if leads(tables, k) else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
 
 
 @njit
-def regulator_events(t, y, out, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g: flow that is left or drop beyond what opens it, way to full opening, way to its seat; each both ways."""
     layout, armed = tables.layout[0], tables.armed
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
     drop, back = head_drop(tables, out, device["valve"])[1], 1.0
-    if device["kind"] != FLOW_CONTROL:
+    if device["mode"] != FLOW_CONTROL:
         back = out[layout["valve"] + device["valve"]]
         if x <= ALMOST_SHUT or back == 0.0:
             back = drop + RELUCTANCE
@@ -114,10 +115,12 @@ def regulator_events(t, y, out, tables, device, g):
     either(tables, g, at, back)
     either(tables, g, at + 2, full)
     either(tables, g, at + 4, seat)
-    lead_events(out, tables, device, g, x, RETURNS if is_stem(device) else 0.0, 1.0 / stroke(tables, device))
+    lead_events(
+        out, tables, device, g, x, RETURNS if device["mode"] != FLOW_CONTROL else 0.0, 1.0 / stroke(tables, device)
+    )
 
 
 @njit
-def regulator_value(y, tables, device):
+def value(t, y, out, tables, device, which):
     """Its opening, 0 to 1."""
     return min(max(regulator_opening(y, tables, device), 0.0), 1.0)

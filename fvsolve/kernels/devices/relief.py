@@ -12,20 +12,20 @@ RELUCTANCE = 1e-10  # of lift, beyond which it changes: rounding must not open i
 
 
 @njit
-def set_relief(out, tables, device):
+def set(t, y, out, tables, device):
     """Its conductance G, of which x^2 is used; none where it is shut."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
-def relief_opening(out, tables, device):
+def value(t, y, out, tables, device, which):
     """Its lift between 0 and 1."""
     return min(max(pressure_lift(tables, out, device["valve"]), 0.0), 1.0)
 
 
 @njit
-def relief_events(out, tables, device, g):
+def events(t, y, out, tables, device, g):
     """g: lift that is left, or beyond what opens it while shut; lift that is missing; each both ways.
 
     From shut to fully open it lifts first: a jump may ask for either end in the law of the other, and not stay there.

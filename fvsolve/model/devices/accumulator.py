@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from fvsolve.errors import Notice
 from fvsolve.kernels.devices import accumulator as law
-from fvsolve.kernels.devices.codes import ACCUMULATOR
 from fvsolve.model.devices.device import Device
 
 ROUNDED = 1e-5  # share of the mass that it gave which errors in its neck are measured against, so as to exceed rounding
@@ -14,7 +13,7 @@ NECK = 0.01  # share of its volume that is fluid in the neck of a bladder accumu
 class Accumulator(Device, kind="accumulator"):
     """A vessel whose pressure is that of its gas."""
 
-    code = ACCUMULATOR
+    law = law
     vessel = True
     quantities = ("gas_volume", "gas_pressure")
     events = ("is empty", "holds fluid again")
@@ -59,7 +58,6 @@ class Accumulator(Device, kind="accumulator"):
 
     def above(self, model, part, row) -> float:
         """Over the state in which it could give no more: P = 0, or no fluid left."""
-        from fvsolve.kernels.devices.accumulator_energy import accumulator_energy
         from fvsolve.kernels.energy_barotropic import head_at
 
         st, floats = model.tables.settings[0], model.tables.floats
@@ -74,7 +72,7 @@ class Accumulator(Device, kind="accumulator"):
             for _ in range(200):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if head(middle) < 0.0 else (low, middle)
-        return -float(accumulator_energy(st, floats, node, at, low))
+        return -float(law.accumulator_energy(st, floats, node, at, low))
 
     def density(self, start):
         """rho(p) [kg/m3] of the case's law."""

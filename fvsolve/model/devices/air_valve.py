@@ -6,7 +6,6 @@ import math
 
 from fvsolve.errors import Notice
 from fvsolve.kernels.devices import air_valve as law
-from fvsolve.kernels.devices.codes import AIR_VALVE
 from fvsolve.model.devices.device import Device
 
 GAS_CONSTANT = 287.05  # of air [J/kg/K]
@@ -15,8 +14,8 @@ GAS_CONSTANT = 287.05  # of air [J/kg/K]
 class AirValve(Device, kind="air-valve"):
     """The chamber of one; it is shut at the start."""
 
-    code = AIR_VALVE
-    vessel = True
+    law = law
+    vessel = sudden = True
     states = ("air",)
     quantities = ("air_volume", "air_mass", "air_pressure")
     events = ("opens", "shuts")

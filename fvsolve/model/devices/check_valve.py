@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.kernels.devices.codes import CHECK_VALVE
+from fvsolve.kernels.devices import check_valve as law
 from fvsolve.model.devices.device import Device
 from fvsolve.model.devices.lifting import CheckLag, CheckSwing
 
@@ -12,7 +12,7 @@ SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is
 class CheckValve(Device, kind="check-valve"):
     """Open or shut; its steady state is that in which no open one flows back and no shut one is pushed open."""
 
-    code = CHECK_VALVE
+    law, sudden = law, True
     quantities = ("opening",)
     events = ("shuts", "opens")
 

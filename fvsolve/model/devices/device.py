@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,13 +14,18 @@ from fvsolve.kernels import records as rec
 class Device:
     """Parts of one kind: their rows, their numbers, how they start, what their events mean.
 
-    code : of their law in kernels.devices; states : names of what each holds
+    law : module of its compiled law, whose functions are named as `kernels.calls.HOOKS`; mode : what that knows it as
+    sudden : whether events alone open it; leads : which of its events lets it lead a rigid column, -1 for none
+    states : names of what each holds
     quantities : probes, in the order in which `device_value` numbers them
     events : what it means that each event function falls to zero; remedy : what to try where they go to and fro
     """
 
     kinds: ClassVar[dict[str, Device]] = {}
-    code: ClassVar[int]
+    law: ClassVar[ModuleType]
+    mode: ClassVar[int] = 0
+    sudden: ClassVar[bool] = False
+    leads: ClassVar[int] = -1
     states: ClassVar[tuple[str, ...]] = ()
     quantities: ClassVar[tuple[str, ...]] = ()
     events: ClassVar[tuple[str, ...]] = ()
@@ -97,9 +103,11 @@ def lower_devices(draft) -> None:
     draft.devices = [(name, part, Device.kinds[part.kind].of(part)) for name, part in parts_of(draft.case)]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
+    laws = list(laws_of(draft.devices))
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
-        row["kind"], row["states"] = device.code, len(states)
+        row["hooks"], row["mode"], row["states"] = laws.index(device.law.__name__), device.mode, len(states)
+        row["sudden"] = device.sudden
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
             draft.valve_table["device"][row["valve"]] = k
@@ -115,7 +123,13 @@ def lower_devices(draft) -> None:
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
         row["event"] = limits.EVENTS * draft.tanks + len(draft.events)
+        row["leads"] = row["event"] + device.leads if device.leads >= 0 else -1
         draft.events += [(name.removesuffix(".inside"), text) for text in device.events]
+
+
+def laws_of(devices: list[tuple]) -> tuple[str, ...]:
+    """The modules of the laws of devices, as rows of `hooks` lie."""
+    return tuple(dict.fromkeys(device.law.__name__ for _, _, device in devices))
 
 
 def parts_of(case) -> list[tuple[str, Any]]:

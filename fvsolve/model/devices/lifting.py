@@ -6,8 +6,7 @@ import math
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.devices import disc as law
-from fvsolve.kernels.devices.codes import CHECK_DISC, RELIEF, RELIEF_DISC
+from fvsolve.kernels.devices import disc, relief
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.devices.device import Device
 from fvsolve.model.devices.regulator import opening_of
@@ -22,6 +21,7 @@ STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "
 class Lifting(Device, kind=""):
     """Shut, fully open, or lifted between; with a disc that takes its time its lift is a state."""
 
+    law, leads = disc, 4
     quantities = ("opening",)
     events = STOPS
     remedy = "give it a greater overpressure"
@@ -37,8 +37,8 @@ class Lifting(Device, kind=""):
 
     def settle(self, model, row, y, scale) -> None:
         stop, seat = (model.tables.armed[row["event"] + k] > 0.0 for k in (0, 2))
-        if self.states and seat and law.disc_lift(y, model.tables, row) > 0.0:  # it has slammed
-            y[row["y"]] = -model.tables.floats[row["data"] + law.LIFT] - SEATED
+        if self.states and seat and disc.disc_lift(y, model.tables, row) > 0.0:  # it has slammed
+            y[row["y"]] = -model.tables.floats[row["data"] + disc.LIFT] - SEATED
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 
@@ -57,7 +57,7 @@ class Lifting(Device, kind=""):
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
         return Edge(i, j, self.row(start, k), 0.0, senses=i)
 
-    def law(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
+    def flow_at(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
         """(flow, its slope over the drop at this lift, its slope over the lift)."""
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
         transition = transition_of(start.valves[k], g)
@@ -109,7 +109,7 @@ class Lifting(Device, kind=""):
 class ReliefDisc(Lifting, kind=""):
     """A relief valve whose disc takes its time."""
 
-    code = RELIEF_DISC
+    mode = disc.RELIEF
 
     def felt(self, start, k):
         i, part = int(start.valves[k]["from_node"]), self.part(start, k)
@@ -121,7 +121,7 @@ class ReliefDisc(Lifting, kind=""):
 
         def newton(flow, drop, potential):
             x = (start.pressure_of(potential, z) - part.set_pressure) / part.overpressure
-            asked, slope, rise = self.law(start, k, drop, x)
+            asked, slope, rise = self.flow_at(start, k, drop, x)
             rise /= part.overpressure
             size = max(slope + rise, 1e-12 * start.flow_scale)
             return 1.0 / size, slope / size, (asked - flow) / size, rise / size
@@ -149,7 +149,7 @@ class ReliefLag(ReliefDisc, kind=""):
 class Relief(ReliefDisc, kind="relief-valve"):
     """A relief valve that opens at once."""
 
-    code = RELIEF
+    law, leads = relief, -1
     events = ("is shut", "opens", "is fully open", "leaves full opening")
 
     def of(self, part) -> Device:
@@ -170,7 +170,7 @@ class Relief(ReliefDisc, kind="relief-valve"):
 class CheckDisc(Lifting, kind=""):
     """A check valve whose disc takes its time."""
 
-    code = CHECK_DISC
+    mode = disc.CHECK
 
     def felt(self, start, k):
         before, behind = start.across(k)
@@ -180,7 +180,9 @@ class CheckDisc(Lifting, kind=""):
         part, ratio = self.part(start, k), start.ratio.get(k, 1.0)
 
         def newton(flow, drop, potential):
-            asked, slope, rise = self.law(start, k, drop, (drop * ratio - part.cracking_pressure) / part.overpressure)
+            asked, slope, rise = self.flow_at(
+                start, k, drop, (drop * ratio - part.cracking_pressure) / part.overpressure
+            )
             slope += rise * ratio / part.overpressure
             size = max(slope, 1e-12 * start.flow_scale)
             return 1.0 / size, slope / size, (asked - flow) / size, 0.0

@@ -10,7 +10,6 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import curves
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import pump as law
-from fvsolve.kernels.devices.codes import PUMP
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.model.devices.device import Device
 from fvsolve.model.head_curves import curve_numbers, rated_point, shaft_points
@@ -28,7 +27,7 @@ SNAP = 1e-12  # share of the torques on a shaft below which their sum is roundin
 class Pump(Device, kind="pump"):
     """A restriction of law CURVE; its steady state is that in which no flow passes its check valve backwards."""
 
-    code = PUMP
+    law = law
     quantities = ("head", "speed", "torque", "power")
     events = ("check valve shuts", "check valve opens")
     remedy = "give it a check-valve with a time_constant behind it, in place of its own"

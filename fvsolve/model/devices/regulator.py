@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels.devices.codes import FLOW_CONTROL, REDUCING, SUSTAINING
+from fvsolve.kernels.devices import regulator as law
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 from fvsolve.model.devices.device import Device
@@ -37,6 +37,7 @@ class Here(NamedTuple):
 class Regulator(Device, kind=""):
     """Active, it keeps what it senses as set; else it stands open or shut. Its stem is a state."""
 
+    law, leads = law, 6
     states = ("opening",)
     quantities = ("opening",)
     events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
@@ -88,11 +89,11 @@ class Regulator(Device, kind=""):
         """Whether the flow through it can set what it senses."""
         return not self.end or bool(np.isnan(start.held[self.sensed(start, k)]))
 
-    def mode(self, start, k: int) -> str:
+    def stands(self, start, k: int) -> str:
         return start.modes.setdefault(k, ACTIVE if self.free(start, k) else OPEN)
 
     def edge(self, start, k):
-        if k in start.shut or self.mode(start, k) == OPEN:
+        if k in start.shut or self.stands(start, k) == OPEN:
             return None
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
         goal = self.target(start, k)
@@ -108,7 +109,7 @@ class Regulator(Device, kind=""):
         p_from, p_to = start.across(k)
         loss = flow * abs(flow) / (float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0))
         here = Here(start, k, p_from, p_to, self.target(start, k), flow, loss)
-        before = "shut" if k in start.shut else self.mode(start, k)
+        before = "shut" if k in start.shut else self.stands(start, k)
         after = self.next(here, before)
         if after == ACTIVE and not self.free(start, k):
             after = "shut"
@@ -123,7 +124,7 @@ class Regulator(Device, kind=""):
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
         valve, floats, at = start.valves[k], start.draft.tables.floats, int(row["data"])
-        shut, active = k in start.shut, self.mode(start, k) == ACTIVE
+        shut, active = k in start.shut, self.stands(start, k) == ACTIVE
         error = self.error(start, k)
         if active and not shut:
             if abs(error) > start.slack(self.end):
@@ -154,7 +155,7 @@ class Regulator(Device, kind=""):
 class PressureReducing(Regulator, kind="pressure-reducing"):
     """Keeps the pressure at `to` down: open where even full opening leaves less, shut where others bring more."""
 
-    code, end, verb = REDUCING, "to", "reduce"
+    mode, end, verb = law.REDUCING, "to", "reduce"
 
     def next(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
@@ -170,7 +171,7 @@ class PressureReducing(Regulator, kind="pressure-reducing"):
 class PressureSustaining(Regulator, kind="pressure-sustaining"):
     """Keeps the pressure at `from` up: open where even full opening leaves more, shut where there is less."""
 
-    code, end, verb = SUSTAINING, "from", "open"
+    mode, end, verb = law.SUSTAINING, "from", "open"
 
     def next(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
@@ -186,7 +187,7 @@ class PressureSustaining(Regulator, kind="pressure-sustaining"):
 class FlowControl(Regulator, kind="flow-control"):
     """Keeps the flow down: open where even full opening lets less pass."""
 
-    code, key = FLOW_CONTROL, "set_flow"
+    mode, key = law.FLOW_CONTROL, "set_flow"
 
     def next(self, here, now):
         if now == ACTIVE:
