@@ -29,8 +29,13 @@ def piece_value(pieces, row, t):
 
 @njit(forceinline=True)
 def schedule_value(tables, index, t):
-    """Value of schedule `index` at t [s], right-continuous, but its left limit from settings.limit on."""
-    limit = tables.settings[0]["limit"]
+    """Value of schedule `index` at t [s], its left limit from the end of the segment on."""
+    return value_until(tables, index, t, tables.clock[0]["limit"])
+
+
+@njit(forceinline=True)
+def value_until(tables, index, t, limit):
+    """Value of schedule `index` at t [s], right-continuous, but its left limit from `limit` on."""
     record = tables.schedules[index]
     pieces = tables.pieces
     if record["pieces"] == 1:
