@@ -16,12 +16,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["argument", "beside", "cache_folder", "written_folder", "inner", "njit", "source_hash"]
+__all__ = ["argument", "beside", "cache_folder", "written_folder", "inner", "njit", "once", "source_hash"]
 
 ROOM = 65536  # bytes that a folder must take to be one for caches
 DIGEST = hashlib.sha256().digest_size
@@ -30,6 +31,8 @@ KEPT = 3  # generations of compiled code kept beside the present one
 PACKAGE = Path(__file__).resolve().parent
 # What compiled code can depend on: the rooms that compile and, by the import contract, all they may import.
 ROOMS = ("kernels", "steppers", "jit", "units", "errors")
+MAKING = threading.RLock()  # held while compiled functions are made
+SETTING = threading.Lock()  # held while numba is told of a folder
 
 
 @functools.cache
@@ -59,6 +62,7 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
 
     Arrays are not reference counted (`_nrt=False`): each count is an atomic operation, and with the tables of a
     model they cost microseconds a step. So compiled code allocates nothing; a function that must says `_nrt=True`.
+    While one runs that Python has called, other threads of Python do (`nogil=True`).
     Used bare or with numba's own options. With `NUMBA_DISABLE_JIT=1` the plain function comes back.
     Only functions of `ROOMS` and of modules written from them are cached: the hash does not see other files.
     """
@@ -68,8 +72,20 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
         return function
     home = Path(function.__code__.co_filename).resolve()
     cache = home in _sources() or home.parent == written_folder().resolve()
-    options = {"error_model": "numpy", "cache": cache, "_nrt": False} | options
+    options = {"error_model": "numpy", "cache": cache, "_nrt": False, "nogil": True} | options
     return _dispatcher()(function, **options)
+
+
+def once(function: Callable) -> Callable:
+    """`functools.cache` of what compiles: threads that ask for the same at one time wait for it, and get the same."""
+    found = functools.cache(function)
+
+    @functools.wraps(function)
+    def asked(*given: Any) -> Any:
+        with MAKING:
+            return found(*given)
+
+    return asked
 
 
 def inner(function: Callable) -> Callable:
@@ -167,12 +183,13 @@ def _dispatcher() -> type:
             super().__init__(function, targetoptions={"nopython": True, "boundscheck": None} | options)
             self.cache, self.options = cache, options
             if cache:
-                before = numba.config.CACHE_DIR
-                numba.config.CACHE_DIR = str(_code_folder() / folder)
-                try:
-                    self.enable_caching()
-                finally:
-                    numba.config.CACHE_DIR = before
+                with SETTING:
+                    before = numba.config.CACHE_DIR
+                    numba.config.CACHE_DIR = str(_code_folder() / folder)
+                    try:
+                        self.enable_caching()
+                    finally:
+                        numba.config.CACHE_DIR = before
                 self._cache._cache_file.__class__ = _kept_file()
 
         @functools.cached_property

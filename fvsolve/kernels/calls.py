@@ -10,7 +10,7 @@ import os
 
 import numpy as np
 
-from fvsolve.jit import njit
+from fvsolve.jit import njit, once
 from fvsolve.kernels.handle import open_tables
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
@@ -32,6 +32,7 @@ def argument_types(letters: str) -> tuple:
     return tuple(kinds[letter] for letter in letters)
 
 
+@once
 def compile_as(function, letters: str) -> None:
     """Compile for arguments of these kinds, and for no others."""
     if hasattr(function, "compile") and not function.overloads:

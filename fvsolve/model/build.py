@@ -338,6 +338,7 @@ class Draft:
         s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
+        schedules.flags.writeable = pieces.flags.writeable = False  # from here on, as in the model
         most, cells = max(pipes["cells"], default=0), self.cells
         system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in self.cluster_table), default=0)
         rigid = int(np.sum(self.node_table["columns"] > 1))

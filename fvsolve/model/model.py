@@ -70,12 +70,12 @@ def flags_of(state: State, model: Model) -> np.ndarray | float:
 
 
 def given_numbers(name: str, given: Any) -> np.ndarray:
-    """What is given as float64[...], itself where it is that; FvsolveError where it is not made of real numbers."""
+    """What is given as float64[...] that can be written, itself where it is that; FvsolveError if not real numbers."""
     try:
         found = np.asarray(given)
         if found.dtype.kind not in "fiu":
             raise TypeError
-        return np.ascontiguousarray(found, dtype=np.float64) if found.ndim else found.astype(np.float64)
+        return np.require(found, np.float64, ("C", "W")) if found.ndim else found.astype(np.float64)
     except (TypeError, ValueError):
         raise FvsolveError(f"{name} = {show(given)} is not made of real numbers") from None
 
@@ -131,6 +131,10 @@ class Model(Shown):
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
 
     picture = "fvsolve.draw.objects:model_figure"
+
+    def __post_init__(self) -> None:
+        for array in (*self.tables, self.scale, self.start, *self.profiles.values()):
+            array.flags.writeable = False
 
     def said(self) -> str:
         cells = f", {self.all_cells} cells" if self.all_cells else ""

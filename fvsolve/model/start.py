@@ -65,7 +65,7 @@ class Start:
 
     def given(self, schedule: int) -> float:
         """What a schedule gives up to the start."""
-        return float(value_until(self.draft.tables, int(schedule), self.t, self.t))
+        return float(value_until(self.draft.tables.schedules, self.draft.tables.pieces, int(schedule), self.t, self.t))
 
     def given_pressure(self, row, node) -> float:
         """Pressure [Pa] of a reservoir or tank at the start."""

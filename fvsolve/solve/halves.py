@@ -95,7 +95,7 @@ class Halves:
         if self.stepper is None:
             model = self.model
             self.stepper = Stepper(
-                loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure, model.scale
+                loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure, model.scale.copy()
             )
             self.stepper.out = model.new_out()
         if fresh:

@@ -5,21 +5,20 @@ They stand in the folder of compiled code, written once and cached like any othe
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import os
 import sys
 from pathlib import Path
 from types import ModuleType
 
-from fvsolve.jit import written_folder
+from fvsolve.jit import once, written_folder
 from fvsolve.kernels.devices.laws import LAWS
 
 HOME = "fvsolve.kernels.devices"
 TEMPLATE = Path(__file__).parent / "template.py"
 
 
-@functools.cache
+@once
 def loops_of(kind: int) -> ModuleType:
     """The module of a kind's loops: `prepare`, `move`, `events`, `observe`, `record`, `power` and `stored`."""
     path, source = written_folder() / f"kind_{kind}.py", text(kind)

@@ -147,7 +147,8 @@ class Pump(Device, kind="pump"):
         name = draft.valve_names[row["valve"]]
         if floats[at + law.MODE] == law.TRIPPING:
             trip = float(part.trip)
-            floats[at + law.HELD] = value_until(draft.tables, int(row["schedule"]), trip, trip)
+            given = draft.tables.schedules, draft.tables.pieces
+            floats[at + law.HELD] = value_until(*given, int(row["schedule"]), trip, trip)
         if floats[at + law.MODE] != law.TURNED:
             return []
         rho = start.density_at(int(valve["from_node"]))

@@ -309,13 +309,18 @@ def change_time(model) -> float:
     trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
     quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
     for index in range(len(model.tables.schedules)):
-        if any(np.ptp([value_until(model.tables, index, at, np.inf) for at in (before(t), t)]) for t in trips.values()):
+        if any(np.ptp(given(model, index, [before(t), t])) for t in trips.values()):
             continue  # it says that a pump has tripped
-        values = np.array([value_until(model.tables, index, t, np.inf) for t in times])
+        values = given(model, index, times)
         steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
         if steepest > 0.0:
             quickest = min(quickest, float(np.ptp(values)) / steepest)
     return quickest
+
+
+def given(model, index: int, times) -> np.ndarray:
+    """Values of a schedule at times."""
+    return np.array([value_until(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
 
 
 def before(t: float) -> float:

@@ -80,7 +80,7 @@ def stopped(model, t: float, before: bool = False):
     """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit."""
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
-    values = [value_until(tables, k, t, limit) for k in range(len(schedules))]
+    values = [value_until(tables.schedules, tables.pieces, k, t, limit) for k in range(len(schedules))]
     for k in range(len(schedules)):
         schedules[k] = (k, 1)
     rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]

@@ -158,9 +158,9 @@ def input_value(at: Frozen, name: str, one: Input) -> float:
                          + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + one.node])  # fmt: skip
         place = model.node_names[one.node]
         return pressure if one.kind == "pressure" else float(model.head(pressure, model.elevation[place]))
-    value = value_until(model.tables, one.schedule, at.t, np.inf)
+    value = value_until(model.tables.schedules, model.tables.pieces, one.schedule, at.t, np.inf)
     if one.other >= 0:
-        value -= value_until(model.tables, one.other, at.t, np.inf)
+        value -= value_until(model.tables.schedules, model.tables.pieces, one.other, at.t, np.inf)
     return float((value - one.offset) / one.scale)
 
 
