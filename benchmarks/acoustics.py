@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, hstack
 from scipy.sparse.linalg import expm_multiply
 
 from fvsolve.case import load
-from fvsolve.model import State, build
+from fvsolve.model import Slate, State, build
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
 END = 2.0  # [s] there and back
@@ -81,8 +81,8 @@ class Acoustics:
 
     def _rhs(self):
         """fvsolve's own compiled rhs as f(t, y, dydt); its tables and `out` by their addresses."""
-        rhs, handle, out = self.model.functions.rhs, self.model.handle, self.model.new_out()
-        self._kept = handle, out
+        rhs, slate, out = self.model.functions.rhs, Slate(self.model), self.model.new_out()
+        self._kept, handle = (slate, out), slate.handle
         handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
 
         @numba.njit(error_model="numpy")

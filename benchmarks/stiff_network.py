@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 import fvsolve
 from fvsolve.case import load
-from fvsolve.model import build
+from fvsolve.model import Slate, build
 from fvsolve.model.dependence import sparsity
 from fvsolve.steppers.differences import differences
 from fvsolve.steppers.structure import Structure
@@ -83,7 +83,8 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
     """The model's structure, what its parts cost at the start, and the matrix that is factored there."""
     structure, rhs = Structure(sparsity(model)), model.functions.rhs
     factor, solve = structure.functions()
-    shape, n, m, handle = structure.shape, structure.n, structure.m, model.handle
+    slate = Slate(model)
+    shape, n, m, handle = structure.shape, structure.n, structure.m, slate.handle
     where, out, y = int(model.layout["supply"]), model.new_out(), np.zeros(n)
     jacobian, store = np.zeros(structure.nnz), np.zeros(structure.store_size)
     f, y_work, f_work, x = np.zeros((4, n))

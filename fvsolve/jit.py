@@ -16,12 +16,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["argument", "beside", "cache_folder", "written_folder", "inner", "njit", "source_hash"]
+__all__ = ["add_sources", "argument", "beside", "cache_folder", "inner", "njit", "once", "source_hash"]
 
 ROOM = 65536  # bytes that a folder must take to be one for caches
 DIGEST = hashlib.sha256().digest_size
@@ -30,6 +31,9 @@ KEPT = 3  # generations of compiled code kept beside the present one
 PACKAGE = Path(__file__).resolve().parent
 # What compiled code can depend on: the rooms that compile and, by the import contract, all they may import.
 ROOMS = ("kernels", "steppers", "jit", "units", "errors")
+OUTSIDE: dict[Path, str] = {}  # folders whose sources may be compiled and cached too, and where below the code folder
+MAKING = threading.RLock()  # held while compiled functions are made
+SETTING = threading.Lock()  # held while numba is told of a folder
 
 
 @functools.cache
@@ -47,9 +51,19 @@ def cache_folder() -> Path:
 @functools.cache
 def source_hash() -> str:
     """Sixteen hexadecimal digits that change with any source of `ROOMS`: sha256 over names and bytes."""
+    return _digest(PACKAGE, _sources())
+
+
+def add_sources(folder: Path) -> None:
+    """Let functions of modules in a folder outside the package be cached too, in a folder named by all its sources."""
+    folder = Path(folder).resolve()
+    OUTSIDE[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
+
+
+def _digest(top: Path, paths) -> str:
     digest = hashlib.sha256()
-    for path in _sources():
-        digest.update(str(path.relative_to(PACKAGE)).encode() + b"\0")
+    for path in paths:
+        digest.update(str(path.relative_to(top)).encode() + b"\0")
         digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
@@ -59,17 +73,30 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
 
     Arrays are not reference counted (`_nrt=False`): each count is an atomic operation, and with the tables of a
     model they cost microseconds a step. So compiled code allocates nothing; a function that must says `_nrt=True`.
+    While one runs that Python has called, other threads of Python do (`nogil=True`).
     Used bare or with numba's own options. With `NUMBA_DISABLE_JIT=1` the plain function comes back.
-    Only functions of `ROOMS` and of modules written from them are cached: the hash does not see other files.
+    Only functions of `ROOMS` and of folders that were added are cached: no hash sees other files.
     """
     if function is None:
         return functools.partial(njit, **options)
     if _disabled():
         return function
     home = Path(function.__code__.co_filename).resolve()
-    cache = home in _sources() or home.parent == written_folder().resolve()
-    options = {"error_model": "numpy", "cache": cache, "_nrt": False} | options
-    return _dispatcher()(function, **options)
+    folder = "" if home in _sources() else next((OUTSIDE[f] for f in home.parents if f in OUTSIDE), None)
+    options = {"error_model": "numpy", "cache": folder is not None, "_nrt": False, "nogil": True} | options
+    return _dispatcher()(function, folder=folder or "", **options)
+
+
+def once(function: Callable) -> Callable:
+    """`functools.cache` of what compiles: threads that ask for the same at one time wait for it, and get the same."""
+    found = functools.cache(function)
+
+    @functools.wraps(function)
+    def asked(*given: Any) -> Any:
+        with MAKING:
+            return found(*given)
+
+    return asked
 
 
 def inner(function: Callable) -> Callable:
@@ -165,14 +192,15 @@ def _dispatcher() -> type:
     class Dispatcher(CPUDispatcher):
         def __init__(self, function: Callable, cache: bool, folder: str = "", **options: Any) -> None:
             super().__init__(function, targetoptions={"nopython": True, "boundscheck": None} | options)
-            self.cache, self.options = cache, options
+            self.cache, self.folder, self.options = cache, folder, options
             if cache:
-                before = numba.config.CACHE_DIR
-                numba.config.CACHE_DIR = str(_code_folder() / folder)
-                try:
-                    self.enable_caching()
-                finally:
-                    numba.config.CACHE_DIR = before
+                with SETTING:
+                    before = numba.config.CACHE_DIR
+                    numba.config.CACHE_DIR = str(_code_folder() / folder)
+                    try:
+                        self.enable_caching()
+                    finally:
+                        numba.config.CACHE_DIR = before
                 self._cache._cache_file.__class__ = _kept_file()
 
         @functools.cached_property
@@ -180,7 +208,7 @@ def _dispatcher() -> type:
             """The same without doors, made when compiled code first asks for it."""
             if bare.items() <= self.options.items():
                 return self
-            return Dispatcher(self.py_func, self.cache, "within", **self.options | bare)
+            return Dispatcher(self.py_func, self.cache, f"{self.folder}/within".strip("/"), **self.options | bare)
 
         @property
         def _numba_type_(self):
@@ -237,14 +265,6 @@ def _code_folder() -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     os.utime(folder)
     _prune(folder)
-    return folder
-
-
-@functools.cache
-def written_folder() -> Path:
-    """Where modules that are written from others lie, and go with the sources they were written from."""
-    folder = _code_folder() / "written"
-    folder.mkdir(exist_ok=True)
     return folder
 
 

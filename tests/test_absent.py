@@ -11,6 +11,7 @@ from truth.scenes import WATER, chamber, junction, pipe, reservoir, scene, tank,
 import fvsolve
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import PHASES
+from fvsolve.model import Slate
 from fvsolve.solve.loop import Loop
 from fvsolve.steppers import slots
 
@@ -70,7 +71,7 @@ def test_two_tanks_are_two_states_and_no_more():
     rows = {name: len(rows) for name in rec.RECORDS if len(rows := getattr(model.tables, name))}
     assert rows == {"settings": 1, "layout": 1, "nodes": 2, "valves": 1, "schedules": 1, "probes": 1}
     assert model.new_out().size == rec.OUT_HEAD + 3 * 2 + 3  # pressure, supply, net flow; valve, conductance, drive
-    assert model.tables.envelope.size == 0
+    assert Slate(model).envelope.size == 0
 
 
 def test_two_tanks_compile_nothing_of_pipes_bodies_and_implicit_steps(compiling):

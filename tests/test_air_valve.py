@@ -11,6 +11,7 @@ from truth.bores import HEAT, SMALL, bores
 from truth.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.model import Slate
 from fvsolve.model.dependence import sparsity
 from fvsolve.studies.energy.energy import energy
 
@@ -159,7 +160,7 @@ def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
     from fvsolve.model.energy_ledger import Accounts
 
     model = fvsolve.build(fvsolve.load(drained(flow=0.0, low=2e5)))
-    accounts, y = Accounts(model), np.zeros(model.y_size)
+    accounts, y = Accounts(Slate(model)), np.zeros(model.y_size)
     i, j = (model.state_names.index(f"v.inside.{name}") for name in ("mass", "air"))
     y[i], y[j] = -0.01 * 0.1, 2e-4 * 0.1
     place = [one.place for one in accounts.held].index("v.inside")

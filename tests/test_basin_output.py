@@ -19,11 +19,10 @@ import fvsolve
 from fvsolve.draw import view
 from fvsolve.draw.view import LABELS, digits, span
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.kernels import calls
-from fvsolve.kernels.handle import make_handle
 from fvsolve.kernels.plane.observe import observe_basins, observe_dense_flows
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.points import Points
+from fvsolve.model import Slate
 from fvsolve.output.fields import parted, shape, write_frame
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
@@ -130,7 +129,8 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
     model = fvsolve.build(fvsolve.load(liquid(probes, mesh={"file": str(path)})))
     y = random_state(model, 1e-3)
     found = np.zeros(len(probes))
-    observe_basins(0.0, y, model.new_out(), make_handle((*model.tables, *2 * [calls.empty_calls(1, 1)])), found)
+    slate = Slate(model)
+    observe_basins(0.0, y, model.new_out(), slate.handle, found)
     frame = model.fields(y, model.new_out())["block"]
     for k, values in zip(cells, found.reshape(-1, 4), strict=True):
         u, v, _ = frame["velocity"][k]
@@ -164,10 +164,10 @@ def test_the_flow_of_a_patch_has_the_density_of_its_place():
     node = model.node_names.index("block.hole")
     out[int(model.layout["net"]) + node] = -3.0
     out[int(model.layout["pressure"]) + node] = 3e7 - model.tables.nodes[node]["pressure"]
-    handle = make_handle((*model.tables, *2 * [calls.empty_calls(1, 1)]))
-    observe_basins(0.0, model.start, out, handle, found)
+    slate = Slate(model)
+    observe_basins(0.0, model.start, out, slate.handle, found)
     assert found[0] == approx(-3.0 / RHO, rel=1e-14)
-    observe_dense_flows(0.0, model.start, out, handle, found)
+    observe_dense_flows(0.0, model.start, out, slate.handle, found)
     assert found[0] == approx(-3.0 / (RHO * np.exp((3e7 - AMBIENT) / 2.2e9)), rel=1e-9)
 
 

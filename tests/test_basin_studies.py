@@ -13,6 +13,7 @@ from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, va
 
 import fvsolve
 from fvsolve.errors import FvsolveError
+from fvsolve.model import Slate
 from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
 from fvsolve.model.basins.free_surface import FreeSurface
 from fvsolve.model.dependence import sparsity
@@ -280,7 +281,7 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
         links = {"tap": valve("pool.west", "lake", 0.2) | {"opening": opening}}
         model = built(scene(nodes, links, 1.0, PLANE, ["tap.flow"]))
         y = model.scale * np.random.default_rng(5).normal(scale=0.5, size=model.y_size)
-        accounts = Accounts(model)
+        accounts = Accounts(Slate(model))
         power = accounts.power_at(0.5, y, np.zeros(model.y_size), model.new_out())
         kinds = {(one.what, one.place): value for one, value in zip(accounts.accounts, power, strict=True)}
         found.append(kinds)

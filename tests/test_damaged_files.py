@@ -19,10 +19,13 @@ from fvsolve.studies import sweep
 
 KEPT = """
 import sys, warnings
+from pathlib import Path
 import numpy as np
-from fvsolve.jit import njit, written_folder
-folder = written_folder()
+from fvsolve.jit import add_sources, cache_folder
+folder = Path(cache_folder()) / "sources"
+folder.mkdir(exist_ok=True)
 (folder / "probe.py").write_text("from fvsolve.jit import njit\\n@njit\\ndef twice(x):\\n    return 2.0 * x\\n")
+add_sources(folder)
 sys.path.insert(0, str(folder))
 if len(sys.argv) > 1:
     import resource

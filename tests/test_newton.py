@@ -198,7 +198,7 @@ def test_what_is_remembered_twice_has_no_factors_either(name):
         again.stepper.remember(memory)
         memory = flat(again)
     assert again.stepper.work[slots.SHIFT] == -loop.stepper.work[slots.SHIFT] < 0.0  # the sign of factors to be made
-    again.now[:] = loop.now
+    again.now[:], again.armed[:] = loop.now, loop.armed
     for one in (loop, again):
         one.resume(0.01, 1e308)
         one.run(5)

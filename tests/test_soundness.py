@@ -15,6 +15,7 @@ import fvsolve
 from fvsolve.limits.grid import advection_limit
 from fvsolve.limits.plane import plane_limit
 from fvsolve.limits.step import step_limits
+from fvsolve.model import Slate
 from fvsolve.run import model_of
 from fvsolve.solve.loop import MOST_IN_A_SPAN, SPAN, Loop
 from fvsolve.solve.soundness import OPEN, Soundness, unclosed
@@ -211,7 +212,7 @@ def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
 
 def test_what_must_not_be_exceeded_follows_the_start_and_what_is_given():
     """1 l/s of 1000 kg/m3: no wave below a million times 1 kg/s is growth, and none beyond it is anything else."""
-    watch = Soundness(model_of(closing(scheme="upwind", method="euler", courant=1.0)))
+    watch = Soundness(Slate(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
     assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
     assert not watch.look(0.0, 0.99 * watch.largest) and watch.look(0.0, 1.01 * watch.largest).startswith("stopped: ")
 
@@ -251,7 +252,7 @@ def test_events_that_crowd_within_one_step_are_bounded_where_nothing_grows():
     model = model_of(chattering(1.0))
     assert "check opens and shuts without end" in result.reason and not result.ok and not said(result, "growth")
     times = [event["time"] for event in result.summary["events"]]
-    assert len(times) == MOST_IN_A_SPAN + 4 * model.tables.armed.size and times[-1] - times[0] < 1.0
+    assert len(times) == MOST_IN_A_SPAN + 4 * model.shapes.armed and times[-1] - times[0] < 1.0
     finer = fvsolve.run(chattering(0.1))
     assert finer.ok and len(finer.summary["events"]) == 3000
 

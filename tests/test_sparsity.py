@@ -13,6 +13,7 @@ from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
 from fvsolve.jit import njit
+from fvsolve.model import Slate
 from fvsolve.model.dependence import sparsity
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.signatures import function_types
@@ -131,9 +132,10 @@ def compiled_differences():
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     """d(dydt, supply)/dy : float64[n + nodes, n], by the compiled differences."""
     n, m, at = model.y_size, len(model.node_names), int(model.layout["supply"])
-    f, out = model.evaluate(t, y)
+    slate = Slate(model)
+    f, out = slate.evaluate(t, y, np.inf)
     supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
-    given = (model.functions.rhs, model.handle, structure.shape, at, t, y, f, supply, model.scale)
+    given = (model.functions.rhs, slate.handle, structure.shape, at, t, y, f, supply, model.scale)
     calls = compiled_differences()(*given, np.zeros(n), np.zeros(n), model.new_out(), jacobian)
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)

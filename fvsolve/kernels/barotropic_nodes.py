@@ -32,7 +32,7 @@ from fvsolve.kernels.density import (
     pressure_of_mass,
     velocity_change,
 )
-from fvsolve.kernels.emitters import emitter_flow, emitter_step, rule_of
+from fvsolve.kernels.emitters import FREE, emitter_flow, emitter_step, rule_of
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.isolated import find_held, inner_row
@@ -190,13 +190,19 @@ def valve_drive(tables, out, k):
 
 @njit
 def valve_target(tables, out, k, g):
+    """`target_under` the rule that holds now."""
+    return target_under(rule_of(tables, k) if tables.valves[k]["law"] == POWER else FREE, tables, out, k, g)
+
+
+@njit
+def target_under(rule, tables, out, k, g):
     """(M |M| that a valve asks for, or the flow where its law has a laminar part or is a power; its G now)."""
     valve = tables.valves[k]
     drop, denser = valve_drive(tables, out, k)
     dense = g * denser
     if valve["law"] == POWER:
         dense *= denser  # it is its volume that follows the drop
-        return emitter_flow(tables.floats, valve["data"], dense, drop, rule_of(tables, k)), dense
+        return emitter_flow(tables.floats, valve["data"], dense, drop, rule), dense
     if valve["law"] == TWO_WAY and drop < 0.0:
         dense *= valve["back"]
     if valve["transition"] > 0.0:

@@ -11,7 +11,7 @@ import os
 
 import numpy as np
 
-from fvsolve.jit import njit
+from fvsolve.jit import njit, once
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import table_types
 
@@ -49,6 +49,7 @@ def argument_types(letters: str) -> tuple:
     return tuple(kinds[letter] for letter in letters)
 
 
+@once
 def compile_as(function, letters: str) -> None:
     """Compile for arguments of these kinds, and for no others."""
     if hasattr(function, "compile") and not function.overloads:

@@ -2,7 +2,7 @@
 
 import functools
 
-from fvsolve.jit import beside, njit
+from fvsolve.jit import beside, njit, once
 from fvsolve.kernels import calls
 from fvsolve.kernels.phases import CLOSING, PHASES, Cast
 
@@ -58,7 +58,7 @@ class Functions:
         return self.all(calls.POWER, power, calls.power_in_turn), self.all(calls.STORED, stored, calls.stored_in_turn)
 
 
-functions = functools.cache(Functions)
+functions = once(Functions)
 
 
 def compile_readers(cast: Cast) -> tuple:
@@ -74,7 +74,7 @@ def compile_readers(cast: Cast) -> tuple:
     return calls.record_in_turn, calls.events_in_turn
 
 
-@functools.cache
+@once
 def leap_function(wanted: bool):
     """A whole step of upwind and Euler under the linear law; not wanted, something of its type to pass on."""
     found = stay

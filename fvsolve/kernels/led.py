@@ -123,7 +123,7 @@ def led_by_lift(t, y, tables, out, k, which, standing, inertia, other, drop):
     before, behind = (standing, other) if ahead else (other, standing)
     still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
     driving, speed = lift_drop(drop, still, slope, heavy)
-    if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables.settings[0]["step"] == 0.0:
+    if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables.clock[0]["step"] == 0.0:
         return driving, speed
     way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
     root = kept_root(y, tables, out, k, which, way, sqrt(driving), slope, heavy)
@@ -140,7 +140,7 @@ def kept_root(y, tables, out, k, which, way, root, slope, heavy):
     dense, column = tables.valves[which]["conductance"], tables.columns[k]
     x = sqrt(conductance(tables, out, which) / dense)
     own = way * (column["flow"] + y[column["y"]]) / sqrt(dense)
-    slow = 4.0 * tables.settings[0]["step"] * root * (1.0 / heavy + root * slope)
+    slow = 4.0 * tables.clock[0]["step"] * root * (1.0 / heavy + root * slope)
     return root + (own - x * root) / max(x, slow)
 
 
@@ -272,7 +272,7 @@ def led_rate(t, y, tables, out, k, end):
 @njit
 def led_flow(t, y, tables, out, k, end, solved):
     """(flow out of column k through the valves that lead it, its rate, p' of that end)."""
-    column, limit = tables.columns[k], tables.settings[0]["limit"]
+    column, limit = tables.columns[k], tables.clock[0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
     if lone_lead(tables, x) >= 0:
         return led_from_rest(t, y, tables, out, k, end, lone_lead(tables, x), solved)

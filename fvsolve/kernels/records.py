@@ -1,7 +1,8 @@
-"""The one fixed record type of each table that a model is made of. Knows layouts; knows no laws.
+"""The one fixed record type of each table of a model, and of what its runs write. Knows layouts; knows no laws.
 
-A model's `tables` are these arrays by name, `tables.nodes[i]["mass"]` in Python as in compiled code. Their types are
-part of every compiled signature, so they are fixed here once and a new scene compiles nothing.
+A model's `tables` are these arrays by name, `tables.nodes[i]["mass"]` in Python as in compiled code, which finds beside
+them what the run writes, `tables.armed`. Their types are part of every compiled signature, so they are fixed here once
+and a new scene compiles nothing.
 """
 
 import functools
@@ -59,8 +60,6 @@ SETTINGS = np.dtype(
         ("vapor", "f8"),  # vapour pressure [Pa]
         ("rate", "f8"),  # greatest wave rate that does not change, speed / dx [1/s]
         ("stop_below", "i8"),  # 1: a pressure below vapour pressure ends the run
-        ("limit", "f8"),  # end of the segment: schedules take their left limit from here on [s]
-        ("step", "f8"),  # that is given; 0 where steps follow what they meet [s]
         ("law", "i8"),
         ("beta", "f8"),  # bulk modulus of the fluid [Pa]
         ("reference", "f8"),  # pressure at which rho holds [Pa]
@@ -348,11 +347,11 @@ BASIN = np.dtype(
         ("area", "i8"),  # of cells [m2]
         ("reflect", "i8"),  # what comes back of waves, a value for each face of the boundary
         ("outer_given", "i8"),  # how many values these are: 0 for walls everywhere
-        ("through", "i8"),  # flows inward through faces of the boundary; -1 where none is open
-        ("unused", "i8"),  # rates that only tell what passes it
+        ("through", "i8"),  # flows inward through faces of the boundary; -1 where none is open; see `plane.behind`
+        ("unused", "i8"),  # offsets in `work`: rates that only tell what passes it
         ("mesh", "i8"),  # numbers of a mesh, in `plane` and
         ("links", "i8"),  # in `integers`
-        ("work", "i8"),
+        ("work", "i8"),  # of `work`
         ("thickness", "f8"),  # [m]
         ("speed", "f8"),  # of waves in a liquid at rest [m/s]
         ("density", "f8"),  # of a liquid at rest [kg/m3]
@@ -360,9 +359,9 @@ BASIN = np.dtype(
         ("small", "f8"),  # what is too small to mean anything, squared
         ("carried", "i8"),  # first state of scalars, depth times value, one after the other; -1 for none
         ("lost", "i8"),  # first of its cells among the losses of a scalar
-        ("flows", "i8"),  # flows through faces: of columns, then of rows, or of a mesh; -1 where nobody asks
-        ("outside", "i8"),  # of each scalar, values beyond the boundary
-        ("toil", "i8"),  # what scalars are carried in
+        ("flows", "i8"),  # through faces: of columns, then of rows, or of a mesh; -1 where nobody asks
+        ("outside", "i8"),  # in `work`: of each scalar, values beyond the boundary
+        ("toil", "i8"),  # and what scalars are carried in
         ("fastest", "f8"),  # rate of a given velocity [1/s]
         ("period", "f8"),  # of its turning back [s]; 0 for none
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
@@ -409,6 +408,14 @@ SCALAR = np.dtype(
     align=True,
 )
 
+CLOCK = np.dtype(
+    [
+        ("limit", "f8"),  # end of the segment: schedules take their left limit from here on [s]
+        ("step", "f8"),  # that is given; 0 where steps follow what they meet [s]
+    ],
+    align=True,
+)
+
 RECORDS = {
     "settings": SETTINGS,
     "layout": LAYOUT,
@@ -428,11 +435,13 @@ RECORDS = {
     "patches": PATCHES,
     "scalars": SCALAR,
 }
-ARRAYS = ("integers", "floats", "profile", "scratch", "marks", "armed", "spare", "plane")  # int64[:], then float64[:]
-MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]
-Tables = namedtuple("Tables", (*RECORDS, *ARRAYS, *MATRICES))
-# behind a handle, with addresses of functions, int64[:, :]: of pieces, a row a job, and of devices, a row a law
-Called = namedtuple("Called", (*Tables._fields, "calls", "hooks"))
+# Of a model, which nobody writes; of one run, which writes them; behind a handle, with addresses of functions: of
+# pieces, a row a job, and of devices, a row a law.
+Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
+Written = namedtuple("Written", ("clock", "work", "armed", "marks", "scratch", "spare", "envelope", "extremes"))
+Called = namedtuple("Called", (*Tables._fields, *Written._fields, "calls", "hooks"))
+MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are no records float64[:]
+INTEGERS = ("integers", "calls", "hooks")  # but int64
 
 
 @functools.cache
@@ -440,8 +449,9 @@ def table_types() -> Called:
     """Numba's types of the tables behind a handle."""
     from numba import from_dtype, types
 
-    records = [types.Array(from_dtype(dtype), 1, "C") for dtype in RECORDS.values()]
-    flats = [types.Array(types.int64 if name == "integers" else types.float64, 1, "C") for name in ARRAYS]
-    matrices = [types.Array(types.float64, 2, "C") for _ in MATRICES]
-    addresses = types.Array(types.int64, 2, "C")
-    return Called(*records, *flats, *matrices, addresses, addresses)
+    def of(name):
+        record = {**RECORDS, "clock": CLOCK}.get(name)
+        values = from_dtype(record) if record else types.int64 if name in INTEGERS else types.float64
+        return types.Array(values, 2 if name in (*MATRICES, "calls", "hooks") else 1, "C")
+
+    return Called(*map(of, Called._fields))

@@ -29,10 +29,14 @@ def piece_value(pieces, row, t):
 
 @njit(forceinline=True)
 def schedule_value(tables, index, t):
-    """Value of schedule `index` at t [s], right-continuous, but its left limit from settings.limit on."""
-    limit = tables.settings[0]["limit"]
-    record = tables.schedules[index]
-    pieces = tables.pieces
+    """Value of schedule `index` at t [s], its left limit from the end of the segment on."""
+    return value_until(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
+
+
+@njit(forceinline=True)
+def value_until(schedules, pieces, index, t, limit):
+    """Value of schedule `index` at t [s], right-continuous, but its left limit from `limit` on."""
+    record = schedules[index]
     if record["pieces"] == 1:
         return piece_value(pieces, record["first"], t)
     row = piece_at(pieces, record["first"], record["pieces"], t, limit)

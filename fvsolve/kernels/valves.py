@@ -31,8 +31,13 @@ def relative_area(kind, floats, table, size, opening):
 @njit(forceinline=True)
 def valve_conductance(tables, index, t):
     """G = 2 rho (Cd A)^2 at time t [kg2/s2/Pa]."""
+    return conductance_of(tables, index, schedule_value(tables, tables.valves[index]["schedule"], t))
+
+
+@njit(forceinline=True)
+def conductance_of(tables, index, opening):
+    """The same at an opening."""
     valve = tables.valves[index]
-    opening = schedule_value(tables, valve["schedule"], t)
     area = relative_area(valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening)
     return valve["conductance"] * area * area
 

@@ -90,20 +90,20 @@ def own_modes(model) -> Modes:
     which = lumped(model)
     if not 0 < which.size <= MOST:
         return []
-    t, y, width, armed = model.case.numerics.start, model.start, SHARE * spreads(model), model.tables.armed
-    kept, out, j = armed.copy(), model.new_out(), np.zeros((which.size, which.size))
-    model.evaluate(t, y)  # which sets what holds there
+    t, y, width = float(model.case.numerics.start), model.start, SHARE * spreads(model)
+    out, j = model.new_out(), np.zeros((which.size, which.size))
 
     def rates(moved: np.ndarray) -> np.ndarray:
         found = np.zeros(model.y_size)
-        model.functions.rhs(float(t), moved, found, out, model.handle)
+        model.functions.rhs(t, moved, found, out, slate.handle)
         return found[which]
 
-    for k, i in enumerate(which):
-        high, low = y.copy(), y.copy()
-        high[i], low[i] = y[i] + width[i], y[i] - width[i]
-        j[:, k] = (rates(high) - rates(low)) / (2.0 * SHARE)
-    armed[:] = kept
+    with model.slate() as slate:
+        slate.evaluate(t, y, np.inf)  # which sets what holds there
+        for k, i in enumerate(which):
+            high, low = y.copy(), y.copy()
+            high[i], low[i] = y[i] + width[i], y[i] - width[i]
+            j[:, k] = (rates(high) - rates(low)) / (2.0 * SHARE)
     j /= spreads(model)[which][:, None]
     if not np.all(np.isfinite(j)):
         return []

@@ -68,12 +68,10 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
 
 def first_step(model) -> float:
     """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
-    numerics, armed = model.case.numerics, model.tables.armed
+    numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step
-    kept = armed.copy()
     rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
-    armed[:] = kept
     return numerics.courant / rate if rate > 0.0 else 0.0
 
 

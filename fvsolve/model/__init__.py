@@ -2,5 +2,6 @@
 
 from fvsolve.model.build import build
 from fvsolve.model.model import Model, PipeMesh, State
+from fvsolve.model.slate import Slate
 
-__all__ = ["Model", "PipeMesh", "State", "build"]
+__all__ = ["Model", "PipeMesh", "Slate", "State", "build"]

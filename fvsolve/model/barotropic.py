@@ -8,8 +8,8 @@ import numpy as np
 
 from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, valve_target
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, target_under
+from fvsolve.kernels.emitters import FREE
 from fvsolve.model.density import cavity_pressure
 from fvsolve.model.start import PRESSURE_SCALE, STORED, Start
 
@@ -67,7 +67,7 @@ class BarotropicStart(Start):
             return self.case.ambient_pressure if node.pressure is None else node.pressure
         if row["kind"] == rec.TANK:
             return head_pressure(self.st, self.floats, float(node.level))
-        value = schedule_value(self.draft.tables, int(row["schedule"]), self.t)
+        value = self.given(row["schedule"])
         return head_pressure(self.st, self.floats, value - row["elevation"]) if row["head_given"] else value
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
@@ -227,7 +227,7 @@ class BarotropicStart(Start):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
             if row["open"] > 0.0 and row["law"] < rec.CURVE:
-                target = valve_target(self.draft.tables, out, k, float(row["open"]))[0]
+                target = target_under(FREE, self.draft.tables, out, k, float(row["open"]))[0]
                 follows = row["transition"] > 0.0 or row["law"] == rec.POWER
                 asked = target if follows else np.sign(target) * np.sqrt(abs(target))
                 if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):

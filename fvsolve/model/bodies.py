@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.schedules import schedule_value
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
 SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of bodies that no chamber holds, of bodies that nothing holds
@@ -115,7 +114,7 @@ def start_bodies(draft, start) -> list[str]:
     size = np.zeros(len(bodies))
     for row in draft.brace_table:
         if row["schedule"] >= 0:
-            row["given"] = row["force"] = schedule_value(draft.tables, int(row["schedule"]), start.t)
+            row["given"] = row["force"] = start.given(row["schedule"])
     for row in draft.piston_table:
         a, b = nodes[row["a"]], nodes[row["b"]]
         row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]

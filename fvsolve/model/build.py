@@ -23,6 +23,7 @@ from fvsolve.model.ranges import flow_notices
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import scheme_settings
+from fvsolve.model.slate import LINE, lined
 from fvsolve.model.unsteady import reserve
 from fvsolve.parts import EDGES
 from fvsolve.parts.schedule import constant
@@ -48,9 +49,6 @@ def build(case) -> Model:
     return draft.model()
 
 
-LINE = 8  # floats of a cache line
-
-
 class Draft:
     """The tables of one model while they are filled."""
 
@@ -60,7 +58,7 @@ class Draft:
         self.schedules = Schedules()
         self.floats: list[float] = []
         self.pieces_of_plane: list[np.ndarray] = []
-        self.plane_size = 0
+        self.plane_size = self.work_size = 0
         cylinders = [name for name, link in case.links.items() if link.kind == "cylinder"]
         self.moving_names = {f"{name}.{place}" for name in cylinders for place in "AB"}
         self.node_index = {name: i for i, name in enumerate(case.places)}
@@ -93,11 +91,18 @@ class Draft:
 
     def plane(self) -> np.ndarray:
         """All values of the plane, from a cache line on."""
-        room = np.zeros(self.plane_size + LINE)
-        first = -(room.ctypes.data // 8) % LINE
-        made = room[first : first + self.plane_size]
+        made = lined(self.plane_size)
         np.concatenate([np.zeros(0), *self.pieces_of_plane], out=made)
         return made
+
+    def to_work(self, size: int) -> int:
+        """Offset of new room in `work`, where a cache line begins."""
+        self.work_size += size + -size % LINE
+        return self.work_size - size - -size % LINE
+
+    def room(self) -> int:
+        """Numbers that basins have taken so far."""
+        return self.plane_size + self.work_size + len(self.integers)
 
     @property
     def device_names(self) -> list[str]:
@@ -320,19 +325,20 @@ class Draft:
         return int(at)
 
     def pack(self, profile: np.ndarray) -> None:
-        """Make the tuple of tables; records stay the same arrays, so later changes are seen."""
+        """Make the tuple of tables, and shape what runs write; records stay the same arrays: later changes are seen."""
         case, pipes = self.case, self.pipe_table
         settings = np.zeros(1, rec.SETTINGS)
         s = settings[0]
         scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
         s["viscosity"] = self.fluid.viscosity or 0.0
-        s["ambient"], s["gravity"], s["limit"] = case.ambient_pressure, case.gravity, np.inf
+        s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
         s["vapor"] = self.fluid.vapor_pressure
         s["stop_below"] = case.numerics.below_vapor == "stop"
         add_law(self.fluid, s, self.floats)
         s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
+        schedules.flags.writeable = pieces.flags.writeable = False  # from here on, as in the model
         most, cells = max(pipes["cells"], default=0), self.cells
         system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in self.cluster_table), default=0)
         rigid = int(np.sum(self.node_table["columns"] > 1))
@@ -357,22 +363,21 @@ class Draft:
             layout[name], at = at, at + size
         layout["size"] = at
         parts = len(pipes) + 3 * len(self.node_table) + len(self.column_table)
-        marks = np.full(parts + 2 * len(self.device_table) + len(self.piston_table), np.nan)
+        marks = parts + 2 * len(self.device_table) + len(self.piston_table)
         if s["floor"] > 0.0:  # first place, greatest volume and its time of the cavities of each pipe
-            marks = np.append(marks, np.full(3 * len(pipes), np.nan))
+            marks += 3 * len(pipes)
             s["vapor"] = cavity_pressure(self.fluid)
-        envelope, extremes = np.empty((4, cells)), np.empty((4, len(self.probe_table)))
-        for array in (envelope, extremes):
-            array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
         self.tables = rec.Tables(
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,
             self.device_table, self.basin_table, self.patch_table, self.scalar_table,
-            np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile,
-            np.zeros(max((5 if many else 4) * most + 64, system, 2 * len(self.body_table), 4 * carried)), marks,
-            np.zeros(limits.EVENTS * self.tanks + len(self.events) + 2 * len(self.stop_table)), np.zeros(at),
-            self.plane(),
-            pieces, envelope, extremes,
+            np.array(self.integers, dtype=np.int64), np.array(self.floats, dtype=float), profile, self.plane(), pieces,
+        )  # fmt: skip
+        self.shapes = rec.Written(
+            clock=1, work=self.work_size, marks=marks,
+            armed=limits.EVENTS * self.tanks + len(self.events) + 2 * len(self.stop_table),
+            scratch=max((5 if many else 4) * most + 64, system, 2 * len(self.body_table), 4 * carried), spare=at,
+            envelope=(4, cells), extremes=(4, len(self.probe_table)),
         )  # fmt: skip
 
     def column_rates(self):
@@ -395,8 +400,8 @@ class Draft:
         start = self.start_state()
         self.warnings += [*dispersion.warnings(self.basins, start), *coarse_for_cavities(self), *flow_notices(self)]
         return Model(
-            case, self.tables, self.state_names, np.array(self.scale), inside, self.schedules.spacing, self.meshes,
-            list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
+            case, self.tables, self.shapes, self.state_names, np.array(self.scale), inside, self.schedules.spacing,
+            self.meshes, list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
             self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
             self.steady, self.profiles, self.devices, start, self.events,
             self.basins,

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
-from fvsolve.model.model import Model
+from fvsolve.model.slate import Slate
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,14 @@ class Account:
 
 
 class Accounts:
-    """Power rows and stored rows of a model by account.
+    """Power rows and stored rows of a model by account, read by the slate of the run that they are of.
 
     stored rows and the power rows of their rates stand in the same order in `stored` and `rates`.
     """
 
-    def __init__(self, model: Model) -> None:
-        self.model, case = model, model.case
+    def __init__(self, slate: Slate) -> None:
+        self.slate, self.model = slate, slate.model
+        model, case = slate.model, slate.model.case
         if model.basins and case.fluid.law != "linear":
             raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies
@@ -156,20 +157,20 @@ class Accounts:
 
     def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Power of every line [W] : float64[lines], from a state; its rates and `out` are written here."""
-        self.model.functions.rhs(t, y, dydt, out, self.model.handle)
+        self.model.functions.rhs(t, y, dydt, out, self.slate.handle)
         return self.power_by(t, y, dydt, out)
 
     def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
         """The same, from a state with rates and `out` as given."""
         rows = np.zeros(self.powers)
-        self.power(t, y, dydt, out, self.model.handle, rows)
+        self.power(t, y, dydt, out, self.slate.handle, rows)
         return self.matrix @ rows
 
     def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
         """Change of what every part stores since the profile [J] : float64[held]."""
         rows, out = np.zeros(self.stores), self.model.new_out()
-        self.model.functions.rhs(t, y, np.zeros(0), out, self.model.handle)
-        self.stored(t, y, np.zeros(0), out, self.model.handle, rows)
+        self.model.functions.rhs(t, y, np.zeros(0), out, self.slate.handle)
+        self.stored(t, y, np.zeros(0), out, self.slate.handle, rows)
         return self.holding @ rows
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,6 +14,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.scalars import node_values, pipe_values
+from fvsolve.model.slate import Slate
 from fvsolve.schemes import SCHEMES
 from fvsolve.shown import Shown
 from fvsolve.units import show
@@ -60,15 +64,28 @@ class State(Shown):
         return {"y": self.y}
 
 
+def flags_of(state: State, model: Model) -> np.ndarray | float:
+    """Flags of devices that a state remembers, if `advance` gave it; 0 of others."""
+    return state.memory[2:] if state.memory.size == 2 + model.shapes.armed else 0.0
+
+
 def given_numbers(name: str, given: Any) -> np.ndarray:
-    """What is given as float64[...], itself where it is that; FvsolveError where it is not made of real numbers."""
+    """What is given as float64[...] that can be written, itself where it is that; FvsolveError if not real numbers."""
     try:
         found = np.asarray(given)
         if found.dtype.kind not in "fiu":
             raise TypeError
-        return np.ascontiguousarray(found, dtype=np.float64) if found.ndim else found.astype(np.float64)
+        return np.require(found, np.float64, ("C", "W")) if found.ndim else found.astype(np.float64)
     except (TypeError, ValueError):
         raise FvsolveError(f"{name} = {show(given)} is not made of real numbers") from None
+
+
+def given_limit(limit: Any) -> float:
+    """Where a segment ends [s], or infinity; FvsolveError where it is no time."""
+    found = given_numbers("limit", limit)
+    if found.ndim or np.isnan(found):
+        raise FvsolveError(f"limit = {show(found)} is no time; wanted a number of seconds, or infinity")
+    return float(found)
 
 
 def given_time(t: Any) -> float:
@@ -81,15 +98,16 @@ def given_time(t: Any) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Shown):
-    """A case made ready; frozen.
+    """A case made ready; frozen, so that runs may share it: what a run writes is on a `Slate` of its own.
 
-    tables : the arrays that kernels read, by name
+    tables : the arrays that kernels read, by name; shapes : of those that a run writes, see `Slate`
     scale : float64[n]  what counts as a small deviation of each state is measured against
     breaks : (time [s], whether a value jumps), rising, inside the run
     """
 
     case: Case
     tables: rec.Tables
+    shapes: rec.Written
     state_names: list[str]
     scale: np.ndarray
     breaks: list[tuple[float, bool]]
@@ -110,8 +128,13 @@ class Model(Shown):
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
     basins: list[Basin]  # as their table has them
+    slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
 
     picture = "fvsolve.draw.objects:model_figure"
+
+    def __post_init__(self) -> None:
+        for array in (*self.tables, self.scale, self.start, *self.profiles.values()):
+            array.flags.writeable = False
 
     def said(self) -> str:
         cells = f", {self.all_cells} cells" if self.all_cells else ""
@@ -152,11 +175,7 @@ class Model(Shown):
         found = float(self.wave_rates.max(initial=0.0))
         if not self.basins:
             return found
-        armed = self.tables.armed
-        kept = armed.copy()
-        rate = self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]
-        armed[:] = kept
-        return max(found, float(rate))
+        return max(found, float(self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]))
 
     @property
     def unsteady(self) -> bool:
@@ -189,13 +208,6 @@ class Model(Shown):
         return self.tables.layout[0]
 
     @cached_property
-    def handle(self):
-        """The tables, and what there is to call, as compiled functions take them."""
-        from fvsolve.kernels.handle import make_handle
-
-        return make_handle((*self.tables, self.functions.calls, self.functions.hooks))
-
-    @cached_property
     def structure(self):
         """Pattern of the Jacobian and the linear algebra that fits it, or that `numerics.linear_algebra` names."""
         from fvsolve.model.dependence import sparsity
@@ -225,35 +237,27 @@ class Model(Shown):
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
         """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there."""
-        armed = self.tables.armed
-        kept = armed.copy()
-        armed[:] = 0.0
-        found = self.evaluate(t, y)[0]
-        armed[:] = kept
-        return found
+        return self.evaluate(t, y)[0]
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-        """(dydt, out) at t; from `limit` [s] on schedules take their left limit there."""
-        t, y = self.given(t, y)
-        limit = given_numbers("limit", limit)
-        if limit.ndim or np.isnan(limit):
-            raise FvsolveError(f"limit = {show(limit)} is no time; wanted a number of seconds, or infinity")
-        self.tables.settings[0]["limit"] = limit
-        dydt, out = np.zeros(self.y_size), self.new_out()
-        self.arm(t, y)
-        self.functions.rhs(t, y, dydt, out, self.handle)
-        return dydt, out
+        """(dydt, out) at t, as `rhs`; from `limit` [s] on schedules take their left limit there."""
+        limit = given_limit(limit)
+        with self.slate() as slate:
+            return slate.evaluate(t, y, limit)
 
-    def arm(self, t: float, y: np.ndarray) -> None:
-        """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
-        t, y = self.given(t, y)
-        armed, g = self.tables.armed, np.zeros(self.tables.armed.size)
-        for _ in range(3 + 2 * len(self.events)):
-            self.functions.events(t, y, self.handle, g)
-            changed = np.any((g <= 0.0) != (armed > 0.0))
-            armed[:] = g <= 0.0
-            if not changed:
-                return
+    @contextmanager
+    def slate(self, armed: np.ndarray | float = 0.0) -> Iterator[Slate]:
+        """A slate for a look at single states, with flags as given, 0 for those of a start; the next look takes it.
+
+        Its marks and extremes say nothing.
+        """
+        try:
+            slate = self.slates.pop()  # which no other thread then has
+        except IndexError:
+            slate = Slate(self)
+        slate.armed[:] = armed
+        yield slate
+        self.slates.append(slate)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
@@ -268,12 +272,16 @@ class Model(Shown):
         return found
 
     def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
-        """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI]."""
-        t, y = self.given(t.t, t.y) if isinstance(t, State) and y is None else self.given(t, y)
-        out = self.evaluate(t, y, limit)[1]
-        values = np.zeros(len(self.probes))
-        self.functions.observe(float(t), y, out, self.handle, values)
-        return values
+        """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI].
+
+        Devices stand as at a start from there, or as a state that `advance` gave remembers.
+        """
+        armed, limit = 0.0, given_limit(limit)
+        if isinstance(t, State) and y is None:
+            t, y, armed = t.t, t.y, flags_of(t, self)
+        t, y = self.given(t, y)
+        with self.slate(armed) as slate:
+            return slate.observe(t, y, slate.evaluate(t, y, limit)[1])
 
     # what the numbers mean ----------------------------------------------------------------------------------
 
@@ -345,16 +353,13 @@ class Model(Shown):
         for k, pipe in enumerate(self.pipes):
             row = self.tables.pipes[k]
             n, o = pipe.cells, row["y"]
-            cells = row["cell"] + np.arange(n)
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
             swollen = row["area"] if linear else self.swollen(row, pressure)
             flow = mass_flow / (rho if linear else self.density(pressure))
-            low, high = (self.cell_pressure(k, self.tables.envelope[i, cells]) for i in (0, 2))
             found[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / swollen,
-                "flow": flow, "least_pressure": np.minimum(low, pressure),
-                "greatest_pressure": np.maximum(high, pressure), **pipe_values(self, k, y),
+                "flow": flow, "least_pressure": pressure, "greatest_pressure": pressure, **pipe_values(self, k, y),
             }  # fmt: skip
         nodes = self.tables.nodes
         at = int(self.layout["pressure"])

@@ -13,8 +13,8 @@ from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.emitters import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_step
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
-from fvsolve.kernels.schedules import schedule_value
-from fvsolve.kernels.valves import flow_at_drop, flow_slope, transition_of, valve_conductance
+from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.bodies import start_bodies
 from fvsolve.steady import Edge, solve_steady
 
@@ -34,7 +34,6 @@ class Start:
         self.columns, self.valves, self.pistons = draft.column_table, draft.valve_table, draft.piston_table
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
-        draft.tables.settings[0]["limit"] = self.t
         self.weight = draft.fluid.density * self.case.gravity
         sizes = [
             1e-9,
@@ -64,6 +63,10 @@ class Start:
         """Density [kg/m3] at node i."""
         return self.draft.fluid.density
 
+    def given(self, schedule: int) -> float:
+        """What a schedule gives up to the start."""
+        return float(value_until(self.draft.tables.schedules, self.draft.tables.pieces, int(schedule), self.t, self.t))
+
     def given_pressure(self, row, node) -> float:
         """Pressure [Pa] of a reservoir or tank at the start."""
         if row["kind"] == rec.PATCH and node.pressure is not None:
@@ -72,7 +75,7 @@ class Start:
             return self.case.ambient_pressure + self.weight * (node.depth or 0.0)
         if row["kind"] == rec.TANK:
             return self.case.ambient_pressure + self.weight * node.level
-        return schedule_value(self.draft.tables, int(row["schedule"]), self.t)
+        return self.given(row["schedule"])
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
@@ -149,7 +152,7 @@ class Start:
             elif row["kind"] == rec.MOVING and not self.touched(i):
                 held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
             elif row["kind"] == rec.JUNCTION:
-                demand[i] = schedule_value(self.draft.tables, int(row["schedule"]), self.t)
+                demand[i] = self.given(row["schedule"])
         return held, np.zeros_like(demand) if self.rest else demand
 
     def touched(self, i: int) -> bool:
@@ -233,7 +236,7 @@ class Start:
     def conductance(self, k: int) -> float:
         """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""
         if self.valves[k]["device"] < 0:
-            return valve_conductance(self.draft.tables, k, self.t)
+            return conductance_of(self.draft.tables, k, self.given(self.valves[k]["schedule"]))
         return 0.0 if k in self.shut else float(self.valves[k]["conductance"])
 
     def leak_edge(self, k: int) -> Edge:

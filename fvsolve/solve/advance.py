@@ -12,6 +12,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
+from fvsolve.model.model import flags_of
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import automatic, slots
 from fvsolve.units import show
@@ -39,8 +40,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop = Loop(held, lambda: model.structure)  # which does not depend on what is held
     loop.now[:] = state.y
     loop.memory[slots.T] = state.t
-    known = state.memory.size == 2 + loop.armed.size
-    loop.armed[:] = state.memory[2:] if known else 0.0
+    loop.armed[:] = flags_of(state, model)
     loop.on_switch = lambda: loop.stop_columns(loop.orders[slots.END])
     adaptive = loop.orders[slots.CONTROL] == slots.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
@@ -49,7 +49,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         first = loop.t == state.t
         loop.stop_columns(end)
         loop.begin(end, NO_LIMIT)
-        if first and adaptive and known:
+        if first and adaptive and state.memory.size == 2 + loop.armed.size:
             loop.memory[[slots.STEP, slots.ERROR_OLD]] = state.memory[:2]
         code = loop.run(NO_LIMIT)
         while code == slots.CHUNK and automatic.wants_change(loop.stepper):

@@ -33,8 +33,9 @@ class Halves:
     its least and its greatest: what a resumed run needs
     """
 
-    def __init__(self, model) -> None:
-        numerics, self.step = model.case.numerics, float(model.tables.settings[0]["step"])
+    def __init__(self, slate) -> None:
+        model, self.step = slate.model, float(slate.clock["step"])
+        numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
         which = lumped(model) if method.explicit else np.arange(model.y_size)
         self.model, self.which = model, which[: None if self.step > 0.0 else 0]
@@ -94,13 +95,13 @@ class Halves:
         if self.stepper is None:
             model = self.model
             self.stepper = Stepper(
-                loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure, model.scale
+                loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure, model.scale.copy()
             )
             self.stepper.out = model.new_out()
         if fresh:
             self.stepper.forget()
         self.stepper.orders[:] = loop.orders
-        return self.stepper.once(loop.rhs, self.model.handle, int(self.model.layout["supply"]), t, h, y)
+        return self.stepper.once(loop.rhs, loop.slate.handle, int(self.model.layout["supply"]), t, h, y)
 
     def widths(self) -> np.ndarray:
         """Ranges of the states so far."""

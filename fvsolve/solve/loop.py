@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.functions import leap_function
-from fvsolve.model import Model
+from fvsolve.model import Model, Slate
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
 from fvsolve.solve.meeting import let_go, shut_places
@@ -31,10 +31,11 @@ class Loop:
 
     def __init__(self, model: Model, structure: Callable[[], Structure] | None = None) -> None:
         numerics = model.case.numerics
-        self.model, method = model, method_named(automatic.first_method(numerics.method))
+        self.model, self.slate = model, Slate(model)
+        method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * model.tables.armed.size)  # their last times
+        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * self.armed.size)  # their last times
         self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
@@ -53,7 +54,7 @@ class Loop:
         stepper.within = within(model)
         stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
         self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
-        events = model.tables.armed.size
+        events = self.armed.size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
@@ -68,7 +69,7 @@ class Loop:
             self.orders[slots.CONTROL] = slots.FIXED_STEP
             self.orders[slots.SIZE] = numerics.courant / model.wave_rate
         given = self.orders[slots.CONTROL] == slots.FIXED_STEP
-        model.tables.settings[0]["step"] = self.orders[slots.SIZE] if given else 0.0
+        self.slate.clock["step"] = self.orders[slots.SIZE] if given else 0.0
 
     @property
     def now(self) -> np.ndarray:
@@ -95,7 +96,7 @@ class Loop:
         self.orders[slots.END], self.orders[slots.STOP_AT] = end, stop_at
         self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
         self.settle()
-        self.model.tables.settings[0]["limit"] = end
+        self.slate.clock["limit"] = end
 
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
@@ -104,7 +105,7 @@ class Loop:
         while code == slots.SWITCHED:
             before = self.armed.copy()
             code = self.stepper.call(
-                self.leap, self.observe, self.record, self.events, self.rhs, self.model.handle,
+                self.leap, self.observe, self.record, self.events, self.rhs, self.slate.handle,
                 int(self.model.layout["supply"]), self.armed,
             )  # fmt: skip
             if code == slots.SWITCHED:
@@ -115,7 +116,7 @@ class Loop:
     @property
     def armed(self) -> np.ndarray:
         """Which events have happened and still hold (a view)."""
-        return self.model.tables.armed
+        return self.slate.armed
 
     def note(self, before: np.ndarray) -> None:
         """List the events that have happened since the flags were `before`, and do what they do at once."""
@@ -132,7 +133,7 @@ class Loop:
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
-            device.settle(self.model, row, self.now, self.stepper.scale)
+            device.settle(self.slate, row, self.now, self.stepper.scale)
 
     def switch(self, before: np.ndarray) -> bool:
         """Note the events that have just happened; False where they go to and fro at one time, or crowd."""
@@ -147,7 +148,7 @@ class Loop:
     def evaluate(self, limit: float) -> np.ndarray:
         """`out` now, with schedules' left limit from `limit` on; events that a jump has brought are listed."""
         before = self.armed.copy()
-        out = self.model.evaluate(self.t, self.now, limit)[1]
+        out = self.slate.evaluate(self.t, self.now, limit)[1]
         self.note(before)
         return out
 
@@ -157,7 +158,7 @@ class Loop:
         Returns (number, flow [kg/s] that it has lost) of those that had another.
         """
         found, out, layout = [], self.evaluate(limit), self.model.layout
-        while (event := let_go(self.model, self.t, self.now, out)) is not None:
+        while (event := let_go(self.slate, self.t, self.now, out)) is not None:
             before = self.armed.copy()
             self.armed[event], self.armed[event + 1] = 1.0, 0.0
             self.note(before)
@@ -193,5 +194,5 @@ def leap_allowed(model: Model, method: Method) -> bool:
     return bool(
         settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and plain and model.tables.armed.size == 0
+        and model.y_size == 2 * model.cells and plain and model.shapes.armed == 0
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels.rigid import gate_inflow
-from fvsolve.model import Model
+from fvsolve.model import Model, Slate
 
 NONE = 1e-9  # of a small flow: columns that part no quicker are rounding
 
@@ -34,14 +34,15 @@ def air_valve_of(model: Model, i: int) -> int | None:
     return None
 
 
-def brought(model: Model, t: float, y: np.ndarray) -> np.ndarray:
+def brought(slate: Slate, t: float, y: np.ndarray) -> np.ndarray:
     """What columns have carried up to t more than in the profile [kg/s]; at the start, their states."""
-    before, columns, settings = model.new_out(), model.tables.columns, model.tables.settings[0]
+    model = slate.model
+    before, columns = model.new_out(), model.tables.columns
     if t <= model.case.numerics.start:
         return y[columns["y"]]
-    limit, settings["limit"] = float(settings["limit"]), t
-    model.functions.rhs(t, y, np.zeros(0), before, model.handle)
-    settings["limit"] = limit
+    limit, slate.clock["limit"] = float(slate.clock["limit"]), t
+    model.functions.rhs(t, y, np.zeros(0), before, slate.handle)
+    slate.clock["limit"] = limit
     return before[model.layout["column"] :][: len(columns)] - columns["flow"]
 
 
@@ -68,13 +69,14 @@ def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[in
     return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
 
 
-def let_go(model: Model, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+def let_go(slate: Slate, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
     """The event of the air valve where columns part the most, which air lets go on; None where none part."""
+    model = slate.model
     places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]
     if all(event is None for event in events):
         return None
     small = NONE * model.scale[model.tables.columns["y"]].max()
-    pushes = impulses(model, brought(model, t, y), out, places)
+    pushes = impulses(model, brought(slate, t, y), out, places)
     apart = [(push, event) for push, event in zip(pushes, events, strict=True) if event is not None and push < -small]
     return min(apart)[1] if apart else None

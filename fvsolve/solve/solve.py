@@ -75,6 +75,7 @@ class Run:
         self.model, self.sink, self.progress = model, sink, progress
         self.began = time.perf_counter()
         self.loop = self.loop_type(model)
+        self.slate = self.loop.slate
         self.loop.on_switch = self.stop_columns
         numerics, output = model.case.numerics, model.case.output
         self.start, self.end = numerics.start, numerics.end
@@ -89,12 +90,8 @@ class Run:
         self.changes: list[tuple[float, float, float]] = []  # of method, under `auto`
         self.loop.now[:] = state.y
         self.loop.memory[slots.T] = state.t
-        for array in (model.tables.extremes, model.tables.envelope):
-            array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
-        model.tables.marks[:] = np.nan
-        model.tables.armed[:] = 0.0
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.waves, self.soundness = Watch(model), Soundness(model)
+        self.waves, self.soundness = Watch(model), Soundness(self.slate)
         if self.soundness.predicted:
             self.budget = FEW
         self.processor = 0.0  # seconds of CPU time of the steps of this process
@@ -111,7 +108,7 @@ class Run:
 
     def memory(self) -> np.ndarray:
         """Everything that a resumed run needs beside t and y, flat."""
-        kept = [getattr(self.model.tables, name).ravel() for name in PERSISTENT]
+        kept = [getattr(self.slate, name).ravel() for name in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
@@ -142,12 +139,12 @@ class Run:
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
         seen = self.soundness.halves.kept
-        known = [getattr(self.model.tables, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
+        known = [getattr(self.slate, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
         if memory.size != sum(array.size for array in known):
             raise ValueError("as many numbers as there is nothing for")
         memory = self.loop.stepper.remember(memory)
         for name in PERSISTENT:
-            array = getattr(self.model.tables, name).ravel()
+            array = getattr(self.slate, name).ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
         seen[:] = memory
@@ -160,7 +157,7 @@ class Run:
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
         out = self.loop.evaluate(limit)
-        self.loop.record(t, self.loop.now, out, self.model.handle, self.loop.stepper.values)
+        self.loop.record(t, self.loop.now, out, self.slate.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, :].copy())
         return out
 
@@ -172,7 +169,7 @@ class Run:
 
     def widen(self, rows: np.ndarray) -> None:
         """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
-        least, t_least, greatest, t_greatest = self.model.tables.extremes
+        least, t_least, greatest, t_greatest = self.slate.extremes
         for k in range(rows.shape[1] - 1):
             low, high = rows[np.argmin(rows[:, k + 1])], rows[np.argmax(rows[:, k + 1])]
             if low[k + 1] < least[k]:
@@ -182,7 +179,7 @@ class Run:
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.waves.look(t, y)
-        self.sink.field(t, self.model.fields(y, out))
+        self.sink.field(t, self.slate.fields(y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows and frames that are due at a jump or at the end, which are written apart."""
@@ -225,8 +222,8 @@ class Run:
                 len(model.pipes) + 3 * len(model.node_names) + k,
                 model.scale[model.tables.columns[k]["y"]],
             )
-            if abs(flow) > 1e-3 * scale and np.isnan(model.tables.marks[at]):
-                model.tables.marks[at] = t
+            if abs(flow) > 1e-3 * scale and np.isnan(self.slate.marks[at]):
+                self.slate.marks[at] = t
 
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
@@ -357,14 +354,14 @@ class Run:
         ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
-        warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers), *run_downs(model)]
+        warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers), *run_downs(self.slate)]
         warnings += parted(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(
-            reason, ok, loop.t, find_marks(model), ledgers, find_extremes(model),
-            find_envelope(model), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
-            self.setup,
-            [Event(t, *model.events[k]) for t, k in loop.switched], find_cavities(model), warnings,
+            reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
+            find_envelope(self.slate), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds,
+            self.processor, self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
+            find_cavities(self.slate), warnings,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

@@ -20,12 +20,12 @@ class Soundness:
     is given over time, and the jump that stopping the start's flows makes (Joukowsky)
     """
 
-    def __init__(self, model) -> None:
-        self.model = model
+    def __init__(self, slate) -> None:
+        self.model = model = slate.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
         self.predicted = step_limits(model)
-        self.halves = Halves(model)
+        self.halves = Halves(slate)
         self.largest = MOST * drives(model)
         self.grown: Notice | None = None
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
-from fvsolve.model import Model
+from fvsolve.model import Model, Slate
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,10 @@ class Summary:
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
-def find_marks(model: Model) -> list[Mark]:
+def find_marks(slate: Slate) -> list[Mark]:
     """First time and place of everything the model cannot really follow; cavities are none where the law has them."""
-    marks, pipes, nodes = model.tables.marks, model.pipes, model.node_names
+    model, marks = slate.model, slate.marks
+    pipes, nodes = model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(what, place.removesuffix(".inside")) for what, place in kinds]
@@ -113,9 +114,9 @@ def find_marks(model: Model) -> list[Mark]:
     ]
 
 
-def run_downs(model: Model) -> list[Notice]:
+def run_downs(slate: Slate) -> list[Notice]:
     """Pumps that ran forward beyond their curve while they ran down, ahead of a check valve that shuts."""
-    found, marks = [], model.tables.marks
+    model, marks, found = slate.model, slate.marks, []
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     for (name, *_), time in zip(model.devices, marks[first + len(model.devices) :], strict=False):
         if np.isfinite(time):
@@ -125,9 +126,9 @@ def run_downs(model: Model) -> list[Notice]:
     return found
 
 
-def find_cavities(model: Model) -> list[Cavity]:
+def find_cavities(slate: Slate) -> list[Cavity]:
     """Every pipe in which pressure fell below twice the vapour pressure: more vapour than gas between the liquid."""
-    found, marks = [], model.tables.marks
+    model, marks, found = slate.model, slate.marks, []
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
         share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
         if np.isfinite(share):
@@ -138,15 +139,15 @@ def find_cavities(model: Model) -> list[Cavity]:
     return found
 
 
-def find_extremes(model: Model) -> dict[str, tuple[float, float, float, float]]:
+def find_extremes(slate: Slate) -> dict[str, tuple[float, float, float, float]]:
     """Probe -> (least, its time, greatest, its time), over all accepted steps and rows."""
-    table = model.tables.extremes
-    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(model.probes)}
+    table = slate.extremes
+    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(slate.model.probes)}
 
 
-def find_envelope(model: Model) -> dict[str, dict[str, np.ndarray]]:
+def find_envelope(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
     """Pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with their times [s]."""
-    envelope, found = model.tables.envelope, {}
+    model, envelope, found = slate.model, slate.envelope, {}
     for k, pipe in enumerate(model.pipes):
         cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
         least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))

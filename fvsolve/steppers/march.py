@@ -4,10 +4,9 @@ One compiled loop serves every method (a step is a function of declared type, Bu
 model (functions of declared type).
 """
 
-import functools
 from math import isfinite
 
-from fvsolve.jit import njit
+from fvsolve.jit import njit, once
 from fvsolve.steppers.coefficients import error_of, row_of, weights_of
 from fvsolve.steppers.control import closing_step, grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
@@ -256,7 +255,7 @@ def march(
     return DONE
 
 
-@functools.cache
+@once
 def compiled():
     """The loop compiled against its declared types (cached on disk), or plain where JIT is off."""
     if not hasattr(march, "compile"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import itertools
 from collections.abc import Callable
 from numbers import Real
 
@@ -12,6 +13,7 @@ import numpy as np
 from numba import objmode, types
 
 from fvsolve.errors import FvsolveError
+from fvsolve.jit import once
 from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.march import compiled
 from fvsolve.steppers.methods import AUTO
@@ -63,11 +65,12 @@ def integrate(
     orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
     if watched:
         automatic.watch(stepper, _full(y0.size))
-    functions, _PYTHON[id(f)] = _prepared(f, t[0], y0)
+    key = next(_KEYS)
+    functions, _PYTHON[key] = _prepared(f, t[0], y0)
     try:
-        found = _stepped(stepper, functions, id(f), t, y0)
+        found = _stepped(stepper, functions, key, t, y0)
     finally:
-        _PYTHON.pop(id(f)), _RAISED.pop(id(f), None)
+        _PYTHON.pop(key), _RAISED.pop(key, None)
     if counts is not None:
         counts |= stepper.counts()
     return found
@@ -171,6 +174,7 @@ def _check(method, t, rtol, step) -> None:
 
 
 _COMPILED: dict[Callable, tuple] = {}  # what was prepared for functions that are compiled already
+_KEYS = itertools.count()  # of what follows, one a call: threads may step one function at a time
 _PYTHON: dict[int, Callable] = {}  # functions that numba cannot compile, by the number in their handle
 _RAISED: dict[int, BaseException] = {}  # what they raised
 WHERE = 3  # no ledger behind it in `out`
@@ -228,7 +232,7 @@ def _functions(f, t0, y0):
     return *watchers(), compiled_as(numba.njit(_rhs(f, t0, y0)), (types.float64, v, v, v, handle))
 
 
-@functools.cache
+@once
 def watchers() -> tuple:
     """(leap, observe, record, events) of a system that has none of them but its states."""
     v, handle = types.float64[::1], types.int64[::1]

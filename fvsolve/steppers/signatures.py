@@ -5,7 +5,7 @@ Declared, so that the loop is compiled once, cached, and serves every method and
 
 import functools
 
-from fvsolve.jit import argument, njit
+from fvsolve.jit import argument, njit, once
 
 
 @functools.cache
@@ -45,14 +45,14 @@ def no_solve(shape, store, x):
     """In place of a solution, where nothing is solved."""
 
 
-@functools.cache
+@once
 def no_algebra():
     """(factor, solve, factor_complex, solve_complex) for steps that solve nothing."""
     types = [kind.signature.args for kind in function_types()[6:]]
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, types, strict=True))
 
 
-@functools.cache
+@once
 def compiled_as(function, kinds: tuple):
     """A function compiled for arguments of these types alone, as the loop takes it."""
     if hasattr(function, "compile"):

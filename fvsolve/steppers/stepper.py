@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
 from collections.abc import Callable
 
 import numpy as np
 
-from fvsolve.jit import argument, beside
+from fvsolve.jit import argument, beside, once
 from fvsolve.steppers import slots
 from fvsolve.steppers.coefficients import coefficients
 from fvsolve.steppers.ledger import SUMS
@@ -143,7 +142,7 @@ class Stepper:
         )  # fmt: skip
 
 
-@functools.cache
+@once
 def arguments(functions: tuple) -> tuple:
     """Compiled functions as the loop takes them."""
     return tuple(argument(function) for function in functions)
@@ -158,7 +157,7 @@ KINDS = {
 }
 
 
-@functools.cache
+@once
 def attempt_of(kind: str, algebra: str = ""):
     """The compiled step of a kind of methods, compiled only where one is used.
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
+from fvsolve.jit import njit, once
 
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
@@ -130,11 +131,9 @@ def kind_module(kind: str):
     return importlib.import_module(f"fvsolve.steppers.linear_{kind}")
 
 
-@cache
+@once
 def functions(kind: str, complex: bool) -> tuple:
     """(factor, solve) of a kind, each compiled for one signature."""
-    from fvsolve.jit import njit
-
     module = kind_module(kind)
     factor, solve = njit(module.factor), njit(module.solve)
     if hasattr(factor, "compile"):

@@ -27,6 +27,7 @@ class Outcome:
 
     y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
     counts : steps, rejections, rhs, ...; seconds : stepping alone, nothing compiled [s]; processor : its CPU time [s]
+    slate : what the run wrote, its envelope and flags
     """
 
     reason: str
@@ -40,6 +41,7 @@ class Outcome:
     seconds: float = float("nan")
     processor: float = float("nan")
     model: object = None
+    slate: object = None
 
     @property
     def cell_updates(self) -> int:
@@ -116,7 +118,7 @@ def _once(model, y, run) -> Outcome:
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(
         summary.reason, summary.finished, False, summary.t, made.loop.now.copy(), rows, names, summary.counts,
-        summary.seconds, made.processor, model,
+        summary.seconds, made.processor, model, made.slate,
     )  # fmt: skip
 
 

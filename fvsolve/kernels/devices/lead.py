@@ -45,7 +45,7 @@ def led_beside(out, tables, device, yielding, speed):
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
     rate = 2.0 * root * (root * speed + yielding / sqrt(tables.valves[device["valve"]]["conductance"]))
-    return max(LEADS, 2.0 * tables.settings[0]["step"] * rate)
+    return max(LEADS, 2.0 * tables.clock[0]["step"] * rate)
 
 
 @njit

@@ -1,6 +1,7 @@
 """Cells behind a patch: what each counts by in what passes it. Knows cells and faces; knows no network."""
 
 from fvsolve.jit import njit
+from fvsolve.kernels.records import CARRIED_GRID
 
 SHALLOW = 1e-3  # depth behind a patch below which no more than a share of what is asked can leave [m]
 HARDLY = 1e-9  # volume behind a patch, over its area, below which its surface turns to the lowest one's [m]
@@ -42,10 +43,17 @@ def counted(tables, patch, leaves, y):
     return max(total, HARDLY * patch["area"])
 
 
+@njit(forceinline=True)
+def is_given(basin):
+    """Whether flows through faces are those of a given velocity, in `plane`; others are found in a run, in `work`."""
+    return basin["kind"] >= CARRIED_GRID
+
+
 @njit
 def through_patch(tables, patch):
     """What flows in through all faces of a patch."""
-    through, total = tables.basins[patch["basin"]]["through"], 0.0
+    basin, total = tables.basins[patch["basin"]], 0.0
+    flows = tables.plane if is_given(basin) else tables.work
     for m in range(patch["faces"]):
-        total += tables.plane[through + tables.integers[patch["ring"] + m]]
+        total += flows[basin["through"] + tables.integers[patch["ring"] + m]]
     return total

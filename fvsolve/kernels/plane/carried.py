@@ -9,7 +9,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.plane.advection import THIN
-from fvsolve.kernels.plane.behind import counted, through_patch, weight
+from fvsolve.kernels.plane.behind import counted, is_given, through_patch, weight
 from fvsolve.kernels.plane.diffusion import add_decay
 from fvsolve.kernels.records import CELL_SCALAR, GIVEN_FLOW, SHALLOW_FACES
 from fvsolve.kernels.schedules import schedule_value
@@ -83,7 +83,7 @@ def put_outside(t, tables, patch, basin, q):
         value = schedule_value(tables, schedule, t)
     for m in range(patch["faces"]):
         k = tables.integers[patch["ring"] + m]
-        tables.plane[basin["outside"] + q * basin["outer"] + k] = value
+        tables.work[basin["outside"] + q * basin["outer"] + k] = value
 
 
 @njit
@@ -92,7 +92,7 @@ def made_ready(t, tables, b, y):
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at = basin["n"], basin["y"], basin["plan"]
     if basin["kind"] <= SHALLOW_FACES:
-        depth, rest, change = plane[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
+        depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
         for i in range(n):
             depth[i] = max(rest[i] + change[i], 0.0)
     for p in range(patches.size):
@@ -116,16 +116,16 @@ def deep(basin):
 def settle_amounts(t, y, dydt, out, handle):
     """Add what decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
     tables = open_tables(handle)
-    plane = tables.plane
+    work = tables.work
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
-        n, depth = basin["n"], plane[basin["toil"] : basin["toil"] + deep(basin)]
+        n, depth = basin["n"], work[basin["toil"] : basin["toil"] + deep(basin)]
         per = tables.settings[0]["rho"]
         if basin["kind"] > SHALLOW_FACES:
             per = basin["density"] * basin["thickness"]
         for q in range(tables.scalars.size if basin["carried"] >= 0 else 0):
             at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
-            outside, s, rate = plane[ring : ring + basin["outer"]], y[at : at + n], dydt[at : at + n]
+            outside, s, rate = work[ring : ring + basin["outer"]], y[at : at + n], dydt[at : at + n]
             settle(tables, b, basin, q, turned(t, basin), per, depth, outside, y, s, rate, out)
 
 
@@ -150,6 +150,7 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
 def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
     """What a given velocity brings in is booked to its patches; what it takes out, all else that cells gain, to one."""
     plane, patches, nodes = tables.plane, tables.patches, tables.nodes.size
+    flows = plane if is_given(basin) else tables.work
     lies, gained = tables.layout[0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
         gained += plane[basin["area"] + i] * rate[i]
@@ -160,7 +161,7 @@ def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
         into, away = 0.0, 0.0
         for m in range(patches[p]["faces"]):
             k = tables.integers[patches[p]["ring"] + m]
-            flow = factor * plane[basin["through"] + k]
+            flow = factor * flows[basin["through"] + k]
             into += max(flow, 0.0) * outside[k]
             away -= min(flow, 0.0)
         out[lies + patches[p]["node"]] = per * into

@@ -3,6 +3,7 @@
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.advection_faces import advection_rates
+from fvsolve.kernels.plane.behind import is_given
 from fvsolve.kernels.plane.carried import deep, made_ready, turned
 from fvsolve.kernels.records import CARRIED_FACES, RATE, SHALLOW_FACES
 
@@ -11,21 +12,22 @@ from fvsolve.kernels.records import CARRIED_FACES, RATE, SHALLOW_FACES
 def carry_on_meshes(t, y, dydt, out, handle):
     """Rates of all amounts, carried and spread."""
     tables = open_tables(handle)
-    plane, scalars, integers = tables.plane, tables.scalars, tables.integers
+    plane, work, scalars, integers = tables.plane, tables.work, tables.scalars, tables.integers
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         if basin["kind"] != SHALLOW_FACES and basin["kind"] != CARRIED_FACES:
             continue
-        n, flow = basin["n"], plane[basin["flows"] : basin["flows"] + basin["faces"]]
+        n, flows = basin["n"], plane if is_given(basin) else work
+        flow = flows[basin["flows"] : basin["flows"] + basin["faces"]]
         made_ready(t, tables, b, y)
-        factor, depth = turned(t, basin), plane[basin["toil"] : basin["toil"] + deep(basin)]
+        factor, depth = turned(t, basin), work[basin["toil"] : basin["toil"] + deep(basin)]
         for q in range(scalars.size):
             o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
             quickest = advection_rates(
                 basin["scheme"], basin["wide"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
                 integers[basin["links"] :],
-                flow, depth, plane[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
-                y[o : o + n], plane[basin["toil"] + n :], dydt[o : o + n],
+                flow, depth, work[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
+                y[o : o + n], work[basin["toil"] + n :], dydt[o : o + n],
             )  # fmt: skip
             still = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]  # which will be at full speed
             out[RATE] = max(out[RATE], quickest + still + scalars[q]["decay"])

@@ -46,7 +46,7 @@ def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
 def shallow_grids(t, y, dydt, out, handle):
     """Rates of water on grids."""
     tables = open_tables(handle)
-    st, plane = tables.settings[0], tables.plane
+    st, plane, work = tables.settings[0], tables.plane, tables.work
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != SHALLOW_GRID or not wanted(basin, dydt):
@@ -54,17 +54,17 @@ def shallow_grids(t, y, dydt, out, handle):
         n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
         nx, ny, through = basin["nx"], basin["ny"], basin["through"]
         plan, many = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n)), ny * (nx + 1)
-        flow_x, flow_y = plane[:0], plane[:0]
+        flow_x, flow_y = work[:0], work[:0]
         if f >= 0:  # scalars are carried by them
-            flow_x, flow_y = plane[f : f + many], plane[f + many : f + many + (ny + 1) * nx]
+            flow_x, flow_y = work[f : f + many], work[f + many : f + many + (ny + 1) * nx]
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
         rates = to[first : first + 3 * n]
         rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
         rate = shallow.grid_rates(
             st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
-            plane[through : through + basin["outer_given"]], plane[basin["work"] :], rates[:n], rate_x, rate_y,
+            work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
         )  # fmt: skip
         if f >= 0:
             through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
@@ -75,20 +75,20 @@ def shallow_grids(t, y, dydt, out, handle):
 def acoustic_grids(t, y, dydt, out, handle):
     """Rates of a liquid under law linear on grids."""
     tables = open_tables(handle)
-    plane = tables.plane
+    plane, work = tables.plane, tables.work
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != ACOUSTIC_GRID or not wanted(basin, dydt):
             continue
         n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
         through = basin["through"]
-        to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
         rates = to[first : first + 3 * n]
         rate = liquid.grid_rates(
             basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
             plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
             y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-            plane[through : through + basin["outer_given"]], plane[basin["work"] :],
+            work[through : through + basin["outer_given"]], work[basin["work"] :],
             rates[:n], rates[n : 2 * n], rates[2 * n :],
         )  # fmt: skip
         book_open(tables, b, basin["thickness"], out)
@@ -98,17 +98,17 @@ def acoustic_grids(t, y, dydt, out, handle):
 @njit
 def full_grid(tables, b, table, y, dydt, out):
     """Rates of a liquid with the full momentum flux on a grid, of its waves or, with no table, under law log."""
-    plane, basin = tables.plane, tables.basins[b]
+    plane, work, basin = tables.plane, tables.work, tables.basins[b]
     n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
     through = basin["through"]
-    to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
     rate = liquid_log.grid_rates(
         basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], nx, ny,
         plane[k : k + nx], plane[k + nx : k + nx + ny],
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
         y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-        plane[through : through + basin["outer_given"]], plane[basin["work"] :],
+        work[through : through + basin["outer_given"]], work[basin["work"] :],
         rates[:n], rates[n : 2 * n], rates[2 * n :],
     )  # fmt: skip
     book_open(tables, b, basin["thickness"], out)
@@ -128,7 +128,7 @@ def liquid_grids(t, y, dydt, out, handle):
 def shallow_meshes(t, y, dydt, out, handle):
     """Rates of water on meshes of any cells."""
     tables = open_tables(handle)
-    st, plane, integers = tables.settings[0], tables.plane, tables.integers
+    st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != SHALLOW_FACES or not wanted(basin, dydt):
@@ -136,16 +136,16 @@ def shallow_meshes(t, y, dydt, out, handle):
         n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
         plan = plane[at : at + shallow.PLANS * n].reshape((shallow.PLANS, n))
         dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
         rates = to[first : first + 3 * n]
         rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
-        flow = plane[:0]
+        flow = work[:0]
         if f >= 0:  # scalars are carried by them
-            flow = plane[f : f + basin["faces"]]
+            flow = work[f : f + basin["faces"]]
         rate = shallow_faces.shallow_rates(
             st["gravity"], basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
-            plane[through : through + basin["outer_given"]], plane[basin["work"] :], rates[:n], rate_x, rate_y,
+            work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
         )  # fmt: skip
         finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
 
@@ -153,16 +153,16 @@ def shallow_meshes(t, y, dydt, out, handle):
 @njit
 def liquid_mesh(tables, b, table, y, dydt, out):
     """Rates of a liquid on a mesh, of its waves or, with no table, under laws linear and log."""
-    plane, integers, basin = tables.plane, tables.integers, tables.basins[b]
+    plane, work, integers, basin = tables.plane, tables.work, tables.integers, tables.basins[b]
     n, o, through = basin["n"], basin["y"], basin["through"]
-    to, first = (dydt, o) if dydt.size > 0 else (plane, basin["unused"])
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
     rate = liquid_faces.liquid_rates(
         tables.settings[0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["wide"],
         plane[basin["mesh"] :],
         integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
         y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-        plane[through : through + basin["outer_given"]], plane[basin["work"] :],
+        work[through : through + basin["outer_given"]], work[basin["work"] :],
         rates[:n], rates[n : 2 * n], rates[2 * n :],
     )  # fmt: skip
     book_open(tables, b, basin["thickness"], out)

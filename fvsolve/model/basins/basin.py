@@ -155,7 +155,7 @@ class Basin:
 
     def lower_common(self, draft, row) -> None:
         """Fill what all kinds need."""
-        numerics, mesh, before = self.case.numerics, self.mesh, draft.plane_size + len(draft.integers)
+        numerics, mesh, before = self.case.numerics, self.mesh, draft.room()
         self.row, row["n"] = row, self.n
         row["scheme"] = family(self.scheme)
         row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].wide
@@ -175,8 +175,8 @@ class Basin:
         given = self.reflects()
         row["reflect"], row["outer_given"] = draft.to_plane(given), given.size
         row["outer"] = mesh.left.size - mesh.inner
-        row["through"] = draft.to_plane(np.zeros(given.size)) if given.size else -1
-        row["unused"] = draft.to_plane(np.zeros(len(self.quantities) * self.n if given.size else 0))
+        row["through"] = draft.to_work(given.size) if given.size else -1
+        row["unused"] = draft.to_work(len(self.quantities) * self.n if given.size else 0)
         row["carried"] = row["flows"] = -1
         self.lower(draft, row)
         if self.scalars:
@@ -187,22 +187,22 @@ class Basin:
         row["carried"] = draft.size if self.scalars else -1
         for name in self.scalars:
             draft.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
-        self.memory = 8 * (draft.plane_size + len(draft.integers) + draft.size - before)
+        self.memory = 8 * (draft.room() + draft.size - before)
         place = f"nodes.{self.name}"
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
 
     def lower_scalars(self, draft, row) -> None:
         """Reserve what scalars are carried by and in, and values beyond the boundary."""
         mesh, grid = self.mesh, self.mesh.grid
-        row["outside"] = draft.to_plane(np.zeros(len(self.scalars) * int(row["outer"])))
+        row["outside"] = draft.to_work(len(self.scalars) * int(row["outer"]))
         if self.is_grid:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
             toil = self.n + max(advection_work(row["scheme"], grid.nx, grid.ny), diffusion_work(grid.nx, grid.ny))
         else:
             flows, toil = mesh.left.size, self.n + advection_faces.work_size(self.integers)
         if row["flows"] < 0:
-            row["flows"] = draft.to_plane(np.zeros(flows))
-        row["toil"] = draft.to_plane(np.zeros(toil))
+            row["flows"] = draft.to_work(flows)
+        row["toil"] = draft.to_work(toil)
         may = self.may_leave(row)
         if may:
             numerics = self.case.numerics

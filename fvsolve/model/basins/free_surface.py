@@ -69,11 +69,11 @@ class FreeSurface(Basin, physics="free-surface"):
         row["kind"] = rec.SHALLOW_GRID
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
         row["unsplit"] = SHORES if dry and SCHEMES[self.scheme].order > 2 else UNSPLIT
-        row["work"] = draft.to_plane(np.zeros(shallow.WORK))
+        row["work"] = draft.to_work(shallow.WORK)
 
     def lower_faces(self, draft, row) -> None:
         row["kind"], row["unsplit"] = rec.SHALLOW_FACES, UNSPLIT
-        row["work"] = draft.to_plane(np.zeros(shallow_faces.work_size(self.integers)))
+        row["work"] = draft.to_work(shallow_faces.work_size(self.integers))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start

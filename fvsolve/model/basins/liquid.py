@@ -56,10 +56,10 @@ class Liquid(Basin, physics="liquid"):
         if self.is_grid:
             row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.TABLE_GRID if self.waves else rec.LIQUID_GRID
             size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
-            row["work"] = draft.to_plane(np.zeros(size))
+            row["work"] = draft.to_work(size)
         else:
             row["kind"] = rec.TABLE_FACES if self.waves else rec.LIQUID_FACES
-            row["work"] = draft.to_plane(np.zeros(liquid_faces.work_size(self.integers)))
+            row["work"] = draft.to_work(liquid_faces.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
         """The table of its waves; a wall cannot make them quicker than the fluid's own."""

@@ -25,10 +25,11 @@ class Accumulator(Device, kind="accumulator"):
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
 
-    def settle(self, model, row, y, scale) -> None:
+    def settle(self, slate, row, y, scale) -> None:
+        model = slate.model
         floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]
-        if floats[law.NECK] > 0.0 and model.tables.armed[row["event"]] > 0.0:  # its neck feels far less
+        if floats[law.NECK] > 0.0 and slate.armed[row["event"]] > 0.0:  # its neck feels far less
             scale[at] = -(1e5 / floats[law.NECK] + ROUNDED * abs(floats[law.EMPTY]))
 
     def begin(self, start, part, row) -> list[str]:

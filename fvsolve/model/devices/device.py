@@ -79,7 +79,7 @@ class Device:
         """Whether its restriction dissipates drop times flow; else that is energy supplied."""
         return True
 
-    def settle(self, model, row, y: np.ndarray, scale: np.ndarray) -> None:
+    def settle(self, slate, row, y: np.ndarray, scale: np.ndarray) -> None:
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:

@@ -35,10 +35,11 @@ class Lifting(Device, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
-    def settle(self, model, row, y, scale) -> None:
-        stop, seat = (model.tables.armed[row["event"] + k] > 0.0 for k in (0, 2))
-        if self.states and seat and disc.disc_lift(y, model.tables, row) > 0.0:  # it has slammed
-            y[row["y"]] = -model.tables.floats[row["data"] + disc.LIFT] - SEATED
+    def settle(self, slate, row, y, scale) -> None:
+        tables = slate.model.tables
+        stop, seat = (slate.armed[row["event"] + k] > 0.0 for k in (0, 2))
+        if self.states and seat and disc.disc_lift(y, tables, row) > 0.0:  # it has slammed
+            y[row["y"]] = -tables.floats[row["data"] + disc.LIFT] - SEATED
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 

@@ -10,7 +10,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import curves
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.devices import pump as law
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedules import value_until
 from fvsolve.model.devices.device import Device
 from fvsolve.model.head_curves import curve_numbers, rated_point, shaft_points
 from fvsolve.parts import Schedule
@@ -82,7 +82,7 @@ class Pump(Device, kind="pump"):
     def speed_at(self, start, k: int) -> float:
         """Relative speed at the start."""
         row = start.draft.device_table[start.valves[k]["device"]]
-        return float(schedule_value(start.draft.tables, int(row["schedule"]), start.t))
+        return start.given(row["schedule"])
 
     def edge(self, start, k: int):
         row = start.valves[k]
@@ -143,11 +143,11 @@ class Pump(Device, kind="pump"):
     def let_go(self, start, part, row, valve) -> list[str]:
         """The speed from which a shaft runs free, and what does not hold it; returns what moves, in words."""
         draft, floats, at = start.draft, start.draft.tables.floats, int(row["data"])
-        name, settings = draft.valve_names[row["valve"]], draft.tables.settings[0]
+        name = draft.valve_names[row["valve"]]
         if floats[at + law.MODE] == law.TRIPPING:
-            limit, settings["limit"] = float(settings["limit"]), part.trip
-            floats[at + law.HELD] = schedule_value(draft.tables, int(row["schedule"]), float(part.trip))
-            settings["limit"] = limit
+            trip = float(part.trip)
+            given = draft.tables.schedules, draft.tables.pieces
+            floats[at + law.HELD] = value_until(*given, int(row["schedule"]), trip, trip)
         if floats[at + law.MODE] != law.TURNED:
             return []
         rho = start.density_at(int(valve["from_node"]))
@@ -155,7 +155,7 @@ class Pump(Device, kind="pump"):
         taken = law.fluid_torque(floats, at, int(valve["data"]), speed, flow, dense)
         first, total = at + law.OWN_NUMBERS, 0.0
         for k in range(int(floats[at + law.GIVEN])):
-            value = schedule_value(draft.tables, int(floats[first + 2 * k]), start.t)
+            value = start.given(floats[first + 2 * k])
             floats[first + 2 * k + 1], total = value, total + value
         left = total - taken if abs(total - taken) > SNAP * (abs(total) + abs(taken)) else 0.0
         floats[at + law.HELD], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, taken, left

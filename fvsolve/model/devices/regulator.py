@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.kernels.devices import regulator as law
-from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 from fvsolve.model.devices.device import Device
 from fvsolve.steady import Edge
@@ -74,7 +73,7 @@ class Regulator(Device, kind=""):
     def given(self, start, k: int) -> float:
         """What is set at the start: a pressure [Pa], or a mass flow [kg/s]."""
         row = start.draft.device_table[start.valves[k]["device"]]
-        return schedule_value(start.draft.tables, int(row["schedule"]), start.t)
+        return start.given(row["schedule"])
 
     def target(self, start, k: int) -> float:
         """The same, of a pressure as a potential [Pa]."""

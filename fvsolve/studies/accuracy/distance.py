@@ -55,12 +55,12 @@ class Pool(NamedTuple):
 
 
 def track(found: Outcome) -> Track:
-    """Rows and last fields of a run that has just ended (its envelope stands in the model until the next)."""
+    """Rows and last fields of a run."""
     waves, spans, model = {}, {}, found.model
     for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
         n, at, cell = pipe.cells, int(row["y"]), int(row["cell"])
         waves[pipe.name] = found.y[at : at + 2 * n].reshape(2, n).copy()
-        envelope = model.tables.envelope[:, cell : cell + n]
+        envelope = found.slate.envelope[:, cell : cell + n]
         span = float(envelope[2].max() - envelope[0].min())
         spans[pipe.name] = span if span > STILL * model.scale[at] else 0.0
     pools = tuple(Pool(basin, contents(basin, found.y)) for basin in model.basins)

@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
+from fvsolve.model import Slate
 from fvsolve.studies.accuracy.apart import recorded
 from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
@@ -125,11 +126,11 @@ class Sourced:
     """One run with a source, segment by segment between kinks of the case."""
 
     def __init__(self, model, source: Given) -> None:
-        self.model, self.source, self.limit = model, source, np.inf
+        self.model, self.slate, self.source, self.limit = model, Slate(model), source, np.inf
 
     def rates(self, t: float, y: np.ndarray, dydt: np.ndarray) -> None:
         """The model's rates and what the source brings."""
-        dydt[:] = self.model.evaluate(t, y, self.limit)[0]
+        dydt[:] = self.slate.evaluate(t, y, self.limit)[0]
         for row, pipe in zip(self.model.tables.pipes, self.model.pipes, strict=True):
             mass, momentum = averages(lambda x, name=pipe.name: self.source(name, x, t), pipe.edges)
             o, n = int(row["y"]), pipe.cells
@@ -168,7 +169,8 @@ class Sourced:
 
     def row(self, t: float, y: np.ndarray) -> np.ndarray:
         """Time and probes."""
-        return np.concatenate([[t], self.model.observe(t, y, self.limit)])
+        out = self.slate.evaluate(t, y, self.limit)[1]
+        return np.concatenate([[t], self.slate.observe(t, y, out)])
 
     def step(self) -> float:
         """The fixed step that the case asks for [s]."""

@@ -15,7 +15,7 @@ import numpy as np
 from fvsolve.doors import CALL, NUMBER, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedules import value_until
 from fvsolve.model.checks import velocities
 from fvsolve.studies.accuracy.rungs import Misfit, finer, restated, structures
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
@@ -306,17 +306,21 @@ def change_time(model) -> float:
     if any(jump for t, jump in model.breaks if t > numerics.start):
         return 0.0
     times = np.unique([*np.linspace(numerics.start, numerics.end, SAMPLES), *(t for t, _ in model.breaks)])
-    model.tables.settings[0]["limit"] = np.inf  # from where on schedules hold their left limit
     trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
     quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
     for index in range(len(model.tables.schedules)):
-        if any(np.ptp([schedule_value(model.tables, index, at) for at in (before(t), t)]) for t in trips.values()):
+        if any(np.ptp(given(model, index, [before(t), t])) for t in trips.values()):
             continue  # it says that a pump has tripped
-        values = np.array([schedule_value(model.tables, index, t) for t in times])
+        values = given(model, index, times)
         steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
         if steepest > 0.0:
             quickest = min(quickest, float(np.ptp(values)) / steepest)
     return quickest
+
+
+def given(model, index: int, times) -> np.ndarray:
+    """Values of a schedule at times."""
+    return np.array([value_until(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
 
 
 def before(t: float) -> float:

@@ -33,7 +33,7 @@ class Booked(Loop):
 
     def run(self, budget: float) -> int:
         """`Loop.run`, one step at a time."""
-        code, left, armed = super().run(0.0), budget, self.model.tables.armed
+        code, left, armed = super().run(0.0), budget, self.armed
         while code == slots.CHUNK and left > 0.0 and not automatic.wants_change(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
             first = self.stepper.k[0].copy(), self.stepper.supply[0].copy()
@@ -138,7 +138,7 @@ class EnergyRun(Run):
 
     def __init__(self, model, state, sink, progress) -> None:
         super().__init__(model, state, sink, progress)
-        self.accounts = Accounts(model)
+        self.accounts = Accounts(self.slate)
         self.loop.watch(self.accounts, self.on_step)
         self.times, self.totals, self.holdings = [self.loop.t], [self.loop.total.copy()], []
         self.first = self.holding()

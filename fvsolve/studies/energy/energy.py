@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -153,7 +153,9 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """
     model = prepared(case, set) if not hasattr(case, "tables") else case
     check_port(model.case, port)
-    model.tables.settings["datum"] = datum_of(model, port)
+    settings = model.tables.settings.copy()
+    settings["datum"] = datum_of(model, port)
+    model = replace(model, tables=model.tables._replace(settings=settings))
     run = EnergyRun(model, initial_state(model), Rows(), progress)
     summary = run.go()
     if run.times[-1] < run.loop.t:

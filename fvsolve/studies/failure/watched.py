@@ -30,10 +30,7 @@ class Watched(Capped):
     def pause(self, spent: float) -> None:
         """Note the probes; after a window of a long run, let it run on to the next one, or give it up."""
         self.check()
-        model, stepper = self.model, self.loop.stepper
-        values = np.zeros(len(model.probes))
-        self.loop.observe(self.loop.t, self.loop.now, stepper.out, model.handle, values)
-        self.bursts[-1].append(values)
+        self.bursts[-1].append(self.slate.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
         apart = int(self.loop.memory[slots.STEPS]) // SPARSE
         self.budget = 1.0
         if apart > WINDOW and len(self.bursts[-1]) >= WINDOW:

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedules import value_until
 from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.studies.outcome import outcome, prepared
 
@@ -20,12 +20,14 @@ class Frozen:
 
     t : time at which they were stopped [s]; y : float64[n]  deviations from the profile
     when : the same in words, with the side of a kink or jump where there is one
+    armed : flags of devices there, see `model.Slate`; 0 at a start
     """
 
     model: object
     t: float
     y: np.ndarray
     when: str
+    armed: np.ndarray | float = 0.0
 
     @property
     def rate(self) -> np.ndarray:
@@ -52,35 +54,33 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     model = prepared(case, {"output.probes": names, "numerics.end": last})
     if model.y_size == 0:
         raise FvsolveError(f"{case.name} has no state: every pressure in it is given; add a pipe, tank or chamber")
-    t, y = _arrive(model, at)
+    t, y, armed = _arrive(model, at)
     sides = {time: jump for time, jump in model.breaks if time == t}
     side = "before" if before else "after"
     when = "the start" if at is None else f"t = {t:g} s"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
-    return Frozen(stopped(model, t, before), t, y, when)
+    return Frozen(stopped(model, t, before), t, y, when, armed)
 
 
-def _arrive(model, at: float | None) -> tuple[float, np.ndarray]:
-    """Time and state at `at`, by a run; the start where it is None."""
+def _arrive(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | float]:
+    """Time, state and flags at `at`, by a run; the start where it is None."""
     start = model.case.numerics.start
     if at is None or at == start:
-        return start, model.start.copy()
+        return start, model.start.copy(), 0.0
     if not start < at < np.inf:
         raise FvsolveError(f"at = {at:g} s is no time after the start of the case, {start:g} s")
     numerics = model.case.numerics.model_copy(update={"end": float(at)})
     run = outcome(replace(model, case=replace(model.case, numerics=numerics)))
     if not run.ok:
         raise FvsolveError(f"the case cannot be run to t = {at:g} s, to be linearised there: {run.reason}")
-    return float(at), run.y
+    return float(at), run.y, run.slate.armed
 
 
 def stopped(model, t: float, before: bool = False):
     """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit."""
     tables = model.tables
-    tables.settings[0]["limit"] = t if before else np.inf
-    schedules = tables.schedules.copy()
-    values = [schedule_value(model.tables, k, t) for k in range(len(schedules))]
-    tables.settings[0]["limit"] = np.inf
+    schedules, limit = tables.schedules.copy(), t if before else np.inf
+    values = [value_until(tables.schedules, tables.pieces, k, t, limit) for k in range(len(schedules))]
     for k in range(len(schedules)):
         schedules[k] = (k, 1)
     rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedules import value_until
 from fvsolve.model.basins.units import unit_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import Input, hold, input_schedules
@@ -131,7 +131,7 @@ def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
         at, a, both[:n].copy(), c, both[n:].copy(), inputs, tuple(one.text for one in probes),
         tuple(UNITS[known[name].kind] for name in inputs),
         tuple(one.unit or DIMENSIONS[one.dimension].si for one in probes),
-        tuple(values), tuple(model.observe(at.t, at.y)[:outputs].tolist()), {"A": error_a, "C": error_c, "BD": error},
+        tuple(values), tuple(responses(at, at.y, outputs)[n:].tolist()), {"A": error_a, "C": error_c, "BD": error},
     )  # fmt: skip
 
 
@@ -158,9 +158,9 @@ def input_value(at: Frozen, name: str, one: Input) -> float:
                          + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + one.node])  # fmt: skip
         place = model.node_names[one.node]
         return pressure if one.kind == "pressure" else float(model.head(pressure, model.elevation[place]))
-    value = schedule_value(model.tables, one.schedule, at.t)
+    value = value_until(model.tables.schedules, model.tables.pieces, one.schedule, at.t, np.inf)
     if one.other >= 0:
-        value -= schedule_value(model.tables, one.other, at.t)
+        value -= value_until(model.tables.schedules, model.tables.pieces, one.other, at.t, np.inf)
     return float((value - one.offset) / one.scale)
 
 
@@ -183,7 +183,8 @@ def input_column(at, name, one, value, size, outputs, steps) -> tuple[np.ndarray
         width = np.minimum(width, min(value - low, high - value))
 
     def at_input(u: np.ndarray) -> np.ndarray:
-        return responses(hold(model, {name: float(u[0])}), at.t, at.y, outputs)
+        held = replace(at, model=hold(model, {name: float(u[0])}))
+        return responses(held, at.y, outputs)
 
     x = np.array([value])
     base = at_input(x)

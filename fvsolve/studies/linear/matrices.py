@@ -18,19 +18,18 @@ LONGEST, LARGEST = 20.0, 10_000_000  # that C may take [s], entries that it may 
 DIRECTIONS = 3  # at random, along which the whole of A is tried
 
 
-def responses(model, t: float, y: np.ndarray, outputs: int) -> np.ndarray:
-    """dy/dt, then the first probes : float64[n + outputs]."""
-    dydt, out = model.evaluate(t, y)
+def responses(at: Frozen, y: np.ndarray, outputs: int) -> np.ndarray:
+    """dy/dt, then the first probes, with y in place of the state : float64[n + outputs]."""
+    model, t = at.model, float(at.t)
+    with model.slate(at.armed) as slate:
+        dydt, out = slate.evaluate(t, y, np.inf)
+        values = slate.observe(t, y, out)[:outputs] if outputs else np.zeros(0)
     if out[rec.STATUS] != rec.OK or not np.all(np.isfinite(dydt)):
         place = f" at {model.node_names[int(out[rec.WHERE])]}" if out[rec.WHERE] >= 0 else ""
         raise FvsolveError(
             f"the state cannot be linearised: no flow meets what is asked{place}; every way to it is shut"
         )
-    if outputs == 0:
-        return dydt
-    values = np.zeros(len(model.probes))
-    model.functions.observe(float(t), np.ascontiguousarray(y), out, model.handle, values)
-    return np.concatenate([dydt, values[:outputs]])
+    return np.concatenate([dydt, values])
 
 
 def widths(at: Frozen) -> np.ndarray:
@@ -69,10 +68,10 @@ def state_matrix(at: Frozen) -> tuple[Any, np.ndarray, float, np.ndarray]:
 def entries(at: Frozen, width, rows, columns, steps) -> tuple[np.ndarray, np.ndarray]:
     """(slopes, sides) of the entries at `rows` and `columns` : float64[steps, entries], per small deviation."""
     structure, slopes, sides = at.model.structure, [], []
-    base = responses(at.model, at.t, at.y, 0)
+    base = responses(at, at.y, 0)
     for color in range(structure.color_count):
         direction = np.where(structure.colors == color, width, 0.0)
-        slope, side = central(lambda y: responses(at.model, at.t, y, 0), at.y, direction, base, steps)
+        slope, side = central(lambda y: responses(at, y, 0), at.y, direction, base, steps)
         slopes.append(slope)
         sides.append(side)
     picked = (slice(None), structure.colors[columns], rows)
@@ -93,10 +92,10 @@ def refuse(model, j: int, what: str) -> None:
 def try_directions(at: Frozen, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
     """Whether A says what happens along whole directions too: raises where f is homogeneous but not linear."""
     model, rng = at.model, np.random.default_rng(1)
-    base = responses(model, at.t, at.y, 0)
+    base = responses(at, at.y, 0)
     for _ in range(DIRECTIONS):
         direction = width * rng.choice([-1.0, 1.0], width.size)
-        slope, _ = central(lambda y: responses(model, at.t, y, 0), at.y, direction, base, steps)
+        slope, _ = central(lambda y: responses(at, y, 0), at.y, direction, base, steps)
         apart = np.abs(slope - a @ direction) / np.where(size > 0.0, size, 1.0)
         worst = np.min(apart, axis=0)
         if np.max(worst) > SMOOTH:
@@ -107,19 +106,19 @@ def try_directions(at: Frozen, a, width: np.ndarray, size: np.ndarray, steps: np
 
 def output_matrix(at: Frozen, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
     """(C, error), state by state of those that an output hangs on."""
-    model, n, width = at.model, at.model.y_size, widths(at)
+    n, width = at.model.y_size, widths(at)
     if outputs == 0:
         return np.zeros((0, n)), 0.0
     if n * outputs > LARGEST:
         raise too_large(n, outputs)
-    latest, base = time.monotonic() + LONGEST, responses(model, at.t, at.y, outputs)
+    latest, base = time.monotonic() + LONGEST, responses(at, at.y, outputs)
     slopes = np.zeros((len(steps), n, outputs))
     for j in seen(at, outputs, base[n:], width):
         if time.monotonic() > latest:
             raise too_large(n, outputs)
         direction = np.zeros(n)
         direction[j] = width[j]
-        slopes[:, j] = central(lambda y: responses(model, at.t, y, outputs), at.y, direction, base, steps)[0][:, n:]
+        slopes[:, j] = central(lambda y: responses(at, y, outputs), at.y, direction, base, steps)[0][:, n:]
     size = np.sum(np.abs(slopes[len(steps) // 2]), axis=0)
     row_size = np.tile(np.where(size > 0.0, size, 1.0), n)
     values, errors = settled(slopes.reshape(len(steps), -1), row_size, np.arange(n) * outputs)
@@ -141,7 +140,7 @@ def seen(at: Frozen, outputs: int, base: np.ndarray, width: np.ndarray) -> Itera
         low, high = halves.pop()
         part = np.zeros(n)
         part[low:high] = direction[low:high]
-        ends = (responses(at.model, at.t, at.y + sign * part, outputs)[n:] for sign in (1.0, -1.0))
+        ends = (responses(at, at.y + sign * part, outputs)[n:] for sign in (1.0, -1.0))
         if all(np.array_equal(end, base) for end in ends):
             continue
         if high - low == 1:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.kernels.records import Tables
 from fvsolve.model.energy import EnergyForm
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import slots
@@ -71,9 +70,8 @@ class Runs:
         model = self.at.model
         changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
-        own = Tables(*map(np.copy, model.tables))  # what has opened or shut in one run has not in another
-        made = Loop(replace(model, case=replace(model.case, numerics=numerics), tables=own), lambda: self.structure)
-        made.now[:] = y
+        made = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
+        made.now[:], made.armed[:] = y, self.at.armed
         made.memory[slots.T] = self.at.t
         made.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return made

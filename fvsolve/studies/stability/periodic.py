@@ -149,15 +149,13 @@ def check_size(cells: int, steps: int) -> None:
         raise FvsolveError(f"steps = {steps}: wanted 10 or more, failure is growth over many steps")
 
 
-def _tables(scheme: str, limiter: str, cells: int) -> rec.Tables:
-    """The tables of a model that has nothing but the scheme's settings, a pipe's small number and scratch."""
-    found = {name: np.zeros(1, dtype) for name, dtype in rec.RECORDS.items()}
-    found |= {name: np.zeros(1, np.int64 if name == "integers" else float) for name in rec.ARRAYS}
-    found |= {name: np.zeros((1, 1)) for name in rec.MATRICES}
+def _tables(scheme: str, limiter: str, cells: int) -> tuple:
+    """What a handle opens where there is nothing but the scheme's settings, a pipe's small number and scratch."""
+    found = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.Written._fields)}
     found["scratch"] = np.zeros(2 * cells + 7)
     scheme_settings(found["settings"][0], scheme, limiter)
     found["pipes"]["noise"] = SMALL
-    return rec.Tables(**found)
+    return tuple(found.values())
 
 
 def _rhs():
