@@ -29,7 +29,7 @@ DIGEST = hashlib.sha256().digest_size
 KEPT = 3  # generations of compiled code kept beside the present one
 
 PACKAGE = Path(__file__).resolve().parent
-# What compiled code can depend on: the rooms that compile and, by the import contract, all they may import.
+# What compiled code can depend on: the laws of parts, the rooms that compile and, by contract, all they may import.
 ROOMS = ("kernels", "steppers", "jit", "units", "errors")
 OUTSIDE: dict[Path, str] = {}  # folders whose sources may be compiled and cached too, and where below the code folder
 MAKING = threading.RLock()  # held while compiled functions are made
@@ -164,7 +164,7 @@ def beside(code: str, cached: str):
 def _sources() -> tuple[Path, ...]:
     rooms = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")]
     modules = [path for room in ROOMS if (path := PACKAGE / f"{room}.py").is_file()]
-    return tuple(sorted(rooms + modules))
+    return tuple(sorted([*rooms, *modules, *(PACKAGE / "parts").rglob("law*.py")]))
 
 
 @functools.cache

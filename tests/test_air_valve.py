@@ -49,7 +49,7 @@ RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
 
 def test_near_ambient_pressure_alone_its_flow_is_not_the_textbooks():
     """Beyond SMALL to rounding; within, less than 0.18 sqrt(SMALL) off the root, the greatest that the quintic is."""
-    from fvsolve.kernels.devices.air_valve import orifice_air
+    from fvsolve.parts.air_valve.law import orifice_air
 
     for r in (0.2, 0.5283, 0.53, 0.9, 1.0 - 1.01 * SMALL):
         textbook = bores(r * AMBIENT, 0.1, 0.1, lambda x: 1.0) / (0.6 * area(0.1) * AMBIENT / math.sqrt(HEAT))

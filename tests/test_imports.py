@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 
 import grimp
 import pytest
+
+import fvsolve
+
+FLOORS = {  # roles -> rooms that they may import
+    "part": {"parts", "units", "errors", "names", "steppers"},
+    "law": {"kernels", "jit"},
+    "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid"},
+}
 
 
 def circle(arrows: dict[str, set[str]]) -> list[str]:
@@ -28,3 +39,37 @@ def test_imports_run_in_no_circle():
 )
 def test_a_circle_is_seen(arrows, found):
     assert len(circle(arrows)) == found
+
+
+def role(module: str) -> str | None:
+    """`part`, `law` or `lower` of a file in the folder of a part; None of others."""
+    names = module.split(".")
+    if names[:2] != ["fvsolve", "parts"] or len(names) < 4:
+        return None
+    return next((one for one in ("law", "lower") if names[3].startswith(one)), "part")
+
+
+def test_each_file_of_a_part_imports_what_its_floor_may():
+    """A declaration imports no compiled function, a law no declaration, and neither what lowers it."""
+    graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
+    seen = set()
+    for module in sorted(graph.modules):
+        if (own := role(module)) is None:
+            continue
+        seen.add(own)
+        for other in graph.find_modules_directly_imported_by(module):
+            theirs = role(other)
+            assert other.split(".")[1] in FLOORS[own] or theirs == own, f"{module} imports {other}"
+            if own != "lower":
+                assert theirs in (None, own), f"{module} imports {other}"
+    assert seen == set(FLOORS)
+
+
+def test_parts_are_declared_without_numba():
+    code = "import sys, fvsolve.parts; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_every_folder_of_parts_has_a_declaration():
+    folders = [path for path in (Path(fvsolve.__file__).parent / "parts").iterdir() if (path / "__init__.py").is_file()]
+    assert folders and all((folder / "part.py").is_file() for folder in folders)

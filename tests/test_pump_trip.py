@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from truth.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, area, junction, lake, pipe, pump, scene, step
 
 import fvsolve
-from fvsolve.parts.suter_tables import SUTER_TABLES
+from fvsolve.parts.pump.suter_tables import SUTER_TABLES
 from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.linear.linearise import linearise
 

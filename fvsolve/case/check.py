@@ -12,17 +12,17 @@ from fvsolve.case.sections import CAVITY_SCHEMES, Numerics
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import (
     KINDS,
-    Accumulator,
     Chamber,
     Cylinder,
     EndStop,
     Junction,
     Leak,
-    Pump,
     Reservoir,
     Spring,
     Torque,
 )
+from fvsolve.parts.accumulator.part import Accumulator
+from fvsolve.parts.pump.part import Pump
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show

@@ -322,7 +322,7 @@ class _Reader:
     def kind(self, group: str, name: str, part: dict[str, Any]) -> Any:
         known = KINDS[group]
         if "type" not in part:
-            self.fault((group, name), f"type is missing; wanted one of {listing(known)}")
+            self.fault((group, name), f"type is missing; wanted one of {listing(sorted(known))}")
             return None
         kind = part["type"]
         if not isinstance(kind, str) or kind not in known:
@@ -331,7 +331,7 @@ class _Reader:
             if isinstance(kind, str) and kind in KINDS[other]:
                 hint = f"; it belongs under [{other}]"
             said = MEANT.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
-            hint = f"; say {said}" if said else f"; types are {listing(known)}{hint}"
+            hint = f"; say {said}" if said else f"; types are {listing(sorted(known))}{hint}"
             self.fault((group, name, "type"), f"no type {show(kind)}{hint}")
             return None
         return known[kind]

@@ -34,7 +34,7 @@ def whole() -> dict[str, Any]:
     for name, model in (("fluid", FluidSpec), ("numerics", Numerics), ("output", Output), ("exact", ExactSpec)):
         properties[name] = _hoisted(model, definitions)
     for group, kinds in KINDS.items():
-        any_kind = [_typed(kind, made, definitions) for kind, made in kinds.items()]
+        any_kind = [_typed(kind, made, definitions) for kind, made in sorted(kinds.items())]
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
     scalar = _hoisted(Scalar, definitions)
     properties["scalars"] = {"type": "object", "additionalProperties": scalar}

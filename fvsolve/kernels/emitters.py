@@ -9,7 +9,7 @@ nothing out; short of all that is asked it goes on beyond it; with all of it, it
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.either import either
 
 LEAST_DROP = 10.0  # drop above `least` below which the cubic holds [Pa]
 EVENTS = 4  # of an outlet: it shuts, it opens; it gives all that is asked, or less

@@ -15,8 +15,8 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import call_lead
-from fvsolve.kernels.devices.lead import leads
-from fvsolve.kernels.devices.loops import LEAD
+from fvsolve.kernels.devices import LEAD
+from fvsolve.kernels.lead import leads
 from fvsolve.kernels.restrictions import conductance, conductance_at
 from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, pressure_at
 

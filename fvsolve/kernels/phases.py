@@ -97,10 +97,10 @@ MEMBERS = {
         record="mechanics: record_bodies", events="mechanics: body_events",
     ),
     "devices": Pieces(
-        prepare="devices.loops: set_devices", move="devices.loops: move_devices",
-        observe="devices.loops: observe_devices", record="devices.loops: record_devices",
-        events="devices.loops: device_events",
-        power="devices.loops: power_devices", stored="devices.loops: stored_devices",
+        prepare="devices: set_devices", move="devices: move_devices",
+        observe="devices: observe_devices", record="devices: record_devices",
+        events="devices: device_events",
+        power="devices: power_devices", stored="devices: stored_devices",
     ),
     "basins": Pieces(
         observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",

@@ -14,7 +14,7 @@ from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.density import add_law, cavity_pressure, coarse_for_cavities
-from fvsolve.model.devices import Device, lower_devices
+from fvsolve.model.device import Device, device_of, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
@@ -123,7 +123,7 @@ class Draft:
         for i, (name, node) in enumerate(self.case.places.items()):
             row = table[i]
             row["elevation"] = self.case.elevation(name)
-            device = Device.kinds.get(node.kind)
+            device = device_of(type(node))
             if device is None:
                 getattr(self, "node_" + node.kind)(name, node, row)
             if name in self.moving_names or (device is not None and device.vessel):
@@ -193,7 +193,7 @@ class Draft:
     def links(self) -> None:
         by_kind: dict[str, list] = {}
         for name, link in self.case.conduits.items():
-            kind = "device" if link.kind in Device.kinds else ALIKE.get(link.kind, link.kind)
+            kind = "device" if device_of(type(link)) else ALIKE.get(link.kind, link.kind)
             by_kind.setdefault(kind, []).append((name, link))
         pipes, columns, valves, spools, devices = (by_kind.get(kind, []) for kind in KINDS)
         self.pipe_names = [name for name, _ in pipes]
@@ -216,7 +216,7 @@ class Draft:
         for (name, link), row in zip(devices, self.valve_table[len(self.valve_table) - len(devices) :], strict=True):
             self.ends(link, row)
             row["schedule"] = -1
-            Device.kinds[link.kind].restriction(self, name, link, row)
+            device_of(type(link)).restriction(self, name, link, row)
         lower_devices(self)
         for row in self.pipe_table:
             self.node_table["admittance"][row["from_node"]] += row["admittance"]

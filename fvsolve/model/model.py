@@ -187,7 +187,7 @@ class Model(Shown):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.phases import Cast
-        from fvsolve.model.devices.device import laws_of
+        from fvsolve.model.device import laws_of
 
         devices = laws_of(self.devices)
         law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))

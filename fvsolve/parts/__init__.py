@@ -1,10 +1,10 @@
 """What a user may declare, one file per part. Knows units and ranges; does no arithmetic."""
 
-from fvsolve.parts.accumulator import Accumulator
-from fvsolve.parts.air_valve import AirValve
+from importlib import import_module
+from pathlib import Path
+
 from fvsolve.parts.basin import Basin
 from fvsolve.parts.chamber import Chamber
-from fvsolve.parts.check_valve import CheckValve
 from fvsolve.parts.cylinder import Cylinder
 from fvsolve.parts.damper import Damper
 from fvsolve.parts.end_stop import EndStop
@@ -19,9 +19,6 @@ from fvsolve.parts.mass import Mass
 from fvsolve.parts.node import Node
 from fvsolve.parts.orifice import Orifice
 from fvsolve.parts.pipe import Pipe, Wall
-from fvsolve.parts.pump import Pump
-from fvsolve.parts.regulating import FlowControl, PressureReducing, PressureSustaining
-from fvsolve.parts.relief_valve import ReliefValve
 from fvsolve.parts.reservoir import Reservoir
 from fvsolve.parts.rigid_column import RigidColumn
 from fvsolve.parts.scalar import Scalar
@@ -32,11 +29,13 @@ from fvsolve.parts.tank import AreaTable, Tank
 from fvsolve.parts.torque import Torque
 from fvsolve.parts.valve import Characteristic, Valve
 
+for path in sorted(Path(__file__).parent.glob("*/part.py")):
+    import_module(f"{__name__}.{path.parent.name}.part")
+
 KINDS = {"nodes": Node.kinds, "links": Link.kinds}
 
 __all__ = [
-    "EDGES", "KINDS", "Accumulator", "AirValve", "AreaTable", "Basin", "Chamber", "Characteristic", "CheckValve",
-    "Cylinder", "Damper", "EndStop", "FlowControl", "Force", "Frame", "Friction", "Inflow", "Junction", "Leak", "Link",
-    "Mass", "Node", "Orifice", "Pipe", "PressureReducing", "PressureSustaining", "Pump", "ReliefValve", "Reservoir",
+    "EDGES", "KINDS", "AreaTable", "Basin", "Chamber", "Characteristic", "Cylinder", "Damper", "EndStop", "Force",
+    "Frame", "Friction", "Inflow", "Junction", "Leak", "Link", "Mass", "Node", "Orifice", "Pipe", "Reservoir",
     "RigidColumn", "Scalar", "Schedule", "SpoolValve", "Spring", "Tank", "Torque", "Valve", "Wall",
 ]  # fmt: skip

@@ -130,7 +130,7 @@ def checked(name: str, value: float, one: Input) -> float:
 
 def torques(model: Model, pump: str, row) -> dict[str, Input]:
     """Torques given to the shaft of a pump."""
-    from fvsolve.kernels.devices.pump import OWN_NUMBERS
+    from fvsolve.parts.pump.law import OWN_NUMBERS
 
     names = [name for name, link in model.case.links.items() if link.kind == "torque" and link.to == f"{pump}.shaft"]
     schedules = model.tables.floats[row["data"] + OWN_NUMBERS :: 2]

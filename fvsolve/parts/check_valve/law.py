@@ -5,7 +5,7 @@ drop exceeds its cracking pressure. armed[event] says which: it changes on accep
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.either import either
 from fvsolve.kernels.records import JUNCTION
 from fvsolve.kernels.restrictions import head_drop
 

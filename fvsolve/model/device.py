@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -9,6 +13,7 @@ import numpy as np
 
 from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.valves import flow_at_drop, transition_of
 
 
 class Device:
@@ -100,7 +105,8 @@ class Device:
 
 def lower_devices(draft) -> None:
     """Fill the table of devices of a scene, with their states, numbers and event functions."""
-    draft.devices = [(name, part, Device.kinds[part.kind].of(part)) for name, part in parts_of(draft.case)]
+    parts = [*draft.case.places.items(), *draft.case.conduits.items()]
+    draft.devices = [(name, part, device.of(part)) for name, part in parts if (device := device_of(type(part)))]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
     laws = list(laws_of(draft.devices))
@@ -132,7 +138,27 @@ def laws_of(devices: list[tuple]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(device.law.__name__ for _, _, device in devices))
 
 
-def parts_of(case) -> list[tuple[str, Any]]:
-    """Parts of a case that are devices, places first."""
-    parts = [*case.places.items(), *case.conduits.items()]
-    return [(name, part) for name, part in parts if part.kind in Device.kinds]
+@functools.cache
+def device_of(part: type) -> Device | None:
+    """What lowers parts of a kind that have a law of their own: of the module `lower` beside theirs; None of others."""
+    home = part.__module__.rpartition(".")[0]
+    if find_spec(f"{home}.lower") is not None:
+        import_module(f"{home}.lower")
+    return Device.kinds.get(part.kind)
+
+
+def opening_of(start, k: int) -> float:
+    """Opening x between 0 and 1 at which valve k passes its flow of the profile, M |M| = G x^2 dP."""
+    valve = start.valves[k]
+    dense, drop = start.law_of(k)
+    flow = abs(float(valve["flow"]))
+    if flow == 0.0 or not dense * drop > 0.0:
+        return 0.0
+    if flow >= valve["transition"] and drop >= valve["unseen"]:
+        return min(flow / math.sqrt(dense * drop), 1.0)
+    low, high, x = 0.0, 1.0, 0.5
+    for _ in range(60):
+        g = dense * x * x
+        low, high = (x, high) if flow_at_drop(g, transition_of(valve, g), drop) < flow else (low, x)
+        x = 0.5 * (low + high)
+    return x

@@ -9,12 +9,12 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.curves import COUNT, LAST, LAW, OWN, SCALE, SUTER, curve_head, piecewise, suter_value
-from fvsolve.kernels.devices.check_valve import RELUCTANCE
-from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.devices.loops import PASSING
+from fvsolve.kernels.devices import PASSING
+from fvsolve.kernels.either import either
 from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
+from fvsolve.parts.check_valve.law import RELUCTANCE
 
 # Numbers of a pump: how its speed comes about, whether it has a check valve, the schedule of its trip, the relative
 # speed from which the shaft then runs free, J times rated speed [N m s], torque that is not balanced at the start and

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.disc import DROPS, Disc
+from fvsolve.parts.disc.part import DROPS, Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import Quantity, positive
 from fvsolve.parts.valve import Sized

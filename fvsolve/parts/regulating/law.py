@@ -8,9 +8,9 @@ states alone. Where it alone holds a rigid column, it leads that from its seat (
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.devices.feedback import loop_rate
-from fvsolve.kernels.devices.lead import lead_events, leads
+from fvsolve.kernels.either import either
+from fvsolve.kernels.feedback import loop_rate
+from fvsolve.kernels.lead import lead_events, leads
 from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value

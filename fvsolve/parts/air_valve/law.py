@@ -9,7 +9,7 @@ from math import expm1, log1p, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.either import either
 from fvsolve.kernels.energy_barotropic import vessel_power
 from fvsolve.kernels.records import LAW_LINEAR, RATE
 from fvsolve.kernels.restrictions import restriction_slope

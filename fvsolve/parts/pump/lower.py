@@ -9,11 +9,11 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.kernels import curves
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.devices import pump as law
 from fvsolve.kernels.schedules import value_until
-from fvsolve.model.devices.device import Device
-from fvsolve.model.head_curves import curve_numbers, rated_point, shaft_points
+from fvsolve.model.device import Device
 from fvsolve.parts import Schedule
+from fvsolve.parts.pump import law
+from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point, shaft_points
 from fvsolve.steady import Edge
 
 SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding

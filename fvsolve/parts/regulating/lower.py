@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels.devices import regulator as law
-from fvsolve.kernels.valves import flow_at_drop, transition_of
-from fvsolve.model.devices.device import Device
+from fvsolve.model.device import Device, opening_of
+from fvsolve.parts.regulating import law
 from fvsolve.steady import Edge
 
 SMALL_FLOW = 1e-9  # share of the flows of a scene below which one is rounding
@@ -212,20 +211,3 @@ def head_of(case, weight: float, name: str) -> tuple[float, str]:
     if node.head is not None:
         return float(np.max(node.head.value)), name
     return (float(np.max(node.pressure.value)) - case.ambient_pressure) / weight + z, name
-
-
-def opening_of(start, k: int) -> float:
-    """Opening x between 0 and 1 at which valve k passes its flow of the profile, M |M| = G x^2 dP."""
-    valve = start.valves[k]
-    dense, drop = start.law_of(k)
-    flow = abs(float(valve["flow"]))
-    if flow == 0.0 or not dense * drop > 0.0:
-        return 0.0
-    if flow >= valve["transition"] and drop >= valve["unseen"]:
-        return min(flow / math.sqrt(dense * drop), 1.0)
-    low, high, x = 0.0, 1.0, 0.5
-    for _ in range(60):
-        g = dense * x * x
-        low, high = (x, high) if flow_at_drop(g, transition_of(valve, g), drop) < flow else (low, x)
-        x = 0.5 * (low + high)
-    return x

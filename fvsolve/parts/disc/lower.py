@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 
-from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.devices import disc, relief
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
-from fvsolve.model.devices.device import Device
-from fvsolve.model.devices.regulator import opening_of
+from fvsolve.model.device import Device, opening_of
+from fvsolve.parts.disc import law
 from fvsolve.steady import Edge
 
 LIFTING, OPEN = "lifting", "open"  # in `start.shut`, shut
@@ -21,7 +18,7 @@ STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "
 class Lifting(Device, kind=""):
     """Shut, fully open, or lifted between; with a disc that takes its time its lift is a state."""
 
-    law, leads = disc, 4
+    law, leads = law, 4
     quantities = ("opening",)
     events = STOPS
     remedy = "give it a greater overpressure"
@@ -38,8 +35,8 @@ class Lifting(Device, kind=""):
     def settle(self, slate, row, y, scale) -> None:
         tables = slate.model.tables
         stop, seat = (slate.armed[row["event"] + k] > 0.0 for k in (0, 2))
-        if self.states and seat and disc.disc_lift(y, tables, row) > 0.0:  # it has slammed
-            y[row["y"]] = -tables.floats[row["data"] + disc.LIFT] - SEATED
+        if self.states and seat and law.disc_lift(y, tables, row) > 0.0:  # it has slammed
+            y[row["y"]] = -tables.floats[row["data"] + law.LIFT] - SEATED
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 
@@ -105,112 +102,3 @@ class Lifting(Device, kind=""):
 
     def tell(self, start, name: str, x: float) -> None:
         """What its user may not expect."""
-
-
-class ReliefDisc(Lifting, kind=""):
-    """A relief valve whose disc takes its time."""
-
-    mode = disc.RELIEF
-
-    def felt(self, start, k):
-        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
-        return start.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
-
-    def row(self, start, k: int):
-        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
-        z = float(start.nodes["elevation"][i])
-
-        def newton(flow, drop, potential):
-            x = (start.pressure_of(potential, z) - part.set_pressure) / part.overpressure
-            asked, slope, rise = self.flow_at(start, k, drop, x)
-            rise /= part.overpressure
-            size = max(slope + rise, 1e-12 * start.flow_scale)
-            return 1.0 / size, slope / size, (asked - flow) / size, rise / size
-
-        return newton
-
-    def tell(self, start, name, x):
-        if x > 0.0:
-            text = f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1"
-            start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
-
-
-class ReliefSwing(ReliefDisc, kind=""):
-    """The same with inertia."""
-
-    states = ("opening", "speed")
-
-
-class ReliefLag(ReliefDisc, kind=""):
-    """The same without."""
-
-    states = ("opening",)
-
-
-class Relief(ReliefDisc, kind="relief-valve"):
-    """A relief valve that opens at once."""
-
-    law, leads = relief, -1
-    events = ("is shut", "opens", "is fully open", "leaves full opening")
-
-    def of(self, part) -> Device:
-        return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
-
-    def restriction(self, draft, name, link, row) -> None:
-        draft.restriction(name, link, row)
-        row["law"] = rec.ROOT if link.moves else rec.LIFT
-
-    def numbers(self, draft, name, part) -> list[float]:
-        draft.valve_table["data"][draft.valve_names.index(name)] = len(draft.floats)
-        return [0.0, part.overpressure, 0.0]
-
-    def fill(self, start, row, x, target):
-        start.draft.tables.floats[row["data"]] = target
-
-
-class CheckDisc(Lifting, kind=""):
-    """A check valve whose disc takes its time."""
-
-    mode = disc.CHECK
-
-    def felt(self, start, k):
-        before, behind = start.across(k)
-        return (before - behind) * start.ratio.get(k, 1.0) - self.part(start, k).cracking_pressure
-
-    def row(self, start, k: int):
-        part, ratio = self.part(start, k), start.ratio.get(k, 1.0)
-
-        def newton(flow, drop, potential):
-            asked, slope, rise = self.flow_at(
-                start, k, drop, (drop * ratio - part.cracking_pressure) / part.overpressure
-            )
-            slope += rise * ratio / part.overpressure
-            size = max(slope, 1e-12 * start.flow_scale)
-            return 1.0 / size, slope / size, (asked - flow) / size, 0.0
-
-        return newton
-
-    def tell(self, start, name, x):
-        """A disc beside other valves does not lead the column that they hold together."""
-        valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
-        if any(
-            nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
-        ):
-            text = (f"{name}: its disc and other valves hold a rigid column: its lift and flow are not to be trusted "
-                    "from where it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
-            start.draft.warnings.append(Notice("range", f"links.{name}", text))
-
-    def next(self, x, back, now):
-        return "shut" if back and now != "shut" else super().next(x, back, now)
-
-
-class CheckSwing(CheckDisc, kind=""):
-    """The same with inertia."""
-
-    states = ("opening", "speed")
-
-
-class CheckLag(CheckDisc, kind=""):
-    """The same without."""
-
-    states = ("opening",)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from fvsolve.kernels import curves
-from fvsolve.parts.head_curve import Points, first_root
-from fvsolve.parts.pump import EFFICIENCY
+from fvsolve.parts.pump.head_curve import Points, first_root
+from fvsolve.parts.pump.part import EFFICIENCY
 
 LEAST_FLOW = 1e-5  # share of the last flow below which a curve that is flat there is a straight line
 HIGHEST, LOWEST = 1000.0, 0.1  # heads between which a pump of constant power keeps it [m]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from fvsolve.errors import Notice
-from fvsolve.kernels.devices import air_valve as law
-from fvsolve.model.devices.device import Device
+from fvsolve.model.device import Device
+from fvsolve.parts.air_valve import law
 
 GAS_CONSTANT = 287.05  # of air [J/kg/K]
 

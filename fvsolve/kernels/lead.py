@@ -7,7 +7,7 @@ a given step resolves what the two exchange: `kernels.led`. A disc that goes to 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.either import either
 from fvsolve.kernels.restrictions import head_drop
 
 LEADS = 1e-4  # lift up to which it leads its column, at least

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fvsolve.errors import Notice
-from fvsolve.kernels.devices import accumulator as law
-from fvsolve.model.devices.device import Device
+from fvsolve.model.device import Device
+from fvsolve.parts.accumulator import law
 
 ROUNDED = 1e-5  # share of the mass that it gave which errors in its neck are measured against, so as to exceed rounding
 NECK = 0.01  # share of its volume that is fluid in the neck of a bladder accumulator

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.suter_tables import SUTER_TABLES
+from fvsolve.parts.pump.suter_tables import SUTER_TABLES
 from fvsolve.parts.table import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,

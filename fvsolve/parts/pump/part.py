@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.head_curve import Efficiency, HeadCurve, Points, ShaftPower, Suter, SuterTable
 from fvsolve.parts.link import TwoPort
+from fvsolve.parts.pump.head_curve import Efficiency, HeadCurve, Points, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table import at_least_one
 from fvsolve.parts.value import Flag, Quantity, Usual, nonnegative, positive

@@ -10,9 +10,9 @@ Where it alone holds a rigid column, it leads that from its seat (armed[event + 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.either import either
-from fvsolve.kernels.devices.feedback import loop_rate
-from fvsolve.kernels.devices.lead import lead_events, leads
+from fvsolve.kernels.either import either
+from fvsolve.kernels.feedback import loop_rate
+from fvsolve.kernels.lead import lead_events, leads
 from fvsolve.kernels.records import CLOSING, RATE
 from fvsolve.kernels.restrictions import head_drop
 

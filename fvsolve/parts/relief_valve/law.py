@@ -5,7 +5,7 @@ armed[event + 2] that it is fully open: these change on accepted states alone, s
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices.either import either
+from fvsolve.kernels.either import either
 from fvsolve.kernels.restrictions import pressure_lift
 
 RELUCTANCE = 1e-10  # of lift, beyond which it changes: rounding must not open it

@@ -1,0 +1,71 @@
+"""Relief valves in the tables of a scene, at once or with a disc that takes its time."""
+
+from __future__ import annotations
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
+from fvsolve.model.device import Device
+from fvsolve.parts.disc.law import RELIEF
+from fvsolve.parts.disc.lower import Lifting
+from fvsolve.parts.relief_valve import law
+
+
+class ReliefDisc(Lifting, kind=""):
+    """A relief valve whose disc takes its time."""
+
+    mode = RELIEF
+
+    def felt(self, start, k):
+        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
+        return start.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
+
+    def row(self, start, k: int):
+        i, part = int(start.valves[k]["from_node"]), self.part(start, k)
+        z = float(start.nodes["elevation"][i])
+
+        def newton(flow, drop, potential):
+            x = (start.pressure_of(potential, z) - part.set_pressure) / part.overpressure
+            asked, slope, rise = self.flow_at(start, k, drop, x)
+            rise /= part.overpressure
+            size = max(slope + rise, 1e-12 * start.flow_scale)
+            return 1.0 / size, slope / size, (asked - flow) / size, rise / size
+
+        return newton
+
+    def tell(self, start, name, x):
+        if x > 0.0:
+            text = f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1"
+            start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
+
+
+class ReliefSwing(ReliefDisc, kind=""):
+    """The same with inertia."""
+
+    states = ("opening", "speed")
+
+
+class ReliefLag(ReliefDisc, kind=""):
+    """The same without."""
+
+    states = ("opening",)
+
+
+class Relief(ReliefDisc, kind="relief-valve"):
+    """A relief valve that opens at once."""
+
+    law, leads = law, -1
+    events = ("is shut", "opens", "is fully open", "leaves full opening")
+
+    def of(self, part) -> Device:
+        return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
+
+    def restriction(self, draft, name, link, row) -> None:
+        draft.restriction(name, link, row)
+        row["law"] = rec.ROOT if link.moves else rec.LIFT
+
+    def numbers(self, draft, name, part) -> list[float]:
+        draft.valve_table["data"][draft.valve_names.index(name)] = len(draft.floats)
+        return [0.0, part.overpressure, 0.0]
+
+    def fill(self, start, row, x, target):
+        start.draft.tables.floats[row["data"]] = target
