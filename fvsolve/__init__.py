@@ -17,6 +17,7 @@ _HOMES = {
     "integrate": "steppers.ode",
     "load": "case",
     "open_run": "run",
+    "register": "parts.outside",
     "run": "run",
     "solve": "solve",
     "tableau": "steppers.tableau",

@@ -23,7 +23,8 @@ class Functions:
         self.cast, rates = cast, cast.functions(*PHASES)
         self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
         self.hooks = calls.empty_calls(len(cast.devices), len(calls.HOOKS))
-        with beside(f"{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
+        others = "" if all(name.startswith("fvsolve.") for name in cast.devices) else "import fvsolve.parts; "
+        with beside(f"{others}{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
             self.hang("set", "move", *["lead"] * cast.columns)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))

@@ -18,6 +18,7 @@ from fvsolve.parts.link import Link
 from fvsolve.parts.mass import Mass
 from fvsolve.parts.node import Node
 from fvsolve.parts.orifice import Orifice
+from fvsolve.parts.outside import declare_offered
 from fvsolve.parts.pipe import Pipe, Wall
 from fvsolve.parts.reservoir import Reservoir
 from fvsolve.parts.rigid_column import RigidColumn
@@ -31,6 +32,8 @@ from fvsolve.parts.valve import Characteristic, Valve
 
 for path in sorted(Path(__file__).parent.glob("*/part.py")):
     import_module(f"{__name__}.{path.parent.name}.part")
+
+declare_offered()
 
 KINDS = {"nodes": Node.kinds, "links": Link.kinds}
 

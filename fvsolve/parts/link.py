@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from fvsolve.errors import FvsolveError
 from fvsolve.parts.table import Table, keys_json, read_keys
 from fvsolve.parts.value import NEEDED, Setting, Text, Value
 from fvsolve.units import show
@@ -34,6 +35,8 @@ class Link(Table):
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if kind:
+            if kind in Link.kinds:
+                raise FvsolveError(f"a link of type {show(kind)} is there already; wanted another name")
             cls.kind = kind
             Link.kinds[kind] = cls
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.errors import FvsolveError
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, Rows, Usual
+from fvsolve.units import show
 
 HEIGHTS = Usual(-12e3, 9e3, "boreholes to mountains")
 
@@ -43,5 +45,7 @@ class Node(Table):
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if kind:
+            if kind in Node.kinds:
+                raise FvsolveError(f"a node of type {show(kind)} is there already; wanted another name")
             cls.kind = kind
             Node.kinds[kind] = cls
