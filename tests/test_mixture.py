@@ -80,12 +80,12 @@ def test_enthalpy_thrust_and_riemann_integral_are_integrals_to_twelve_digits(key
         a, b = low + a, low + b
         h = law.enthalpy(st, NONE, b) - law.enthalpy(st, NONE, a)
         assert h == approx(integral(lambda p: 1 / law.density(st, NONE, p), a, b, st), rel=1e-11)
-        force = law.thrust(st, pipe, b) - law.thrust(st, pipe, a)
-        assert force == approx(integral(lambda p: law.wall_area(st, pipe, p), a, b, st), rel=1e-12)
+        force = law.thrust(st, NONE, pipe, b) - law.thrust(st, NONE, pipe, a)
+        assert force == approx(integral(lambda p: law.wall_area(st, NONE, pipe, p), a, b, st), rel=1e-12)
 
         def lightness(p):
             m, dm = law.mass_of_pressure(st, NONE, pipe, p)
-            return math.sqrt(dm * law.wall_area(st, pipe, p)) / m
+            return math.sqrt(dm * law.wall_area(st, NONE, pipe, p)) / m
 
         change = integral(lightness, a, b, st)
         assert law.velocity_change(st, NONE, pipe, a, b) == approx(change, rel=2e-12)

@@ -76,6 +76,11 @@ class Law:
         return bool(self.st["floor"] > 0.0)
 
     @property
+    def family(self) -> str:
+        """Which kernels it runs on: "linear" hold pressures, "barotropic" masses, "cavitating" cavities too."""
+        return "linear" if self.linear else "cavitating" if self.cavitates else "barotropic"
+
+    @property
     def cavity_pressure(self) -> float:
         """Pressure [Pa] below which a place is a cavity: vapour pressure, or where more vapour than gas is in it."""
         return self.fluid.vapor_pressure * (2.0 if self.cavitates else 1.0)
@@ -194,7 +199,7 @@ class Dense(Law):
         return 1.0 / (self.rho * speed**2) - 1.0 / self.fluid.bulk_modulus
 
     def area(self, row, pressure):
-        return self.each(lambda st, floats, p: self.kernels.wall_area(st, row, p), pressure)
+        return self.each(self.kernels.wall_area, row, pressure)
 
     def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
         masses = profile[row["center"] + np.arange(len(waves))] + waves / row["speed"]

@@ -32,7 +32,7 @@ from fvsolve.kernels.tanks import tank_level
 @njit
 def momentum_flux(st, floats, pipe, m, flow):
     """M^2 / m + integral of A dp [N]."""
-    return flow * flow / m + thrust(st, pipe, pressure_of_mass(st, floats, pipe, m))
+    return flow * flow / m + thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 
 @njit

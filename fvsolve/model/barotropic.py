@@ -9,6 +9,7 @@ import numpy as np
 from fvsolve.kernels import density as kernels
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.barotropic_nodes import drive, end_flow, target_under
+from fvsolve.kernels.density.profile import profile_along
 from fvsolve.kernels.emitters import FREE
 from fvsolve.model.start import PRESSURE_SCALE, Start
 
@@ -104,7 +105,7 @@ class BarotropicStart(Start):
             m, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.pressure(i))
             start += 0.5 * (flow / m) ** 2
         faces, centers = np.zeros(mesh.cells + 1), np.zeros(mesh.cells)
-        b_to = kernels.profile_along(self.st, self.floats, row, float(start), z, flow, faces, centers)
+        b_to = profile_along(self.st, self.floats, row, float(start), z, flow, faces, centers)
         self.ends = faces[0], faces[-1]
         return faces, centers, b_to
 

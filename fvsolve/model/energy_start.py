@@ -95,7 +95,7 @@ def pipe_above(model: Model, k: int) -> float:
         low = mass_of_pressure(st, floats, row, rest)[0]
         p = pressure_of_mass(st, floats, row, m)
         head, least = enthalpy(st, floats, p) - base + height, enthalpy(st, floats, rest) - base + height
-        squeezed = m * head - low * least - (thrust(st, row, p) - thrust(st, row, rest))
+        squeezed = m * head - low * least - (thrust(st, floats, row, p) - thrust(st, floats, row, rest))
         total += float(row["dx"]) * (squeezed + 0.5 * row["flow"] ** 2 / m)
     return float(total)
 

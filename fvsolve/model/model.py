@@ -189,8 +189,7 @@ class Model(Shown):
         from fvsolve.kernels.phases import Cast
         from fvsolve.model.device import laws_of
 
-        devices = laws_of(self.devices)
-        law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))
+        devices, many = laws_of(self.devices), rec.Tables(*(len(table) > 0 for table in self.tables))
         there = [many.clusters, many.columns, many.bodies]
         basins = tuple(int(kind) for kind in np.unique(self.tables.basins["kind"]))
         spread, valves = bool(self.tables.scalars["diffusivity"].any()), many.valves
@@ -198,7 +197,7 @@ class Model(Shown):
         alone = bool(basins and patches) and not (self.cells or valves or devices or any(there))
         outlets = bool((self.tables.valves["law"] == rec.POWER).any())
         fifth = SCHEMES[self.case.numerics.scheme].on(True).order > 2
-        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, devices, basins, many.scalars, fifth,
+        cast = Cast(self.case.law.family, self.cells > 0, *there, self.unsteady, devices, basins, many.scalars, fifth,
                     spread, valves, alone, outlets)  # fmt: skip
         return functions(cast)
 
