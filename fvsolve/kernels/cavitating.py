@@ -7,7 +7,7 @@ profile's; so a front moves at its own speed, be it sound's in the liquid or a c
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic import wall_force
-from fvsolve.kernels.density import local_speed, pressure_of_mass, thrust
+from fvsolve.kernels.density import force_of_mass, local_speed, pressure_of_mass
 from fvsolve.kernels.density.mixture import relative_volume
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.reconstruction import value_muscl
@@ -122,7 +122,7 @@ def end_flux(st, floats, profile, pipe, i, r, l):
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
     m, total = profile[pipe["face"] + i] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
-    force = thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
+    force = force_of_mass(st, floats, pipe, m)
     return r - l, total * total / m + force - profile[pipe["flux"] + i]
 
 

@@ -84,6 +84,13 @@ def thrust(st, floats, pipe, p):
 
 
 @njit
+def force_of_mass(st, floats, pipe, m):
+    """`thrust` at the pressure of a pipe that holds m [kg/m], often asked [N]."""
+    ask = log.force_of_mass, table.force_of_mass, mixture.force_of_mass, nobody.number
+    return by_law(*ask, st, floats, pipe, m)
+
+
+@njit
 def impedance(st, floats, pipe, p):
     """rho c = sqrt(rho / (d ln m / dp)) of a pipe at a pressure [kg/m2/s]."""
     return by_law(log.impedance, table.impedance, mixture.impedance, nobody.number, st, floats, pipe, p)

@@ -8,36 +8,10 @@ free gas as long as x < saturation (it dissolves by Henry's law; infinite for no
 A = A_ref (1 + compliance (p - p_ref)), so that with k = 1 pressure over mass is the root of a quadratic.
 """
 
-import os
 from math import exp, log, sqrt
 
-from fvsolve.jit import inner, njit
-
-if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
-    from numba.core import types
-    from numba.extending import intrinsic
-
-    @intrinsic
-    def outside(typingctx):
-        """Keep LLVM from copying the function around this call into its callers: halves what it adds to compiling."""
-
-        def generate(context, builder, kind, args):
-            builder.function.attributes.add("noinline")
-            return context.get_dummy_value()
-
-        return types.none(), generate
-else:
-
-    def outside():
-        """Nothing, without numba."""
-
-
-def part(function):
-    """`njit` for what the questions of this folder alone call: no door to Python.
-
-    Inlining is told, since numba takes it over from whichever caller compiles first, and `outside` forbids it.
-    """
-    return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+from fvsolve.jit import inner
+from fvsolve.kernels.density.apart import outside, part
 
 
 @part
@@ -67,14 +41,14 @@ def gas_work(st, x):
     return st["gas"] * at ** (1.0 - k) * (1.0 / (1.0 - k) - at / s / (2.0 - k))
 
 
-@part
+@inner
 def log_density(st, floats, p):
     """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
     size, fall = relative_volume(st, p)
     return -log(size), fall / size
 
 
-@part
+@inner
 def density(st, floats, p):
     """rho [kg/m3] at a pressure."""
     return st["rho"] / relative_volume(st, p)[0]
@@ -142,13 +116,13 @@ def pressure_of_share(st, compliance, share):
     return x + floor
 
 
-@part
+@inner
 def pressure_of_log(st, floats, compliance, q):
     """Pressure [Pa] at which ln(rho / rho_ref) and the wall's own, ln(A / A_ref), are q together."""
     return pressure_of_share(st, compliance, exp(q))
 
 
-@part
+@inner
 def pressure_of_mass(st, floats, pipe, m):
     """Pressure [Pa] of a pipe that holds m [kg/m]."""
     return pressure_of_share(st, pipe["compliance"], m / (st["rho"] * pipe["area"]))
@@ -160,13 +134,13 @@ def wall_stretch(st, compliance, p):
     return 1.0 + compliance * (p - st["reference"])
 
 
-@part
+@inner
 def wall_area(st, floats, pipe, p):
     """Area of a pipe at a pressure [m2]."""
     return pipe["area"] * wall_stretch(st, pipe["compliance"], p)
 
 
-@part
+@inner
 def thrust(st, floats, pipe, p):
     """Integral of A dp from the reference pressure [N]."""
     x = pipe["compliance"] * (p - st["reference"])
@@ -181,6 +155,12 @@ def mass_of_pressure(st, floats, pipe, p):
     stretch = wall_stretch(st, pipe["compliance"], p)
     m = st["rho"] * pipe["area"] * stretch / size
     return m, m * (fall / size + pipe["compliance"] / stretch)
+
+
+@inner
+def force_of_mass(st, floats, pipe, m):
+    """`thrust` at the pressure of a pipe that holds m [kg/m]: the momentum that its pressure carries [N]."""
+    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 
 @part
@@ -228,7 +208,7 @@ def velocity_change(st, floats, pipe, p_from, p_to):
     return sign * total
 
 
-@part
+@inner
 def local_speed(st, floats, pipe, p):
     """Wave speed c of a pipe at a pressure [m/s]."""
     return impedance(st, floats, pipe, p) * relative_volume(st, p)[0] / st["rho"]

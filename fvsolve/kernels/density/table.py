@@ -2,8 +2,9 @@
 
 from math import exp, expm1, log
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.density import swelling
+from fvsolve.kernels.density.apart import outside, part
 
 
 @njit(forceinline=True)
@@ -32,7 +33,7 @@ def log_density(st, floats, p):
     return value, slope
 
 
-@njit
+@inner
 def density(st, floats, p):
     """rho [kg/m3] at a pressure."""
     return swelling.density(st, log_density(st, floats, p)[0])
@@ -51,9 +52,10 @@ def enthalpy(st, floats, p):
     return hermite(floats, o + 2 * n, o + 3 * n, k, x - k, step)
 
 
-@njit
+@part
 def pressure_of_enthalpy(st, floats, h):
     """Pressure [Pa] at which `enthalpy` is h."""
+    outside()
     p = st["reference"] + st["rho"] * h
     for _ in range(30):
         step = (enthalpy(st, floats, p) - h) * density(st, floats, p)
@@ -63,9 +65,10 @@ def pressure_of_enthalpy(st, floats, h):
     return p
 
 
-@njit
+@part
 def pressure_of_log(st, floats, compliance, q):
     """Pressure [Pa] at which ln(rho / rho_ref) + compliance (p - p_ref) is q."""
+    outside()
     p = st["reference"] + q / (1.0 / st["beta"] + compliance)
     for _ in range(30):
         value, slope = log_density(st, floats, p)
@@ -76,32 +79,38 @@ def pressure_of_log(st, floats, compliance, q):
     return p
 
 
-@njit
+@inner
 def pressure_of_mass(st, floats, pipe, m):
     """Pressure [Pa] of a pipe that holds m [kg/m]."""
     return pressure_of_log(st, floats, pipe["compliance"], log(swelling.filled(st, pipe, m)))
 
 
-@njit
+@inner
 def mass_of_pressure(st, floats, pipe, p):
     """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
     value, slope = log_density(st, floats, p)
     return swelling.mass(st, pipe, p, value, slope)
 
 
-@njit
+@inner
 def wall_area(st, floats, pipe, p):
     """Area of a pipe at a pressure [m2]."""
     return swelling.area(st, pipe, p)
 
 
-@njit
+@inner
 def thrust(st, floats, pipe, p):
     """Integral of A dp from the reference pressure [N]."""
     return swelling.thrust(st, pipe, p)
 
 
-@njit
+@inner
+def force_of_mass(st, floats, pipe, m):
+    """`thrust` at the pressure of a pipe that holds m [kg/m]: the momentum that its pressure carries [N]."""
+    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
+
+
+@inner
 def impedance(st, floats, pipe, p):
     """rho c of a pipe at a pressure [kg/m2/s]."""
     value, slope = log_density(st, floats, p)
@@ -117,7 +126,7 @@ def velocity_change(st, floats, pipe, p_from, p_to):
     return swelling.over_three(half, impedance(st, floats, pipe, middle), here, there)
 
 
-@njit
+@inner
 def local_speed(st, floats, pipe, p):
     """Wave speed c of a pipe at a pressure [m/s]."""
     value, slope = log_density(st, floats, p)
