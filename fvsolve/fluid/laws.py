@@ -1,7 +1,7 @@
 """Density laws: what each can carry, and how density, head and mass hang on pressure. Knows one fluid; knows no scene.
 
-A law is one class here and one file of compiled functions in `kernels.density`; basins have their own
-(`model.basins.liquid_laws`). What is asked of a law elsewhere is asked by these names, never by its own.
+A law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their own
+(`model.basins.liquid`). What is asked of a law elsewhere is asked by these names, never by its own.
 """
 
 from __future__ import annotations
@@ -155,8 +155,6 @@ class Linear(Law, name="linear"):
 class Dense(Law):
     """Laws whose kernels hold masses: their questions are those of `kernels.density`."""
 
-    basins = ("liquid", "transport")
-
     @cached_property
     def kernels(self):
         from fvsolve.kernels import density  # which scenes under a linear law do without
@@ -212,13 +210,13 @@ class Dense(Law):
 class Log(Dense, name="log"):
     """p = p_ref + beta ln(rho / rho_ref): one bulk modulus."""
 
-    code = rec.LAW_LOG
+    code, basins = rec.LAW_LOG, ("liquid", "transport")
 
 
 class Table(Dense, name="table"):
     """CoolProp's own density along the isentrope through the reference state."""
 
-    code, tabulated = rec.LAW_TABLE, True
+    code, tabulated, basins = rec.LAW_TABLE, True, ("liquid", "transport")
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
@@ -242,7 +240,7 @@ class Table(Dense, name="table"):
 class Mixture(Dense, name="mixture"):
     """Liquid with free gas, and vapour where cavities are asked for; with nothing mixed in it is `log`."""
 
-    code, keys, basins = rec.LAW_MIXTURE, AIR_KEYS, ("transport",)
+    code, keys = rec.LAW_MIXTURE, AIR_KEYS
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air:
