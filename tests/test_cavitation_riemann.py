@@ -66,7 +66,7 @@ def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
     law = Mixture(fluid["density"], fluid["bulk_modulus"], AMBIENT, FLOOR, gas, float(pipe["compliance"]), EXACT.area)
     for left, right in random_states(np.random.default_rng(5), law, 200):
         p, v = Riemann(law, left, right).middle()
-        sides = side_at(st, pipe, left[0]), side_at(st, pipe, right[0])
+        sides = side_at(st, floats, pipe, left[0]), side_at(st, floats, pipe, right[0])
         middle, after, ahead = star(st, floats, pipe, sides[0], left[1], sides[1], right[1])
         assert middle[0] - FLOOR == pytest.approx(p - FLOOR, rel=10.0 * near)
         assert [after, ahead] == pytest.approx([v, v], abs=near * (1.0 + abs(v)))

@@ -14,9 +14,9 @@ from truth.scenes import chamber, junction, pipe, ramp, reservoir, scene, valve
 import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.fluid import properties
+from fvsolve.fluid.laws import Mixture
 from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
-from fvsolve.model.density import add_law
 from fvsolve.studies.energy.energy import energy
 
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.6e9, "viscosity": 0.04}
@@ -34,7 +34,7 @@ def settings(**keys):
     """The record that kernels read, of oil with what `keys` mix into it."""
     fluid = properties(**{**OIL, "temperature": 293.15, "pressure": ATM, "law": "mixture", **keys})
     made = np.zeros(1, rec.SETTINGS)
-    add_law(fluid, made[0], [])
+    Mixture.lower(fluid, made[0], [])
     return made[0]
 
 
@@ -80,12 +80,12 @@ def test_enthalpy_thrust_and_riemann_integral_are_integrals_to_twelve_digits(key
         a, b = low + a, low + b
         h = law.enthalpy(st, NONE, b) - law.enthalpy(st, NONE, a)
         assert h == approx(integral(lambda p: 1 / law.density(st, NONE, p), a, b, st), rel=1e-11)
-        force = law.thrust(st, pipe, b) - law.thrust(st, pipe, a)
-        assert force == approx(integral(lambda p: law.wall_area(st, pipe, p), a, b, st), rel=1e-12)
+        force = law.thrust(st, NONE, pipe, b) - law.thrust(st, NONE, pipe, a)
+        assert force == approx(integral(lambda p: law.wall_area(st, NONE, pipe, p), a, b, st), rel=1e-12)
 
         def lightness(p):
             m, dm = law.mass_of_pressure(st, NONE, pipe, p)
-            return math.sqrt(dm * law.wall_area(st, pipe, p)) / m
+            return math.sqrt(dm * law.wall_area(st, NONE, pipe, p)) / m
 
         change = integral(lightness, a, b, st)
         assert law.velocity_change(st, NONE, pipe, a, b) == approx(change, rel=2e-12)

@@ -15,6 +15,7 @@ import numpy as np
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
+from fvsolve.fluid.laws import LAWS, named
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Place
 from fvsolve.parts.formula import Formula
@@ -197,11 +198,10 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)
-        if fluid is not None and fluid.law != "linear" and basin.physics == "free-surface":
-            what = f"{show(fluid.law)} does not go with a free surface, whose water has one density"
-            yield ("fluid", "law"), f'{what}; wanted "linear"'
-        if fluid is not None and fluid.law == "mixture" and basin.physics == "liquid":
-            yield ("fluid", "law"), f'{show(fluid.law)} does not go with basins; wanted "linear", "log" or "table"'
+        if fluid is not None and basin.physics not in LAWS[fluid.law].basins:
+            what = {"free-surface": "a free surface, whose water has one density"}.get(basin.physics, "basins")
+            wanted = named(lambda law, physics=basin.physics: physics in law.basins)
+            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {what}; wanted {wanted}"
         if name not in meshes:
             continue
         known = patch_names(meshes[name])

@@ -13,7 +13,8 @@ from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
-from fvsolve.fluid import Fluid
+from fvsolve.fluid import LAWS, Fluid
+from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.table import plain
 from fvsolve.schemes import SCHEMES
@@ -85,6 +86,11 @@ class Case(Shown):
         """Schemes that can follow what its fluid does."""
         air = self.properties.air
         return CAVITY_SCHEMES if air is not None and air.cavitation else tuple(SCHEMES)
+
+    @cached_property
+    def law(self) -> Law:
+        """Its density law, with the fluid's numbers."""
+        return LAWS[self.fluid.law](self.properties, self.ambient_pressure, self.gravity)
 
     @cached_property
     def places(self) -> dict[str, Node]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from fvsolve.case.size import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.fluid.laws import LAWS, named
 from fvsolve.parts import KINDS, Basin, Chamber, Inflow, Pipe, Reservoir, Tank
 from fvsolve.units import show
 
@@ -52,8 +53,8 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
                 yield (group, name), f"is {article} {part.kind}; {HOLDERS[part.kind]}"
     if not scalars:
         return
-    if fluid is not None and fluid.law != "linear":
-        yield ("fluid", "law"), f'{show(fluid.law)} carries no scalars yet; wanted "linear"'
+    if fluid is not None and not LAWS[fluid.law].scalars:
+        yield ("fluid", "law"), f"{show(fluid.law)} carries no scalars yet; wanted {named(lambda law: law.scalars)}"
 
 
 def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:

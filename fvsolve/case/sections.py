@@ -59,7 +59,7 @@ class FluidSpec(Table):
     name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"')]
     temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = 293.15
     pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]")] = 101325.0
-    law: Annotated[str, Choice("density law", LAWS, "one for the case")] = "linear"
+    law: Annotated[str, Choice("density law", tuple(LAWS), "one for the case")] = "linear"
     density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES)] = None
     bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI)] = None
     viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]", VISCOSITIES)] = None

@@ -7,31 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
+from fvsolve.fluid.air import Air, check_cavities
 from fvsolve.fluid.cache import cached
 from fvsolve.fluid.coolprop import celsius
+from fvsolve.fluid.laws import LAWS
 from fvsolve.fluid.oils import OILS, ask_oil, oil_name
 from fvsolve.fluid.table import FluidTable
 
 __all__ = ["LAWS", "Fluid", "FluidTable", "properties"]
 
-LAWS = ("linear", "log", "table", "mixture")
-ATMOSPHERE = 101325.0  # where air_fraction counts [Pa]
 USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user")
-
-
-@dataclass(frozen=True)
-class Air:
-    """What is mixed into a liquid.
-
-    fraction : volume of free gas over that of the mixture, at 1 atm; exponent : polytropic, of the gas;
-    saturation_pressure : where all of it is dissolved, falling linearly with the gas pressure [Pa], infinite for none;
-    cavitation : whether vapour pressure adds to the gas pressure, so that no pressure is below it.
-    """
-
-    fraction: float
-    exponent: float = 1.0
-    saturation_pressure: float = math.inf
-    cavitation: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,21 +75,21 @@ def properties(
     state = dict(temperature=float(temperature), pressure=float(pressure))
     _check_numbers(given | state, law)
     name = oil_name(name) or name
-    _check_table(name, law, given)
+    LAWS[law].check(name, given)
     found = _found(name, law, **state)
     boiling = max(found["vapor_pressure"], given.get("vapor_pressure", 0.0))
     if state["pressure"] <= boiling:
         raise FluidError("pressure", _not_liquid(name, boiling, **state))
     mixed = dict(air_fraction=air_fraction, gas_exponent=gas_exponent)
     mixed |= dict(saturation_pressure=saturation_pressure, cavitation=cavitation)
-    air = _air(law, {key: value for key, value in mixed.items() if value is not None})
+    air = LAWS[law].air({key: value for key, value in mixed.items() if value is not None})
     if given and name != "user":
         found = found | {"source": f"{found['source']}; {', '.join(given)} given"}
     fluid = Fluid(name=name, law=law, air=air, **(found | state | given))
     for key in ("density", "bulk_modulus"):
         if getattr(fluid, key) is None:
             raise FluidError(key, _missing(name, key))
-    _check_cavities(fluid)
+    check_cavities(fluid)
     return fluid
 
 
@@ -123,50 +108,6 @@ def _check_numbers(numbers: dict[str, float], law: str) -> None:
     for key, value in numbers.items():
         if not math.isfinite(value) or value < 0.0 or (value == 0.0 and key != "vapor_pressure"):
             raise FluidError(key, f"{value:g} is not a positive, finite number")
-
-
-def _check_table(name: str, law: str, given: dict[str, float]) -> None:
-    """A table is CoolProp's own density: it needs a fluid that has one, and nothing that contradicts it."""
-    if law != "table":
-        return
-    if name == "user" or name in OILS or name.startswith("INCOMP::"):
-        text = f'"table" wants a compressible CoolProp fluid, "{name}" is none; use "linear" or "log"'
-        raise FluidError("law", text)
-    for key in ("density", "bulk_modulus"):
-        if key in given:
-            text = f'law = "table" takes it from CoolProp; leave {key} out, or use law = "log"'
-            raise FluidError(key, text)
-
-
-def _air(law: str, given: dict[str, float]) -> Air | None:
-    """What is mixed in, by the keys given; only a mixture has any."""
-    fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
-    if law != "mixture":
-        for key in given:
-            raise FluidError(key, f'law = "{law}" knows no gas; use law = "mixture"')
-        return None
-    if not 0.0 <= fraction < 1.0:
-        raise FluidError("air_fraction", f"{fraction:g} is no share of a volume; wanted at least 0 and below 1")
-    if cavitation and fraction == 0.0:
-        raise FluidError("cavitation", "cavities grow from free gas; give air_fraction, 1e-7 for a degassed liquid")
-    exponent, saturation = given.get("gas_exponent", 1.0), given.get("saturation_pressure", math.inf)
-    if not 1.0 <= exponent <= 2.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is not between 1, isothermal, and 2")
-    if cavitation and exponent != 1.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is not 1, and the gas in a cavity is isothermal")
-    if saturation <= ATMOSPHERE:
-        raise FluidError("saturation_pressure", f"{saturation:g} Pa is not above 1 atm, where air_fraction counts")
-    return Air(fraction, exponent, saturation, cavitation)
-
-
-def _check_cavities(fluid: Fluid) -> None:
-    """Cavities need a vapour that is liquid at 1 atm."""
-    if fluid.air is None or not fluid.air.cavitation:
-        return
-    if fluid.vapor_pressure == 0.0:
-        raise FluidError("cavitation", f'needs the vapour pressure of "{fluid.name}"; give vapor_pressure')
-    if fluid.vapor_pressure >= ATMOSPHERE:
-        raise FluidError("cavitation", f"{fluid.name} boils at 1 atm, where air_fraction counts; leave cavitation out")
 
 
 def _missing(name: str, key: str) -> str:

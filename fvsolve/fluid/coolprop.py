@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
+from fvsolve.fluid.laws import LAWS
 from fvsolve.fluid.oils import OILS
 from fvsolve.fluid.table import isentrope, known
 
@@ -37,7 +38,7 @@ def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[
         raise FluidError("pressure", f"{name} is two-phase there, or unknown (CoolProp: {error})") from None
     found |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
     found["viscosity"] = known(state.viscosity)
-    if law == "table":
+    if LAWS[law].tabulated:
         found["table"] = isentrope(state, name, vapor_pressure)
     return found
 

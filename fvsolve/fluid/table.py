@@ -49,6 +49,32 @@ class FluidTable:
     def __hash__(self) -> int:
         return hash((self.error, self.pressure.size))
 
+    def numbers(self, density: float, pressure: float) -> list[float]:
+        """Four columns for kernels: ln(rho / density), its slope, enthalpy from `pressure` on [J/kg], its slope."""
+        p, k = self.pressure, self.compressibility
+        step = (p[-1] - p[0]) / (len(p) - 1)
+        log_density = self.log_density - hermite_at(p, self.log_density, k, pressure)
+        nodes, weights = np.polynomial.legendre.leggauss(6)
+        h = np.zeros(len(p))
+        for x, w in zip(nodes, weights, strict=True):
+            at = p[:-1] + 0.5 * (1.0 + x) * step
+            h[1:] += 0.5 * w * step / (density * np.exp(hermite_at(p, log_density, k, at)))
+        h = np.cumsum(h)
+        slope = 1.0 / (density * np.exp(log_density))
+        h -= hermite_at(p, h, slope, pressure)
+        return [*log_density, *k, *h, *slope]
+
+
+def hermite_at(grid, values, slopes, at):
+    """Cubic Hermite interpolant of a uniform table at given places."""
+    step = grid[1] - grid[0]
+    k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
+                len(grid) - 2)  # fmt: skip
+    s = (at - grid[k]) / step
+    r = 1.0 - s
+    rise = values[k + 1] - values[k]
+    return values[k] + s * s * (3 - 2 * s) * rise + s * r * step * (r * slopes[k] - s * slopes[k + 1])
+
 
 def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     """The table through the present state of CoolProp's `state`; raises FluidError where it has no liquid.

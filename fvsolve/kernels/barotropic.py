@@ -9,9 +9,9 @@ from fvsolve.jit import njit
 from fvsolve.kernels.density import (
     density,
     enthalpy,
+    force_of_mass,
     local_speed,
     pressure_of_mass,
-    thrust,
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
@@ -32,7 +32,7 @@ from fvsolve.kernels.tanks import tank_level
 @njit
 def momentum_flux(st, floats, pipe, m, flow):
     """M^2 / m + integral of A dp [N]."""
-    return flow * flow / m + thrust(st, pipe, pressure_of_mass(st, floats, pipe, m))
+    return flow * flow / m + force_of_mass(st, floats, pipe, m)
 
 
 @njit

@@ -7,9 +7,9 @@ profile's; so a front moves at its own speed, be it sound's in the liquid or a c
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic import wall_force
-from fvsolve.kernels.density import local_speed, pressure_of_mass, thrust
+from fvsolve.kernels.density import force_of_mass, local_speed, pressure_of_mass
+from fvsolve.kernels.density.mixture import relative_volume
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mixture import mixture_volume
 from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import RATE, UPWIND
 from fvsolve.kernels.riemann import face_flux
@@ -122,7 +122,7 @@ def end_flux(st, floats, profile, pipe, i, r, l):
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
     m, total = profile[pipe["face"] + i] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
-    force = thrust(st, pipe, pressure_of_mass(st, floats, pipe, m))
+    force = force_of_mass(st, floats, pipe, m)
     return r - l, total * total / m + force - profile[pipe["flux"] + i]
 
 
@@ -162,7 +162,7 @@ def note_cavity(t, pipe, r, l, at, tables):
             m = profile[pipe["center"] + i] + (r[i] + l[i]) / pipe["speed"]
             p = pressure_of_mass(st, floats, pipe, max(m, DRY * st["rho"] * pipe["area"]))
             liquid = 1.0 - (p - st["reference"]) / st["beta"]
-            volume += pipe["area"] * pipe["dx"] * (1.0 - liquid / mixture_volume(st, p)[0])
+            volume += pipe["area"] * pipe["dx"] * (1.0 - liquid / relative_volume(st, p)[0])
     if first >= 0:
         if marks[at] != marks[at]:
             marks[at], marks[at + 1] = (first + 0.5) / r.size, 0.0

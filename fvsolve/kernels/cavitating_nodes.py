@@ -15,8 +15,8 @@ from fvsolve.kernels.barotropic_nodes import (
     step_clusters,
 )
 from fvsolve.kernels.density import pressure_of_mass
+from fvsolve.kernels.density.mixture import enthalpy, relative_volume
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mixture import mixture_enthalpy, mixture_volume
 from fvsolve.kernels.records import JUNCTION
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
 
@@ -31,15 +31,15 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     An end that runs into its node at more than half the speed of sound, or into a vessel at rest, has the node's
     pressure: its v^2 / 2 is lost.
     """
-    floor, target, side = st["floor"], mixture_enthalpy(st, p_node), side_at(st, pipe, p_node)
+    floor, target, side = st["floor"], enthalpy(st, floats, p_node), side_at(st, floats, pipe, p_node)
     change, rise = jump(st, floats, pipe, inside, side)
     v = v_in - change
     if (still and v >= 0.0) or 2.0 * v * side[1] > side[3]:
         return side, v, -rise
     slope, rho, low, high = 1.0, 1.0, floor, p_node
     for _ in range(60):
-        p, rho = side[0], st["rho"] / mixture_volume(st, side[0])[0]
-        slope, over = 1.0 - v * rise * rho, mixture_enthalpy(st, p) + 0.5 * v * v - target
+        p, rho = side[0], st["rho"] / relative_volume(st, side[0])[0]
+        slope, over = 1.0 - v * rise * rho, enthalpy(st, floats, p) + 0.5 * v * v - target
         if over > 0.0 and not (v > 0.0 and slope < 0.5):
             high = p
         else:
@@ -48,10 +48,10 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
         if abs(step) <= 1e-15 * abs(p) + 1e-12 * (p - floor):
             break
         p -= step
-        side = side_at(st, pipe, p if low < p < high else between(floor, low, high, side[0]))
+        side = side_at(st, floats, pipe, p if low < p < high else between(floor, low, high, side[0]))
         change, rise = jump(st, floats, pipe, inside, side)
         v = v_in - change
-    return side, v, -rise * rho * mixture_volume(st, p_node)[0] / (slope * st["rho"])
+    return side, v, -rise * rho * relative_volume(st, p_node)[0] / (slope * st["rho"])
 
 
 @njit
@@ -60,7 +60,7 @@ def end_of_state(st, floats, pipe, p_in, v_in, p_node, still):
 
     p_in, v_in : what the cells say of the end, velocity towards the node.
     """
-    inside = side_at(st, pipe, p_in)
+    inside = side_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
     if v >= 0.0:
         m, at, _ = beside(st, floats, pipe, inside, v_in, side, v)

@@ -107,7 +107,7 @@ def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
             h0, h = enthalpy(st, floats, p0) - base, enthalpy(st, floats, p) - base
             height = st["gravity"] * (z + pipe["slope"] * (i + 0.5 + PLACES[g]) * dx)
             kinetic += SHARES[g] * (0.5 * flow * flow / m - 0.5 * pipe["flow"] * pipe["flow"] / m0)
-            squeezed = (m * h - m0 * h0) - (thrust(st, pipe, p) - thrust(st, pipe, p0))
+            squeezed = (m * h - m0 * h0) - (thrust(st, floats, pipe, p) - thrust(st, floats, pipe, p0))
             elastic += SHARES[g] * (squeezed + height * (m - m0))
     rows[0], rows[1] = dx * kinetic, dx * elastic
 

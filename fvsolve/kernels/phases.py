@@ -147,15 +147,14 @@ ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
 class Cast:
     """What decides which functions a scene is made of.
 
-    law : of the fluid; cavities : whether it knows them; devices : modules of their laws, as rows of `hooks` lie
-    basins : codes of the kinds that there are
+    family : of kernels that the density law runs on, "linear", "barotropic" or "cavitating"; basins : codes of the
+    kinds that there are; devices : modules of their laws, as rows of `hooks` lie
     fifth : order of what carries scalars on grids; spread : whether any scalar does
     alone : whether there is nothing but basins, and no link; outlets : whether leaks, or demands that follow pressure
     """
 
-    law: str
+    family: str
     pipes: bool
-    cavities: bool = False
     clusters: bool = False
     columns: bool = False
     bodies: bool = False
@@ -171,8 +170,8 @@ class Cast:
 
     def members(self) -> Iterator[Pieces]:
         """Of what it consists, in the order in which pieces of one phase run."""
-        linear = self.law == "linear"
-        family = "linear" if linear else "cavitating" if self.cavities and self.pipes else "barotropic"
+        linear = self.family == "linear"
+        family = self.family if linear or self.pipes else "barotropic"
         yield from (ALONE,) if self.alone else (LUMPED,) if linear and not self.pipes else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
         if self.pipes:
@@ -217,7 +216,7 @@ class Cast:
             yield MEMBERS["patches"]
         if self.flowing and self.valves:
             yield MEMBERS["inflows"]
-        if self.flowing and self.law == "table":
+        if any(kind in (TABLE_GRID, TABLE_FACES) for kind in self.basins):
             yield MEMBERS["patches, table"]
 
     def scalar_members(self) -> Iterator[Pieces]:

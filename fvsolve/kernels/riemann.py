@@ -9,8 +9,7 @@ A side is (pressure p [Pa], mass per length m [kg/m], F [N], m c [kg/s], the int
 from math import exp, log, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.density import velocity_change
-from fvsolve.kernels.mixture import mixture_impedance, mixture_mass, wall_stretch
+from fvsolve.kernels.density.mixture import impedance, mass_of_pressure, velocity_change, wall_stretch
 
 NEAR = 1e-3  # of the gas pressure: smaller jumps are taken by the mean of 1 / (m c), lest differences cancel
 LEAST = 1e-10  # gas pressure that is a vacuum [Pa]
@@ -32,9 +31,9 @@ def plain_integral(st, compliance, x):
 
 
 @njit
-def side_at(st, pipe, p):
+def side_at(st, floats, pipe, p):
     """The side of a pipe at a pressure."""
-    m, dm = mixture_mass(st, pipe, p)
+    m, dm = mass_of_pressure(st, floats, pipe, p)
     over = p - st["reference"]
     force = pipe["area"] * over * (1.0 + 0.5 * pipe["compliance"] * over)
     area = pipe["area"] * wall_stretch(st, pipe["compliance"], p)
@@ -49,11 +48,11 @@ def is_plain(st):
 
 
 @njit
-def lead(st, pipe, p):
+def lead(st, floats, pipe, p):
     """The integrand of dp / (rho c) over that of `plain_integral` at a pressure: one, but for the wall's stretch."""
     x = p - st["floor"]
     plain = 1.0 / st["beta"] + pipe["compliance"] + st["gas"] / x * (pipe["compliance"] + 1.0 / x)
-    return sqrt(st["rho"] / plain) / mixture_impedance(st, pipe["compliance"], p)
+    return sqrt(st["rho"] / plain) / impedance(st, floats, pipe, p)
 
 
 @njit
@@ -61,7 +60,7 @@ def thinned(st, floats, pipe, low, high):
     """Integral of dp / (rho c) between two sides [m/s]."""
     if not is_plain(st):
         return velocity_change(st, floats, pipe, low[0], high[0])
-    return (high[4] - low[4]) * 0.5 * (lead(st, pipe, low[0]) + lead(st, pipe, high[0]))
+    return (high[4] - low[4]) * 0.5 * (lead(st, floats, pipe, low[0]) + lead(st, floats, pipe, high[0]))
 
 
 @njit
@@ -89,7 +88,7 @@ def star(st, floats, pipe, left, v_l, right, v_r):
     if p <= floor:
         p = floor + LEAST
     for _ in range(100):
-        middle = side_at(st, pipe, p)
+        middle = side_at(st, floats, pipe, p)
         take, rise_l = jump(st, floats, pipe, left, middle)
         give, rise_r = jump(st, floats, pipe, right, middle)
         gap, before = (v_l - take) - (v_r + give), p
@@ -123,7 +122,7 @@ def sonic(st, floats, pipe, side, v0, end):
     found, v = side, v0
     for _ in range(50):
         middle = 0.5 * (low + high)
-        found = side_at(st, pipe, floor + exp(middle))
+        found = side_at(st, floats, pipe, floor + exp(middle))
         v = v0 - jump(st, floats, pipe, side, found)[0]
         if v > found[3] / found[1]:
             low = middle
@@ -151,7 +150,7 @@ def beside(st, floats, pipe, side, v0, end, v):
 @njit
 def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
     """Flux of mass [kg/s] and of momentum M^2 / m + F [N] between two states, pressure [Pa] and velocity [m/s]."""
-    left, right = side_at(st, pipe, p_l), side_at(st, pipe, p_r)
+    left, right = side_at(st, floats, pipe, p_l), side_at(st, floats, pipe, p_r)
     middle, after, ahead = star(st, floats, pipe, left, v_l, right, v_r)
     m, v, force = middle[1], 0.5 * (after + ahead), middle[2]
     if after >= 0.0 and v >= 0.0:

@@ -123,7 +123,7 @@ def long_pipe(model, method: str, k: int, courant: float) -> list[Room]:
 
 def proved(model) -> bool:
     """Whether von Neumann's limit is one of its pipes, by proof: a linear scheme, and waves that no state changes."""
-    return not frozen(model.case.numerics.scheme)[1] and model.case.fluid.law == "linear"
+    return not frozen(model.case.numerics.scheme)[1] and model.case.law.linear
 
 
 def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
@@ -172,7 +172,7 @@ def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
             limit = plane_limit(scheme, method, share, basin.waving)
         else:
             limit = advection_limit(scheme, method).limit
-        fixed = basin.is_grid and basin.part.physics == "liquid" and model.case.fluid.law == "linear"
+        fixed = basin.is_grid and basin.part.physics == "liquid" and model.case.law.linear
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
         if grows >= GROWS:
             rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,

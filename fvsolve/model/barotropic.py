@@ -1,4 +1,4 @@
-"""The starting profile under the density laws log and table. Knows what the linear start lacks."""
+"""The starting profile under laws that are not linear. Knows what the linear start lacks."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from fvsolve.kernels import density as law
+from fvsolve.kernels import density as kernels
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.barotropic_nodes import drive, end_flow, head_pressure, target_under
+from fvsolve.kernels.barotropic_nodes import drive, end_flow, target_under
+from fvsolve.kernels.density.profile import profile_along
 from fvsolve.kernels.emitters import FREE
-from fvsolve.model.density import cavity_pressure
-from fvsolve.model.start import PRESSURE_SCALE, STORED, Start
+from fvsolve.model.start import PRESSURE_SCALE, Start
 
 
 class BarotropicStart(Start):
@@ -20,11 +20,11 @@ class BarotropicStart(Start):
     def __init__(self, draft) -> None:
         super().__init__(draft)
         self.st, self.floats = draft.tables.settings[0], draft.tables.floats
-        self.rho, self.g = draft.fluid.density, self.case.gravity
+        self.rho = draft.fluid.density
         self.jets = {name: self.jet(row, *2 * [self.rho * float(row["area"])]) for name, row in
                      zip(draft.pipe_names, self.pipes, strict=True)}  # fmt: skip
         self.end_flow = end_flow
-        if self.st["floor"] > 0.0:
+        if self.law.cavitates:
             from fvsolve.kernels.cavitating_nodes import end_flow_cavitating
 
             self.end_flow = end_flow_cavitating
@@ -55,23 +55,6 @@ class BarotropicStart(Start):
         ends = ((int(row["from_node"]), m_from), (int(row["to_node"]), m_to))
         back, ahead = (0.5 * self.rho / m**2 if self.still(i) else 0.0 for i, m in ends)
         return back, ahead
-
-    def potential_of(self, pressure: float, elevation: float) -> float:
-        return self.rho * (law.enthalpy(self.st, self.floats, float(pressure)) + self.g * elevation)
-
-    def pressure_of(self, potential: float, elevation: float) -> float:
-        return law.pressure_of_enthalpy(self.st, self.floats, float(potential / self.rho - self.g * elevation))
-
-    def given_pressure(self, row, node) -> float:
-        if row["kind"] == rec.PATCH:
-            return self.case.ambient_pressure if node.pressure is None else node.pressure
-        if row["kind"] == rec.TANK:
-            return head_pressure(self.st, self.floats, float(node.level))
-        value = self.given(row["schedule"])
-        return head_pressure(self.st, self.floats, value - row["elevation"]) if row["head_given"] else value
-
-    def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        return law.density(self.st, self.floats, max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def still(self, i: int) -> bool:
         return self.nodes["kind"][i] != rec.JUNCTION
@@ -113,33 +96,18 @@ class BarotropicStart(Start):
         ratio = drop / change if abs(change) > 1e-3 else rho / self.rho
         return rho / self.rho, ratio
 
-    def density_at(self, i: int) -> float:
-        return law.density(self.st, self.floats, float(self.pressure(i))) if hasattr(self, "answer") else self.rho
-
-    def pressure(self, i: int) -> float:
-        return self.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
-
     def march(self, row, mesh, flow: float):
         """(mass per length at faces, at centres, Bernoulli constant at the `to` end) of a pipe's profile."""
         i = int(row["from_node"])
         z = float(self.nodes["elevation"][i])
         start = self.answer.potential[i] / self.rho
         if flow < 0.0 and self.still(i):
-            m, _ = law.mass_of_pressure(self.st, self.floats, row, self.pressure(i))
+            m, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.pressure(i))
             start += 0.5 * (flow / m) ** 2
         faces, centers = np.zeros(mesh.cells + 1), np.zeros(mesh.cells)
-        b_to = law.profile_along(self.st, self.floats, row, float(start), z, flow, faces, centers)
+        b_to = profile_along(self.st, self.floats, row, float(start), z, flow, faces, centers)
         self.ends = faces[0], faces[-1]
         return faces, centers, b_to
-
-    def fill_nodes(self) -> None:
-        super().fill_nodes()
-        for i in range(len(self.nodes)):
-            if self.nodes["kind"][i] not in (rec.FIXED, rec.TANK, rec.PATCH):
-                self.nodes["pressure"][i] = self.pressure(i)
-        for row in self.nodes:
-            if row["kind"] in STORED:
-                row["mass"] = law.density(self.st, self.floats, float(row["pressure"])) * row["volume"]
 
     def match(self, row, mesh, flow: float):
         """The profile that ends at the pressure of its `to` node; what friction does not hold of it drives the flow."""
@@ -172,7 +140,7 @@ class BarotropicStart(Start):
                 near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
                 row[f"{name}_base"] = into if near else sign * flow
                 row[f"{name}_mass"] = mass if near else m0
-            boiling, _ = law.mass_of_pressure(self.st, self.floats, row, cavity_pressure(self.draft.fluid))
+            boiling, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.law.cavity_pressure)
             profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
             self.draft.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
             self.flux(row, faces, profile)
@@ -184,7 +152,7 @@ class BarotropicStart(Start):
             profile[row["flux"] + i] = momentum_flux(self.st, self.floats, row, float(m), float(row["flow"]))
 
     def pressure_of_mass(self, row, m: float) -> float:
-        return law.pressure_of_mass(self.st, self.floats, row, float(m))
+        return kernels.pressure_of_mass(self.st, self.floats, row, float(m))
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         row, mesh = self.pipes[k], self.draft.meshes[k]

@@ -12,8 +12,8 @@ from fvsolve.kernels import emitters, limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
+from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.density import add_law, cavity_pressure, coarse_for_cavities
 from fvsolve.model.device import Device, device_of, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.model import Model, PipeMesh
@@ -54,7 +54,7 @@ class Draft:
 
     def __init__(self, case) -> None:
         self.case, self.fluid = case, case.properties
-        self.law = Hydraulics(case)
+        self.hydraulics = Hydraulics(case)
         self.schedules = Schedules()
         self.floats: list[float] = []
         self.pieces_of_plane: list[np.ndarray] = []
@@ -138,7 +138,7 @@ class Draft:
     def node_reservoir(self, name, node, row) -> None:
         row["kind"] = rec.FIXED
         if node.head is not None:
-            row["schedule"] = self.law.add_head(self.schedules, node.head, row)
+            row["schedule"] = self.hydraulics.add_head(self.schedules, node.head, row)
         else:
             row["schedule"] = self.schedules.add(node.pressure)
 
@@ -154,7 +154,7 @@ class Draft:
         row["schedule"] = self.schedules.add(node.flow, -self.fluid.density)
 
     def node_tank(self, name, node, row) -> None:
-        rho = self.law.tank_density
+        rho = self.case.law.open_density
         row["kind"], row["level"], row["density"] = rec.TANK, node.level, rho
         if hasattr(node.area, "area"):
             level, area = node.area.level, node.area.area
@@ -237,8 +237,8 @@ class Draft:
         z = self.node_table["elevation"][[row["from_node"], row["to_node"]]]
         row["slope"] = (z[1] - z[0]) / link.length
         row["noise"] = (1e-9 * self.fluid.density * area * speed) ** 2
-        row["compliance"] = self.law.compliance(name, speed, self.fault)
-        self.law.friction(name, link, row, self.fault)
+        row["compliance"] = self.hydraulics.compliance(name, speed, self.fault)
+        self.hydraulics.friction(name, link, row, self.fault)
         if link.friction.model == "unsteady":
             reserve(self, row)
         names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
@@ -254,7 +254,7 @@ class Draft:
     def column(self, name, link, row) -> None:
         self.ends(link, row)
         row["area"], row["length"] = math.pi / 4.0 * link.diameter**2, link.length
-        self.law.friction(name, link, row, self.fault)
+        self.hydraulics.friction(name, link, row, self.fault)
         row["y"] = self.states([f"{name}.flow"], 0.1 * self.fluid.density * row["area"])
 
     def valve(self, name, link, row) -> None:
@@ -298,7 +298,7 @@ class Draft:
     def restriction(self, name, link, row) -> None:
         row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
         if link.laminar_reynolds is not None:
-            row["transition"] = self.law.transition_flow(name, link, link.laminar_reynolds, self.fault)
+            row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)
 
     # the profile and the rest -------------------------------------------------------------------------------
 
@@ -316,7 +316,7 @@ class Draft:
     def profile_size(self) -> int:
         """Place of every pipe's profile: a threshold a cell; under `log` and `table` masses and fluxes behind it."""
         at = self.cells
-        if self.case.fluid.law == "linear":
+        if self.case.law.linear:
             return 2 * at if self.case.scalars else at
         for row in self.pipe_table:
             n = row["cells"]
@@ -334,7 +334,7 @@ class Draft:
         s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
         s["vapor"] = self.fluid.vapor_pressure
         s["stop_below"] = case.numerics.below_vapor == "stop"
-        add_law(self.fluid, s, self.floats)
+        case.law.lower(self.fluid, s, self.floats)
         s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *self.column_rates()])
         self.probe_table = lower_probes(self)
         schedules, pieces = self.schedules.tables()
@@ -364,9 +364,9 @@ class Draft:
         layout["size"] = at
         parts = len(pipes) + 3 * len(self.node_table) + len(self.column_table)
         marks = parts + 2 * len(self.device_table) + len(self.piston_table)
-        if s["floor"] > 0.0:  # first place, greatest volume and its time of the cavities of each pipe
+        if case.law.cavitates:  # first place, greatest volume and its time of the cavities of each pipe
             marks += 3 * len(pipes)
-            s["vapor"] = cavity_pressure(self.fluid)
+            s["vapor"] = case.law.cavity_pressure
         self.tables = rec.Tables(
             settings, layout, pipes, self.node_table, self.valve_table, self.column_table, self.cluster_table,
             schedules, self.probe_table, self.body_table, self.brace_table, self.stop_table, self.piston_table,

@@ -115,13 +115,7 @@ def basin_facts(basin) -> dict[str, Any]:
 def start_speed(model, k: int) -> float:
     """Wave speed of pipe k [m/s]: that of liquid and wall, or under `mixture` its mean along the pipe at the start."""
     mesh = model.pipes[k]
-    if model.case.fluid.law != "mixture":
-        return mesh.wave_speed
-    from fvsolve.kernels.density import local_speed
-
-    st, floats, row = model.tables.settings[0], model.tables.floats, model.tables.pipes[k]
-    pressures = model.cell_pressure(k, np.zeros(mesh.cells))
-    return mesh.cells / sum(1.0 / local_speed(st, floats, row, float(p)) for p in pressures)
+    return model.case.law.wave_speed(model.tables.pipes[k], model.cell_pressure(k, np.zeros(mesh.cells)))
 
 
 def rhs_seconds(model) -> float:
@@ -157,7 +151,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
         own, rate = model.wave_rates, model.wave_rate
     if not rate > 0.0:
         return None, "nothing limits it"
-    if model.case.fluid.law != "linear" and len(own):
+    if not model.case.law.linear and len(own):
         own = own * (1.0 + LOCAL) + velocities(model) / model.tables.pipes["dx"]
     if len(own) and own.max() >= rate * (1 - 1e-12):
         name = model.pipes[int(np.argmax(own))].name

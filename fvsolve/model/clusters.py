@@ -31,7 +31,7 @@ def sort_nodes(draft) -> None:
     for root, ks in touched.items():
         soft = np.all(nodes["admittance"][members[root]] > 0.0)
         plain = np.all(valves["law"][ks] == rec.ROOT)
-        single = len(ks) == 1 and soft and plain and draft.case.fluid.law == "linear"
+        single = len(ks) == 1 and soft and plain and draft.case.law.linear
         nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
         valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
         if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(draft, members[root], ks):
@@ -45,7 +45,7 @@ def sort_nodes(draft) -> None:
         valves["solve"][k] = rec.CLUSTER
         clusters.append((len(integers), 0, len(integers), 1))
         integers.append(int(k))
-    if draft.case.fluid.law != "linear":
+    if not draft.case.law.linear:
         for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
             nodes["row"][i] = 0
             clusters.append((len(integers), 1, len(integers) + 1, 0))
@@ -124,7 +124,7 @@ def soften(draft, ks) -> None:
         if row["transition"] == 0.0 and row["law"] <= rec.TWO_WAY:
             link = draft.case.conduits[draft.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            row["transition"] = draft.law.transition_flow(draft.valve_names[k], link, 10.0, draft.fault)
+            row["transition"] = draft.hydraulics.transition_flow(draft.valve_names[k], link, 10.0, draft.fault)
             row["unseen"] = max(1.0 if neck else 0.0, unseen)
 
 

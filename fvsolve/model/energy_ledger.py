@@ -31,7 +31,7 @@ class Accounts:
     def __init__(self, slate: Slate) -> None:
         self.slate, self.model = slate, slate.model
         model, case = slate.model, slate.model.case
-        if model.basins and case.fluid.law != "linear":
+        if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []

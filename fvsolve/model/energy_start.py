@@ -54,7 +54,7 @@ def available(model: Model) -> dict[str, float]:
 def vessels_above(model: Model):
     """energy(node row) of a chamber at the start above that at P = 0 [J]."""
     st, floats = model.tables.settings[0], model.tables.floats
-    if st["law"] == rec.LAW_LINEAR:
+    if model.case.law.linear:
         return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
     from fvsolve.kernels.density import density, enthalpy, pressure_of_enthalpy
     from fvsolve.kernels.energy_barotropic import vessel_energy
@@ -80,7 +80,7 @@ def potential(model: Model, row) -> float:
 def pipe_above(model: Model, k: int) -> float:
     """Energy of pipe k at the start above that at P = 0 and rest [J]."""
     row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
-    if st["law"] == rec.LAW_LINEAR:
+    if model.case.law.linear:
         p, flow = potential(model, model.tables.nodes[row["from_node"]]), row["flow"] / row["area"]
         q = p - row["drag"] / row["area"] * pipe.length
         square = (p * p + p * q + q * q) / (3.0 * row["speed"] ** 2) + flow * flow
@@ -95,7 +95,7 @@ def pipe_above(model: Model, k: int) -> float:
         low = mass_of_pressure(st, floats, row, rest)[0]
         p = pressure_of_mass(st, floats, row, m)
         head, least = enthalpy(st, floats, p) - base + height, enthalpy(st, floats, rest) - base + height
-        squeezed = m * head - low * least - (thrust(st, row, p) - thrust(st, row, rest))
+        squeezed = m * head - low * least - (thrust(st, floats, row, p) - thrust(st, floats, row, rest))
         total += float(row["dx"]) * (squeezed + 0.5 * row["flow"] ** 2 / m)
     return float(total)
 
@@ -104,7 +104,7 @@ def memory_above(model: Model, k: int) -> float:
     """What unsteady friction of pipe k remembers of the flow of the start [J]."""
     row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
     share, full, square = float(memory_shares(model.tables.floats, row).sum()), st["rho"] * row["area"], 1.0
-    if st["law"] != rec.LAW_LINEAR:  # the velocity is remembered
+    if not model.case.law.linear:  # the velocity is remembered
         square = np.mean((full / model.tables.profile[row["center"] + np.arange(pipe.cells)]) ** 2)
     return float(0.5 * share * square * row["flow"] ** 2 * pipe.length / full)
 

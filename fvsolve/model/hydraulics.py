@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from fvsolve.kernels import records as rec
-from fvsolve.model.density import density_of
 
 HAZEN_WILLIAMS = 4.727 * 0.3048**-0.685  # h / L = 10.667 q^1.852 / (C^1.852 D^4.871), EPANET's 4.727 in feet, as SI
 MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3), SI
@@ -20,23 +17,9 @@ class Hydraulics:
         self.case, self.fluid = case, case.properties
         self.rho, self.gravity, self.ambient = self.fluid.density, case.gravity, case.ambient_pressure
 
-    @property
-    def tank_density(self) -> float:
-        """Density of what tanks hold [kg/m3]: the reference density, or under the other laws that at ambient."""
-        if self.fluid.law == "linear":
-            return self.rho
-        if self.fluid.air is not None:
-            return density_of(self.fluid, self.ambient)
-        change = self.ambient - self.fluid.pressure
-        if self.fluid.table is not None:
-            table = self.fluid.table
-            low, here = np.interp([self.fluid.pressure, self.ambient], table.pressure, table.log_density)
-            return self.rho * math.exp(here - low)
-        return self.rho * math.exp(change / self.fluid.bulk_modulus)
-
     def add_head(self, schedules, head, row) -> int:
-        """A schedule of head [m] as one of pressure [Pa] at an elevation [m]; under `log` and `table` it stays head."""
-        if self.fluid.law != "linear":
+        """A schedule of head [m] as one of pressure [Pa] at an elevation [m]; as it is under laws that bend it."""
+        if not self.case.law.linear:
             row["head_given"] = 1
             return schedules.add(head)
         elevation = row["elevation"]
@@ -79,10 +62,8 @@ class Hydraulics:
             row["reynolds"] = link.diameter / (area * self.fluid.viscosity)
 
     def compliance(self, name: str, speed: float, fault) -> float:
-        """Growth of a pipe's area with pressure, 1 / (rho a^2) - 1 / beta [1/Pa]; none may be negative."""
-        if self.fluid.law == "linear":
-            return 0.0
-        found = 1.0 / (self.rho * speed**2) - 1.0 / self.fluid.bulk_modulus
+        """Growth of a pipe's area with pressure [1/Pa], as its law has it; none may be negative."""
+        found = self.case.law.compliance(speed)
         if found < -1e-9 / self.fluid.bulk_modulus:
             fault(f"links.{name}.wave_speed", f"{speed:.6g} m/s is faster than sound in the fluid, "
                   f"{self.fluid.sound_speed:.6g} m/s; wanted at most that, or law = \"linear\"")  # fmt: skip

@@ -189,8 +189,7 @@ class Model(Shown):
         from fvsolve.kernels.phases import Cast
         from fvsolve.model.device import laws_of
 
-        devices = laws_of(self.devices)
-        law, many = self.case.fluid.law, rec.Tables(*(len(table) > 0 for table in self.tables))
+        devices, many = laws_of(self.devices), rec.Tables(*(len(table) > 0 for table in self.tables))
         there = [many.clusters, many.columns, many.bodies]
         basins = tuple(int(kind) for kind in np.unique(self.tables.basins["kind"]))
         spread, valves = bool(self.tables.scalars["diffusivity"].any()), many.valves
@@ -198,7 +197,7 @@ class Model(Shown):
         alone = bool(basins and patches) and not (self.cells or valves or devices or any(there))
         outlets = bool((self.tables.valves["law"] == rec.POWER).any())
         fifth = SCHEMES[self.case.numerics.scheme].on(True).order > 2
-        cast = Cast(law, self.cells > 0, self.cavitates, *there, self.unsteady, devices, basins, many.scalars, fifth,
+        cast = Cast(self.case.law.family, self.cells > 0, *there, self.unsteady, devices, basins, many.scalars, fifth,
                     spread, valves, alone, outlets)  # fmt: skip
         return functions(cast)
 
@@ -295,71 +294,34 @@ class Model(Shown):
         ):
             raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; wanted a number for each cell of one of "
                                f"{len(self.pipes)} pipes, counted from 0")  # fmt: skip
-        row = self.tables.pipes[k]
-        if self.case.fluid.law == "linear":
-            return self.profiles[k] + waves / row["admittance"]
-        from fvsolve.kernels.density import pressure_of_mass
-
-        st, floats = self.tables.settings[0], self.tables.floats
-        masses = self.tables.profile[row["center"] + np.arange(len(waves))] + waves / row["speed"]
-        return np.array([pressure_of_mass(st, floats, row, float(m)) for m in masses])
+        return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
         """Head [m] of the case's fluid above datum, measured from ambient."""
         pressure, elevation = given_numbers("pressure", pressure), given_numbers("elevation", elevation)
-        ambient, gravity = self.case.ambient_pressure, self.case.gravity
-        if self.case.fluid.law == "linear":
-            return (pressure - ambient) / (self.case.properties.density * gravity) + elevation
-        from fvsolve.kernels.density import enthalpy
-
-        st, floats = self.tables.settings[0], self.tables.floats
-        base = enthalpy(st, floats, float(ambient))
-        h = np.array([enthalpy(st, floats, float(p)) - base for p in np.ravel(pressure)])
-        return h.reshape(np.shape(pressure)) / gravity + elevation
+        return self.case.law.head(pressure, elevation)
 
     @property
     def cavitates(self) -> bool:
         """Whether the density law knows cavities: it has a floor."""
-        return bool(self.tables.settings[0]["floor"] > 0.0)
-
-    @property
-    def reference(self) -> float:
-        """Pressure at which density and areas are the stated ones [Pa]."""
-        return self.case.properties.pressure
-
-    def density(self, pressure: np.ndarray) -> np.ndarray:
-        """Density [kg/m3] at pressures, under all laws but linear."""
-        from fvsolve.kernels.density import density
-
-        st, floats = self.tables.settings[0], self.tables.floats
-        return np.array([density(st, floats, float(p)) for p in np.atleast_1d(given_numbers("pressure", pressure))])
-
-    def swollen(self, row, pressure: np.ndarray) -> np.ndarray:
-        """Area [m2] of a pipe at pressures, under all laws but linear."""
-        from fvsolve.kernels.density import wall_area
-
-        if not isinstance(row, np.void):
-            raise FvsolveError(f"row = {show(row)} is no pipe; wanted a row of the table of pipes")
-        pressures = np.atleast_1d(given_numbers("pressure", pressure))
-        return np.array([wall_area(self.tables.settings[0], row, float(p)) for p in pressures])
+        return self.case.law.cavitates
 
     def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it."""
         y = self.sized(y)
         if np.shape(out) != (int(self.layout["size"]),):
             raise FvsolveError(f"out has shape {np.shape(out)}; wanted what Model.evaluate gives beside the rates")
-        found, rho = {}, self.case.properties.density
-        linear = self.case.fluid.law == "linear"
+        found, law = {}, self.case.law
         for k, pipe in enumerate(self.pipes):
             row = self.tables.pipes[k]
             n, o = pipe.cells, row["y"]
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
-            swollen = row["area"] if linear else self.swollen(row, pressure)
-            flow = mass_flow / (rho if linear else self.density(pressure))
+            flow = mass_flow / law.density(pressure)
             found[pipe.name] = {
-                "pressure": pressure, "head": self.head(pressure, pipe.elevation), "velocity": flow / swollen,
-                "flow": flow, "least_pressure": pressure, "greatest_pressure": pressure, **pipe_values(self, k, y),
+                "pressure": pressure, "head": self.head(pressure, pipe.elevation),
+                "velocity": flow / law.area(row, pressure), "flow": flow,
+                "least_pressure": pressure, "greatest_pressure": pressure, **pipe_values(self, k, y),
             }  # fmt: skip
         nodes = self.tables.nodes
         at = int(self.layout["pressure"])
@@ -377,15 +339,11 @@ class Model(Shown):
     def contents(self, y: np.ndarray) -> tuple[float, float]:
         """Mass stored in the profile and by how much the state deviates from it [kg]."""
         y = self.sized(y)
-        fluid, initial, change = self.case.properties, 0.0, 0.0
+        initial, change = 0.0, 0.0
         for k, pipe in enumerate(self.pipes):
             row = self.tables.pipes[k]
             o, n = row["y"], pipe.cells
-            if fluid.law == "linear":
-                strain = (self.profiles[k] - fluid.pressure) / (fluid.density * row["speed"] ** 2)
-                initial += float(np.sum(fluid.density * row["area"] * row["dx"] * (1 + strain)))
-            else:
-                initial += float(np.sum(self.tables.profile[row["center"] + np.arange(n)])) * row["dx"]
+            initial += self.case.law.held_in_pipe(row, self.profiles[k], self.tables.profile)
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
         for row in self.tables.nodes:
             if row["y"] >= 0:

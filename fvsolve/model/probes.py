@@ -129,7 +129,7 @@ def probe_offsets(draft, start) -> None:
     for row, probe in zip(draft.probe_table, draft.case.probes, strict=True):
         if row["kind"] >= rec.CELL_STATE:  # their profile is known to basins
             continue
-        if draft.case.fluid.law == "linear":
+        if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)
         else:
             barotropic_offsets(draft, start, row, probe)

@@ -11,10 +11,10 @@ from fvsolve.model.unsteady import add_terms
 
 def start_profile(draft) -> dict[str, Any]:
     """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
-    if draft.case.fluid.law == "linear":
+    if draft.case.law.linear:
         start = Start(draft)
     else:
-        from fvsolve.model.barotropic import BarotropicStart  # scenes under law linear load none of it
+        from fvsolve.model.barotropic import BarotropicStart  # scenes under a linear law load none of it
 
         start = BarotropicStart(draft)
     start.solve()

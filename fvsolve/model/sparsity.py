@@ -38,7 +38,7 @@ class Couplings:
         self.nodes, self.pipes = tables.nodes, tables.pipes
         self.valves, self.columns = tables.valves, tables.columns
         settings = tables.settings[0]
-        self.linear = settings["law"] == rec.LAW_LINEAR
+        self.linear = model.case.law.linear
         self.upwind = settings["scheme"] == rec.UPWIND
         self.reach = reach_of(model.case.numerics.scheme, settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION

@@ -26,10 +26,10 @@ SNAP = 1e-12  # flows below this share of the scene's are zero
 
 
 class Start:
-    """The steady problem of one scene under the linear law and its answer."""
+    """The steady problem of one scene and its answer, at one density in all drops."""
 
     def __init__(self, draft) -> None:
-        self.draft, self.case = draft, draft.case
+        self.draft, self.case, self.law = draft, draft.case, draft.case.law
         self.nodes, self.pipes = draft.node_table, draft.pipe_table
         self.columns, self.valves, self.pistons = draft.column_table, draft.valve_table, draft.piston_table
         self.rest = self.case.numerics.initial == "rest"
@@ -51,17 +51,13 @@ class Start:
         self.shut: set[int] = set()  # valves that a device holds shut
         self.modes: dict[int, str] = {}  # as what those stand that regulate
 
-    def potential_of(self, pressure: float, elevation: float) -> float:
-        """Potential [Pa] of a pressure at an elevation."""
-        return pressure + self.weight * elevation
-
-    def pressure_of(self, potential: float, elevation: float) -> float:
-        """Pressure [Pa] of a potential at an elevation."""
-        return potential - self.weight * elevation
+    def pressure(self, i: int) -> float:
+        """Pressure [Pa] at node i, as it was just found."""
+        return self.law.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
 
     def density_at(self, i: int) -> float:
-        """Density [kg/m3] at node i."""
-        return self.draft.fluid.density
+        """Density [kg/m3] at node i; before anything is found that of reference."""
+        return self.law.density(self.pressure(i)) if hasattr(self, "answer") else self.law.rho
 
     def given(self, schedule: int) -> float:
         """What a schedule gives up to the start."""
@@ -72,10 +68,11 @@ class Start:
         if row["kind"] == rec.PATCH and node.pressure is not None:
             return node.pressure
         if row["kind"] == rec.PATCH:
-            return self.case.ambient_pressure + self.weight * (node.depth or 0.0)
+            return self.law.pressure_under(node.depth) if node.depth else self.case.ambient_pressure
         if row["kind"] == rec.TANK:
-            return self.case.ambient_pressure + self.weight * node.level
-        return self.given(row["schedule"])
+            return self.law.pressure_under(node.level)
+        value = self.given(row["schedule"])
+        return self.law.pressure_under(value - row["elevation"]) if row["head_given"] else value
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
@@ -144,13 +141,13 @@ class Start:
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH):
-                held[i] = self.potential_of(self.given_pressure(row, node), row["elevation"])
+                held[i] = self.law.potential_of(self.given_pressure(row, node), row["elevation"])
             elif getattr(node, "at_ambient", False):
-                held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
+                held[i] = self.law.potential_of(self.case.ambient_pressure, row["elevation"])
             elif row["kind"] in STORED and node.initial_pressure is not None:
-                held[i] = self.potential_of(node.initial_pressure, row["elevation"])
+                held[i] = self.law.potential_of(node.initial_pressure, row["elevation"])
             elif row["kind"] == rec.MOVING and not self.touched(i):
-                held[i] = self.potential_of(self.case.ambient_pressure, row["elevation"])
+                held[i] = self.law.potential_of(self.case.ambient_pressure, row["elevation"])
             elif row["kind"] == rec.JUNCTION:
                 demand[i] = self.given(row["schedule"])
         return held, np.zeros_like(demand) if self.rest else demand
@@ -250,7 +247,7 @@ class Start:
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
         """Mass flow from A to B past a piston, as kernels.mechanics.leak_flow has it [kg/s]."""
-        return self.draft.fluid.density * row["leakage"] * (p_a - p_b)
+        return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
         """What no steady state can meet, each by its name."""
@@ -322,15 +319,12 @@ class Start:
             row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
 
     def fill_nodes(self) -> None:
-        self.nodes["pressure"] = self.answer.potential - self.weight * self.nodes["elevation"]
-        for node, row in zip(self.case.places.values(), self.nodes, strict=True):
-            if row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH):
-                row["pressure"] = self.given_pressure(row, node)
+        for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
+            given = row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH)
+            row["pressure"] = self.given_pressure(row, node) if given else self.pressure(i)
+            if row["kind"] in STORED:
+                row["mass"] = self.law.held(row["pressure"], row["volume"])
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
-        fluid = self.draft.fluid
-        chambers = np.isin(self.nodes["kind"], STORED)
-        self.nodes["mass"][chambers] = fluid.density * self.nodes["volume"][chambers] * (
-            1.0 + (self.nodes["pressure"][chambers] - fluid.pressure) / fluid.bulk_modulus)  # fmt: skip
 
     def pipe_drop(self, row) -> float:
         law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))

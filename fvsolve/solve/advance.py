@@ -80,7 +80,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
     schedules, pieces, nodes = tables.schedules.copy(), tables.pieces, tables.nodes.copy()
     scalars = tables.scalars.copy()
     known = input_schedules(model)
-    linear = model.case.fluid.law == "linear"
+    linear = model.case.law.linear
     rows = []
     for name, value in inputs.items():
         if name not in known:
@@ -89,7 +89,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             raise FvsolveError(f"no input named {show(name)}{hint}")
         one = known[name]
         found = checked(name, value, one)
-        if one.node >= 0 and not linear:  # `log` and `table` read a head as it is
+        if one.node >= 0 and not linear:  # what is linear in it is made one of pressure, else it stays a head
             nodes["head_given"][one.node] = one.kind == "head"
         else:
             found = one.scale * found + one.offset

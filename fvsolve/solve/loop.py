@@ -192,7 +192,7 @@ def leap_allowed(model: Model, method: Method) -> bool:
     settings, numerics = model.tables.settings[0], model.case.numerics
     plain = np.isin(model.tables.pipes["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
     return bool(
-        settings["law"] == rec.LAW_LINEAR and settings["scheme"] == rec.UPWIND
+        model.case.law.linear and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
         and model.y_size == 2 * model.cells and plain and model.shapes.armed == 0
     )  # fmt: skip

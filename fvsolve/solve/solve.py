@@ -295,12 +295,9 @@ class Run:
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:
-        """Where, when and what to try; gas that expands far is more than the mixture law alone can follow."""
-        said, fluid = self.what_failed(code), self.model.case.fluid
+        """Where, when and what to try."""
         numbers = code in (slots.BAD_VALUE, slots.NEWTON_STUCK, slots.TINY_STEP)
-        if numbers and fluid.law == "mixture" and not self.model.cavitates:
-            said += "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation)"
-        return said
+        return self.what_failed(code) + (self.model.case.law.advice if numbers else "")
 
     def what_failed(self, code: int) -> str:
         """What, where and when, and what to try."""

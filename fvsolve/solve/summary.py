@@ -90,7 +90,6 @@ def find_marks(slate: Slate) -> list[Mark]:
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
-    keys = "" if model.case.fluid.law == "mixture" else 'law = "mixture", air_fraction = 1e-7 and '
     texts = {
         "stopped dead": (
             "its last way out shut while it flowed, or it met another; a rigid column has no surge, a pipe would"
@@ -102,7 +101,7 @@ def find_marks(slate: Slate) -> list[Mark]:
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would hold it",
         "below vapor pressure": (
             "pressure falls below vapour pressure; the liquid column would part, and "
-            f"{keys}cavitation = true in [fluid] would follow it"
+            f"{model.case.law.to_cavitate}cavitation = true in [fluid] would follow it"
         ),
         "dry": "no water is left where outflow is asked for; what flows is made up",
         "spilling": "the tank is full to its height and spills",

@@ -26,8 +26,8 @@ class Liquid(Basin, physics="liquid"):
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
         fluid = case.properties
-        self.linear, self.waves = case.fluid.law == "linear", None
-        if case.fluid.law == "table":
+        self.linear, self.waves = case.law.linear, None
+        if case.law.tabulated:
             from fvsolve.model.basins.waves import Waves
 
             self.waves = Waves(fluid, self.part.pressure, self.part.wave_speed)

@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from fvsolve.fluid.laws import Table
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane.waves import HEAD
-from fvsolve.model.density import add_density_table
 
 FINER, LEAST = 4, 512  # intervals of the kernels' tables for each of the fluid's, and at least for all of these
 PANELS = 8  # of the integral, for each of the fluid's
@@ -28,7 +28,7 @@ class Waves:
 
     def __init__(self, fluid, pressure: float, wave_speed: float | None = None) -> None:
         settings, floats = np.zeros(1, rec.SETTINGS), []
-        add_density_table(fluid, settings[0], floats)
+        Table.lower(fluid, settings[0], floats)
         n, start, step = (settings[0][key] for key in ("table_size", "table_start", "table_step"))
         knots, value, slope = start + step * np.arange(n), np.array(floats[:n]), np.array(floats[n : 2 * n])
         far, self.rest, self.many = knots[-1] - knots[0], pressure, 3 * int(n - 1)

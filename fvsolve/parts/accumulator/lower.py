@@ -35,7 +35,7 @@ class Accumulator(Device, kind="accumulator"):
     def begin(self, start, part, row) -> list[str]:
         draft, fluid = start.draft, start.draft.fluid
         node = draft.node_table[row["node"]]
-        p, dense = float(node["pressure"]), self.density(start)
+        p, dense = float(node["pressure"]), draft.case.law.density
         neck = NECK * part.volume if part.precharge is not None else 0.0
         first = part.precharge if part.precharge is not None else p
         gas = part.gas_volume or part.volume * min(1.0, (first / p) ** (1.0 / part.exponent))
@@ -44,7 +44,7 @@ class Accumulator(Device, kind="accumulator"):
         shed = (first if neck else p * (gas / part.volume) ** part.exponent) - p
         stiff = fluid.bulk_modulus / (fluid.density * neck) if neck else 0.0
         empty = dense(p + shed) * neck - mass
-        if fluid.law == "linear":
+        if draft.case.law.linear:
             empty = shed / stiff if neck and shed > 0.0 else -fluid.density * (part.volume - gas)
         floats = draft.tables.floats
         floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, room, stiff, empty, shed]
@@ -74,11 +74,3 @@ class Accumulator(Device, kind="accumulator"):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if head(middle) < 0.0 else (low, middle)
         return -float(law.accumulator_energy(st, floats, node, at, low))
-
-    def density(self, start):
-        """rho(p) [kg/m3] of the case's law."""
-        if start.draft.fluid.law == "linear":
-            return lambda p: start.draft.fluid.density
-        from fvsolve.kernels.density import density
-
-        return lambda p: density(start.st, start.floats, float(p))

@@ -22,7 +22,7 @@ class AirValve(Device, kind="air-valve"):
     remedy = "give it another volume"
 
     def place(self, draft, name, node, row) -> None:
-        row["density"] = draft.law.tank_density
+        row["density"] = draft.case.law.open_density
         row["y"] = draft.states([f"{name}.mass"], row["density"] * node.volume)
 
     def gate(self, name: str) -> str:

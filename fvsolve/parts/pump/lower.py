@@ -133,7 +133,7 @@ class Pump(Device, kind="pump"):
             near = 1e-6 * (abs(drop) + abs(self.lift(start, valve, 0.0))) + 1e-3
             if abs(drop - valve["drop"] * ratio) > near:
                 valve["open"] = 0.0
-            elif draft.case.fluid.law == "linear":
+            elif draft.case.law.linear:
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")

@@ -78,7 +78,7 @@ class Regulator(Device, kind=""):
         """The same, of a pressure as a potential [Pa]."""
         if not self.end:
             return self.given(start, k)
-        return start.potential_of(self.given(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
+        return start.law.potential_of(self.given(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
 
     def sensed(self, start, k: int) -> int:
         return int(start.valves[k][f"{self.end}_node"])

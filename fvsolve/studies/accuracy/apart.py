@@ -36,12 +36,11 @@ def end_probes(case) -> list[str]:
 
 def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
     """{pipe: (pressure [Pa], flow [m3/s])} of sums and differences of both waves, averaged over a model's cells."""
-    found, rho = {}, model.case.properties.density
+    found = {}
     for k, pipe in enumerate(model.pipes):
         total, mass_flow = waves[pipe.name]
         pressure = model.cell_pressure(k, total)
-        density = rho if model.case.fluid.law == "linear" else model.density(pressure)
-        found[pipe.name] = pressure, (model.tables.pipes[k]["flow"] + mass_flow) / density
+        found[pipe.name] = pressure, (model.tables.pipes[k]["flow"] + mass_flow) / model.case.law.density(pressure)
     return found
 
 

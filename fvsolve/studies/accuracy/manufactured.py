@@ -33,7 +33,7 @@ class Manufactured(Judge):
             raise FvsolveError('against = "exact" wants the function exact(pipe, x, t); wanted that, or "finer"')
         if not pipes(case):
             raise FvsolveError("initial, source and exact are functions along pipes, and this case has none")
-        if case.fluid.law != "linear":
+        if not case.law.linear:
             raise FvsolveError(f'initial, source and exact want the law "linear"; this case has "{case.fluid.law}"')
         t0 = case.numerics.start
         self.source, self.exact = source and Given("source", source), exact and Given("exact", exact)

@@ -221,7 +221,7 @@ def laws(case) -> list[str]:
         return [case.fluid.law]
     found = [case.fluid.law]
     for law in LAWS:
-        if law == "mixture":  # a case's own, or without gas the same as `log`
+        if LAWS[law].keys:  # a case's own: without them it is another
             continue
         try:
             load(case, {"fluid.law": law})

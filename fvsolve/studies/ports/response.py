@@ -144,10 +144,7 @@ def port_flows(case, port: str) -> dict[str, float]:
 
 def _density(found, row) -> float:
     """Mass per volume fed in at a storing node [kg/m3]."""
-    model = found.at.model
-    if model.case.fluid.law == "linear":
-        return float(model.case.properties.density)
-    return float(model.density(np.array([found.output_values[0]]))[0])
+    return float(found.at.model.case.law.density(found.output_values[0]))
 
 
 def _dense(a) -> np.ndarray:

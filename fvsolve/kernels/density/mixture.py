@@ -8,36 +8,10 @@ free gas as long as x < saturation (it dissolves by Henry's law; infinite for no
 A = A_ref (1 + compliance (p - p_ref)), so that with k = 1 pressure over mass is the root of a quadratic.
 """
 
-import os
 from math import exp, log, sqrt
 
-from fvsolve.jit import inner, njit
-
-if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
-    from numba.core import types
-    from numba.extending import intrinsic
-
-    @intrinsic
-    def outside(typingctx):
-        """Keep LLVM from copying the function around this call into its callers: halves what it adds to compiling."""
-
-        def generate(context, builder, kind, args):
-            builder.function.attributes.add("noinline")
-            return context.get_dummy_value()
-
-        return types.none(), generate
-else:
-
-    def outside():
-        """Nothing, without numba."""
-
-
-def part(function):
-    """`njit` for what the functions of `density.py` alone call: no door to Python.
-
-    Inlining is told, since numba takes it over from whichever caller compiles first, and `outside` forbids it.
-    """
-    return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+from fvsolve.jit import inner
+from fvsolve.kernels.density.apart import outside, part
 
 
 @part
@@ -51,7 +25,7 @@ def free_gas(st, x):
 
 
 @part
-def mixture_volume(st, p):
+def relative_volume(st, p):
     """(rho_ref / rho, its fall with pressure [1/Pa])."""
     outside()
     size, fall = free_gas(st, p - st["floor"])
@@ -67,8 +41,21 @@ def gas_work(st, x):
     return st["gas"] * at ** (1.0 - k) * (1.0 / (1.0 - k) - at / s / (2.0 - k))
 
 
+@inner
+def log_density(st, floats, p):
+    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
+    size, fall = relative_volume(st, p)
+    return -log(size), fall / size
+
+
+@inner
+def density(st, floats, p):
+    """rho [kg/m3] at a pressure."""
+    return st["rho"] / relative_volume(st, p)[0]
+
+
 @part
-def mixture_enthalpy(st, p):
+def enthalpy(st, floats, p):
     """h = integral of dp / rho from the reference pressure [J/kg]."""
     outside()
     dp, floor = p - st["reference"], st["floor"]
@@ -77,8 +64,8 @@ def mixture_enthalpy(st, p):
 
 
 @part
-def mixture_pressure_of_enthalpy(st, h):
-    """Pressure [Pa] at which `mixture_enthalpy` is h, by Newton on p, or on ln x where that would pass the floor."""
+def pressure_of_enthalpy(st, floats, h):
+    """Pressure [Pa] at which `enthalpy` is h, by Newton on p, or on ln x where that would pass the floor."""
     outside()
     floor, beta = st["floor"], st["beta"]
     lift = h * st["rho"]
@@ -87,7 +74,7 @@ def mixture_pressure_of_enthalpy(st, h):
         x += 2.0 * lift / (1.0 + sqrt(max(0.0, 1.0 - 2.0 * lift / beta)))
     for _ in range(100):
         p = x + floor
-        step = (mixture_enthalpy(st, p) - h) * st["rho"] / mixture_volume(st, p)[0]
+        step = (enthalpy(st, floats, p) - h) * st["rho"] / relative_volume(st, p)[0]
         x = x - step if step < 0.8 * x else x * exp(max(-step / x, -700.0))
         if abs(step) <= 1e-15 * abs(p) or abs(step) <= 1e-14 * x:
             break
@@ -105,7 +92,7 @@ def gas_root(st, compliance, share, slope, rest):
 
 
 @part
-def mixture_pressure(st, compliance, share):
+def pressure_of_share(st, compliance, share):
     """Pressure [Pa] of a pipe that holds `share` times rho_ref A_ref [-]; compliance 0 for a vessel.
 
     Where the gas is not isothermal, its tangent in 1 / x stands for it, until the root stays: the gas is concave there.
@@ -130,27 +117,58 @@ def mixture_pressure(st, compliance, share):
 
 
 @inner
+def pressure_of_log(st, floats, compliance, q):
+    """Pressure [Pa] at which ln(rho / rho_ref) and the wall's own, ln(A / A_ref), are q together."""
+    return pressure_of_share(st, compliance, exp(q))
+
+
+@inner
+def pressure_of_mass(st, floats, pipe, m):
+    """Pressure [Pa] of a pipe that holds m [kg/m]."""
+    return pressure_of_share(st, pipe["compliance"], m / (st["rho"] * pipe["area"]))
+
+
+@inner
 def wall_stretch(st, compliance, p):
     """A / A_ref of a pipe at a pressure."""
     return 1.0 + compliance * (p - st["reference"])
 
 
+@inner
+def wall_area(st, floats, pipe, p):
+    """Area of a pipe at a pressure [m2]."""
+    return pipe["area"] * wall_stretch(st, pipe["compliance"], p)
+
+
+@inner
+def thrust(st, floats, pipe, p):
+    """Integral of A dp from the reference pressure [N]."""
+    x = pipe["compliance"] * (p - st["reference"])
+    return pipe["area"] * (p - st["reference"]) * (1.0 + 0.5 * x)
+
+
 @part
-def mixture_mass(st, pipe, p):
+def mass_of_pressure(st, floats, pipe, p):
     """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
     outside()
-    size, fall = mixture_volume(st, p)
+    size, fall = relative_volume(st, p)
     stretch = wall_stretch(st, pipe["compliance"], p)
     m = st["rho"] * pipe["area"] * stretch / size
     return m, m * (fall / size + pipe["compliance"] / stretch)
 
 
+@inner
+def force_of_mass(st, floats, pipe, m):
+    """`thrust` at the pressure of a pipe that holds m [kg/m]: the momentum that its pressure carries [N]."""
+    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
+
+
 @part
-def mixture_impedance(st, compliance, p):
+def impedance(st, floats, pipe, p):
     """rho c = sqrt(rho / (d ln rho / dp + d ln A / dp)) of a pipe at a pressure [kg/m2/s]."""
     outside()
-    size, fall = mixture_volume(st, p)
-    return sqrt(st["rho"] / (fall + size * compliance / wall_stretch(st, compliance, p)))
+    size, fall = relative_volume(st, p)
+    return sqrt(st["rho"] / (fall + size * pipe["compliance"] / wall_stretch(st, pipe["compliance"], p)))
 
 
 # Places in (0, 1) and shares of Gauss' eight points, the upper four; the others lie opposite (Abramowitz, Stegun 25.4).
@@ -159,18 +177,18 @@ SHARES = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.10122853
 
 
 @part
-def velocity_panel(st, compliance, p_from, p_to):
+def velocity_panel(st, floats, pipe, p_from, p_to):
     """Integral of dp / (rho c) [m/s] between two pressures whose gas pressures differ by a factor of two at most."""
     middle, half, total = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from), 0.0
     for i in range(4):
         far = PLACES[i] * half
-        high, low = mixture_impedance(st, compliance, middle + far), mixture_impedance(st, compliance, middle - far)
+        high, low = impedance(st, floats, pipe, middle + far), impedance(st, floats, pipe, middle - far)
         total += SHARES[i] * (1.0 / high + 1.0 / low)
     return half * total
 
 
 @part
-def mixture_velocity_change(st, compliance, p_from, p_to):
+def velocity_change(st, floats, pipe, p_from, p_to):
     """Integral of dp / (rho c) [m/s], in panels that end where all gas is dissolved; one ratio of 2 a panel."""
     outside()
     low, high = min(p_from, p_to), max(p_from, p_to)
@@ -183,8 +201,14 @@ def mixture_velocity_change(st, compliance, p_from, p_to):
             end = min(end, floor + st["saturation"])
         else:
             end = high
-        total += velocity_panel(st, compliance, low, end)
+        total += velocity_panel(st, floats, pipe, low, end)
         low = end
         if low >= high:
             break
     return sign * total
+
+
+@inner
+def local_speed(st, floats, pipe, p):
+    """Wave speed c of a pipe at a pressure [m/s]."""
+    return impedance(st, floats, pipe, p) * relative_volume(st, p)[0] / st["rho"]

@@ -1,0 +1,49 @@
+"""The profile of a pipe that its drag holds. Knows one pipe; knows no node."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressure_of_enthalpy
+
+
+@njit
+def mass_of_head(st, floats, pipe, bernoulli, flow):
+    """Mass per length [kg/m] where h(p) + v^2 / 2 is `bernoulli` [J/kg], v = flow / m, below the speed of sound."""
+    p = pressure_of_enthalpy(st, floats, bernoulli)
+    m, dm = mass_of_pressure(st, floats, pipe, p)
+    for _ in range(50):
+        v = flow / m
+        step = (enthalpy(st, floats, p) + 0.5 * v * v - bernoulli) / (1.0 / density(st, floats, p) - v * v * dm / m)
+        p -= step
+        m, dm = mass_of_pressure(st, floats, pipe, p)
+        if abs(step) <= 1e-15 * abs(p):
+            break
+    return m
+
+
+@njit
+def profile_along(st, floats, pipe, start, z, flow, faces, centers):
+    """Profile of a pipe that its drag holds: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
+
+    start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Fills mass per length at faces and
+    centres [kg/m]; returns h + v^2/2 + g z at the other end.
+    """
+    pull = pipe["drag"] * st["rho"] * pipe["area"]
+    g, half, b = st["gravity"], 0.5 * pipe["dx"], start
+    m = mass_of_head(st, floats, pipe, b - g * z, flow)
+    faces[0] = m
+    for i in range(2 * centers.size):
+        x = i * half
+        k1 = -pull / (m * m)
+        middle = g * (z + pipe["slope"] * (x + 0.5 * half))
+        m = mass_of_head(st, floats, pipe, b + 0.5 * half * k1 - middle, flow)
+        k2 = -pull / (m * m)
+        m = mass_of_head(st, floats, pipe, b + 0.5 * half * k2 - middle, flow)
+        k3 = -pull / (m * m)
+        end = g * (z + pipe["slope"] * (x + half))
+        m = mass_of_head(st, floats, pipe, b + half * k3 - end, flow)
+        b += half * (k1 + 2.0 * k2 + 2.0 * k3 - pull / (m * m)) / 6.0
+        m = mass_of_head(st, floats, pipe, b - end, flow)
+        if i % 2 == 0:
+            centers[i // 2] = m
+        else:
+            faces[i // 2 + 1] = m
+    return b

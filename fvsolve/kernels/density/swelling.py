@@ -1,0 +1,62 @@
+"""What follows from ln(rho / rho_ref), and its slope, at a pressure: in a pipe whose wall swells by d ln(area) =
+compliance dp. Knows no law."""
+
+from math import exp, expm1, sqrt
+
+from fvsolve.jit import inner
+
+FAR = 0.7745966692414834  # sqrt(3/5)
+
+
+@inner
+def density(st, value):
+    """rho [kg/m3]."""
+    return st["rho"] * exp(value)
+
+
+@inner
+def filled(st, pipe, m):
+    """What a pipe that holds m [kg/m] holds over what it does at the reference."""
+    return m / (st["rho"] * pipe["area"])
+
+
+@inner
+def mass(st, pipe, p, value, slope):
+    """Mass per length m = rho A [kg/m] and dm/dp of a pipe."""
+    m = st["rho"] * pipe["area"] * exp(value + pipe["compliance"] * (p - st["reference"]))
+    return m, m * (slope + pipe["compliance"])
+
+
+@inner
+def area(st, pipe, p):
+    """Area of a pipe [m2]."""
+    return pipe["area"] * exp(pipe["compliance"] * (p - st["reference"]))
+
+
+@inner
+def thrust(st, pipe, p):
+    """Integral of A dp from the reference pressure [N]."""
+    x = pipe["compliance"] * (p - st["reference"])
+    if abs(x) < 1e-14:
+        return pipe["area"] * (p - st["reference"])
+    return pipe["area"] * expm1(x) / pipe["compliance"]
+
+
+@inner
+def impedance(st, pipe, value, slope):
+    """rho c = sqrt(K rho) [kg/m2/s]."""
+    return sqrt(st["rho"] * exp(value) / (slope + pipe["compliance"]))
+
+
+@inner
+def over_three(half, middle, low, high):
+    """Integral of 1 / (rho c) over pressures, `half` to either side, from rho c at the three Gauss points [m/s]."""
+    total = 8.0 / middle
+    total += 5.0 / low + 5.0 / high
+    return half * total / 9.0
+
+
+@inner
+def speed(st, pipe, value, slope):
+    """Wave speed sqrt(K / rho), 1/K = d ln rho / dp + compliance [m/s]."""
+    return sqrt(1.0 / ((slope + pipe["compliance"]) * st["rho"] * exp(value)))
