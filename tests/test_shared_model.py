@@ -37,8 +37,8 @@ def built(scene: str) -> Model:
 
 
 def bits(model: Model) -> str:
-    """All bytes of a model's arrays."""
-    arrays = (*model.tables, model.scale, model.start, *model.profiles.values())
+    """All bytes of a model's arrays, and of what implicit steps read of its Jacobian."""
+    arrays = (*model.tables, model.scale, model.start, *model.profiles.values(), model.structure.shape)
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
