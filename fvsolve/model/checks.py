@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from time import process_time
 from typing import Any
 
@@ -171,11 +172,10 @@ def quick_valve(model, rate: float) -> tuple[str, float]:
     valves, found, least = model.tables.valves, "", rate * (1 - QUICKER)
     start = model.case.numerics.start
     for k in np.flatnonzero((valves["solve"] == rec.ALONE) & (valves["device"] < 0))[:MOST_TRIED]:
-        size, valves["conductance"][k] = float(valves["conductance"][k]), 0.0
-        try:
-            without = float(model.evaluate(start, model.start, start)[1][rec.RATE])
-        finally:
-            valves["conductance"][k] = size
+        shut = valves.copy()
+        shut["conductance"][k] = 0.0
+        other = replace(model, tables=model.tables._replace(valves=shut))
+        without = float(other.evaluate(start, model.start, start)[1][rec.RATE])
         if without < least:
             found, least = model.valve_names[k], without
     return found, least
