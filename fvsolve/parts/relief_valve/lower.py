@@ -17,14 +17,14 @@ class ReliefDisc(Lifting, kind=""):
 
     def felt(self, start, k):
         i, part = int(start.valves[k]["from_node"]), self.part(start, k)
-        return start.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
+        return start.law.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
 
     def row(self, start, k: int):
         i, part = int(start.valves[k]["from_node"]), self.part(start, k)
         z = float(start.nodes["elevation"][i])
 
         def newton(flow, drop, potential):
-            x = (start.pressure_of(potential, z) - part.set_pressure) / part.overpressure
+            x = (start.law.pressure_of(potential, z) - part.set_pressure) / part.overpressure
             asked, slope, rise = self.flow_at(start, k, drop, x)
             rise /= part.overpressure
             size = max(slope + rise, 1e-12 * start.flow_scale)
