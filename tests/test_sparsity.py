@@ -135,7 +135,7 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     slate = Slate(model)
     f, out = slate.evaluate(t, y, np.inf)
     supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
-    given = (model.functions.rhs, slate.handle, structure.shape, at, t, y, f, supply, model.scale)
+    given = (model.functions.rhs, slate.handle, structure.shape, at, t, y, f, supply, model.scale.copy())
     calls = compiled_differences()(*given, np.zeros(n), np.zeros(n), model.new_out(), jacobian)
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)

@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from importlib.util import module_from_spec
 from pathlib import Path
 
+from fvsolve.doors import PATH, door
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
 from fvsolve.units import show
@@ -20,6 +21,7 @@ NAMED = "FVSOLVE_PARTS"  # variable that tells other processes of folders that a
 HOME = "fvsolve_parts"  # package in which folders that are named appear
 
 
+@door(folder=PATH)
 def register(folder: str | os.PathLike) -> None:
     """Make the part in a folder one like any other: `part.py`, with `lower.py` and `law.py` where it has a law.
 
