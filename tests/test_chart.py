@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,11 +33,11 @@ from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy import timing
 from fvsolve.studies.accuracy.chart import chart
-from fvsolve.studies.accuracy.distance import Distance, Track, averages, distance
 from fvsolve.studies.accuracy.files import figure, write_csv
 from fvsolve.studies.accuracy.front import curves
-from fvsolve.studies.accuracy.witnesses import Witness, judged, own_error
-from fvsolve.studies.outcome import outcome
+from fvsolve.studies.distance import Distance, averaged, distance
+from fvsolve.studies.outcome import Outcome, outcome, prepared
+from fvsolve.studies.truth import judge, of_halvings, of_run
 
 SUPPLY, HOLE, VOLUME, P0 = 5e6, 1e-6, 0.5, 1e6
 LENGTH, DIAMETER, SPEED, OPEN, PRESSURE = 300.0, 0.2, 1000.0, 4e-4, AMBIENT + 4e5
@@ -150,12 +151,17 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
     assert point.end == pytest.approx(worst, rel=0.02, abs=2 * closing.floor["end"])
 
 
+def told(rows, *probes) -> Outcome:
+    """A run that ended with these rows."""
+    return Outcome("finished", ok=True, rows=rows, probes=probes, model=prepared(pot()))
+
+
 def test_rows_before_and_after_a_jump_are_both_compared_and_weigh_nothing_twice():
     t = np.array([0.0, 1.0, 1.0, 2.0])
     exact = np.column_stack([t, [0.0, 0.0, 10.0, 10.0]])
     off = exact.copy()
     off[1, 1] += 1.0  # only before the jump
-    found = distance(Track(("p",), off, {}, {}), Track(("p",), exact, {}, {}))
+    found = distance(told(off, "p"), of_run(told(exact, "p")))
     assert found.trajectory == pytest.approx(0.5 * 0.1 / 2.0)
     assert found.greatest == pytest.approx(0.1)
     assert found.end == 0.0
@@ -165,7 +171,7 @@ def test_every_probe_is_measured_by_its_own_range_and_one_that_stands_still_by_n
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, 1e6 + 10.0 * t, 1e-3 * t, np.full(5, 7.0)])
     off = exact + np.array([0.0, 0.1, 2e-5, 3.0])
-    found = distance(Track(("a", "b", "c"), off, {}, {}), Track(("a", "b", "c"), exact, {}, {}))
+    found = distance(told(off, "a", "b", "c"), of_run(told(exact, "a", "b", "c")))
     assert found.worst == "b"
     assert found.trajectory == pytest.approx(0.02)
     assert found.overshoot == pytest.approx(0.02)
@@ -174,45 +180,48 @@ def test_every_probe_is_measured_by_its_own_range_and_one_that_stands_still_by_n
 def test_a_run_that_stopped_early_has_no_error():
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, t])
-    assert math.isnan(distance(Track(("a",), exact[:3], {}, {}), Track(("a",), exact, {}, {})).trajectory)
+    early = Outcome("stopped", rows=exact[:3], probes=("a",))
+    assert math.isnan(distance(early, of_run(told(exact, "a"))).trajectory)
 
 
 @pytest.mark.parametrize("fine, coarse", [(40, 10), (47, 10), (64, 48)])
 def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
-    """Cell averages of cos, exact on both grids; between edges a cubic reads their sums."""
+    """Cell averages of cos, exact on both grids; between edges a spline reads their sums."""
 
     def cells(n):
         edges = np.linspace(0.0, 1.0, n + 1)
         return np.diff(np.sin(2 * edges) / 2) * n
 
-    assert averages(cells(fine), coarse) == pytest.approx(cells(coarse), abs=1e-12 if fine == 40 else 1e-5)
+    assert averaged(cells(fine), coarse) == pytest.approx(cells(coarse), abs=1e-12 if fine == 40 else 1e-5)
 
 
 # floor ------------------------------------------------------------------------------------------------------------
 
 
-def _witness(name: str, shift: float, own: float) -> Witness:
+def opinion(name: str, shift: float, own: float):
     t = np.linspace(0.0, 1.0, 11)
-    return Witness(name, Track(("a",), np.column_stack([t, t + shift]), {}, {}), Distance(own, own, own))
+    found = of_run(told(np.column_stack([t, t + shift]), "a"), name)
+    return replace(found, doubt=Distance(own, own, own))
 
 
 def test_two_references_that_disagree_give_a_floor():
-    found = judged([_witness("rough", 0.01, 1e-4), _witness("fine", 0.0, 1e-6)])
-    assert (found.name, found.second) == ("fine", "rough")
-    assert found.floor.trajectory == pytest.approx(0.01)
+    found = judge([opinion("rough", 0.01, 1e-4), opinion("fine", 0.0, 1e-6)])
+    assert (found.words, found.second) == ("fine", "rough")
+    assert found.doubt.trajectory == pytest.approx(0.01)
 
 
 def test_references_that_agree_by_chance_have_the_floor_of_their_own_error():
-    found = judged([_witness("one", 1e-9, 3e-3), _witness("other", 0.0, 2e-3)])
-    assert found.floor.trajectory == pytest.approx(1.5 * 2e-3)
+    found = judge([opinion("one", 1e-9, 3e-3), opinion("other", 0.0, 2e-3)])
+    assert found.doubt.trajectory == pytest.approx(2e-3)
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 5.0])
 def test_halvings_tell_the_error_of_a_reference(order):
     t = np.linspace(0.0, 1.0, 11)
-    tracks = [Track(("a",), np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), {}, {}) for k in range(3)]
-    truth = Track(("a",), np.column_stack([t, t]), {}, {})
-    assert own_error(*tracks).trajectory == pytest.approx(distance(tracks[2], truth).trajectory, rel=0.05)
+    runs = [told(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a") for k in range(3)]
+    exact = of_run(told(np.column_stack([t, t]), "a"))
+    own = of_halvings("", runs).doubt.trajectory
+    assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)  # half as much again, to be sure
 
 
 def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():

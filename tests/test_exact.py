@@ -17,8 +17,8 @@ from fvsolve.errors import CaseError
 from fvsolve.exact.solution import averages
 from fvsolve.kernels.schedules import value_until
 from fvsolve.run import model_of
-from fvsolve.studies.accuracy.reference import start_of
 from fvsolve.studies.outcome import outcome
+from fvsolve.studies.truth import start_of
 
 
 def solved(case):

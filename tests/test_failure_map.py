@@ -124,6 +124,16 @@ def test_a_map_of_upwind_shows_the_exact_square_the_smeared_ones_and_the_limit()
     assert said["euler"] == ["wrong", "wrong", "stable", "blown up", "blown up"]
 
 
+def test_a_map_goes_by_the_exact_solution_of_a_case_and_without_it_knows_how_far_off_it_may_be():
+    case = closing()
+    case["links"]["valve"]["opening"] = step(0.1, 1.0, 0.0)  # whose front all finer runs blur alike
+    asked = {"schemes": ["upwind5"], "methods": ["rk4"], "courants": [0.5], "tolerance": 0.1}
+    found, exact = (failures(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
+    assert exact.reference.startswith('exact solution "rays", checked by ') and "exact" not in found.reference
+    apart = abs(found.squares[0].measures.error - exact.squares[0].measures.error)
+    assert 0.0 < apart <= found.doubt
+
+
 def test_a_linear_fifth_order_scheme_is_stable_to_its_limit_and_implicit_euler_is_coarse():
     methods = ["rk4", "implicit-euler", "radau-iia-5"]
     made = failures(load(closing()), ["upwind5"], methods, courants=[0.5, 1.0, 2.5])

@@ -13,9 +13,9 @@ from truth.order_json import call
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import order
-from fvsolve.studies.accuracy.apart import averaged, differences, end_probes, recorded
-from fvsolve.studies.accuracy.reference import reference
+from fvsolve.studies.distance import averaged, differences, end_probes, recorded
 from fvsolve.studies.outcome import outcome
+from fvsolve.studies.truth import truth
 
 
 @pytest.mark.parametrize("cells", [1, 3, 10, 20, 30, 60, 7, 13, 47])
@@ -43,12 +43,12 @@ def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
 def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case, scheme):
     case = load(case, {"numerics.scheme": scheme})
     keys = {"links.main.cells": 4 * case.links["main"].cells}
-    made = reference(case, keys, exact=False)
-    truth = reference(case, keys)
+    made = truth(case, recorded(case, keys), opinions=1, judged=True, exact=False)
+    exact = truth(case, recorded(case, keys), opinions=1)
     [cells] = [int(word) for word in made.words.split() if word.isdigit()]
     keys = {"numerics.scheme": "upwind5", "numerics.method": "dormand-prince", "links.main.cells": cells}
     run = outcome(case, recorded(case, {**keys, "numerics.step": 0.5 * 100.0 / 1000.0 / cells}))
-    true = differences(run, truth)
+    true = differences(run, exact)
     for variable in ("pressure", "flow"):
         for norm in ("L1", "L2"):
             assert 0.3 < made.own[variable][norm] / true[variable][norm] < 6.0, (variable, norm)

@@ -17,12 +17,9 @@ from fvsolve.studies.accuracy.fit import fit
 from fvsolve.studies.accuracy.judge import plausible
 from fvsolve.studies.accuracy.models import change_time
 from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings, work
-from fvsolve.studies.accuracy.reference import otherwise
 from fvsolve.studies.accuracy.rungs import Misfit, restated
 from fvsolve.studies.accuracy.timing import GIVEN_UP
-from fvsolve.studies.accuracy.witnesses import candidates
 from fvsolve.studies.failure import watched as watched_runs
-from fvsolve.studies.failure.converged import converged
 from fvsolve.studies.failure.eigen_limit import spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, verdict
 from fvsolve.studies.linear.linearise import linearise
@@ -31,6 +28,7 @@ from fvsolve.studies.points import Points
 from fvsolve.studies.stability import stability as room
 from fvsolve.studies.stability.carried import TooLarge
 from fvsolve.studies.stability.stability import stability
+from fvsolve.studies.truth import candidates, truth
 
 RHO_WATER = 998.2
 CASES = Path(__file__).parent.parent / "cases"
@@ -131,8 +129,8 @@ def test_errors_that_fall_quicker_than_scheme_and_method_can_make_them_are_said_
 
 
 def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
-    keys = otherwise(case("adelaide", links__main__cells=10), ("muscl",), "both", 4.0)
-    assert keys["numerics.scheme"] == "muscl" and keys["links.main.cells"] == 40
+    (_, trials), *_ = candidates(case("adelaide", links__main__cells=10), True, "both", False)
+    assert trials[-1]["numerics.scheme"] == "muscl" and trials[-1]["links.main.cells"] == 40
 
 
 # chart ----------------------------------------------------------------------------------------------------------
@@ -148,7 +146,7 @@ def test_a_chart_leaves_out_what_does_not_follow_cavities():
 
 def test_with_cavities_both_references_of_a_chart_can_be_run():
     few = case("adelaide", links__main__cells=8)
-    found = [outcome(few, keys[0]).ok for keys in candidates(few, 4, False).values()]
+    found = [outcome(few, keys[0]).ok for _, keys in candidates(few, False, "both", False)]
     assert found == [True, True]
 
 
@@ -206,8 +204,8 @@ def test_a_network_whose_plan_has_not_the_scale_of_its_heights_is_pressed_flat_t
 
 def test_a_map_of_cavities_has_a_reference_and_a_limit():
     few = case("adelaide", links__main__cells=8)
-    found = converged(few, {}, False)
-    assert found.words.startswith("muscl van-leer on 24 cells") and 0.0 < found.doubt < 1.0
+    found = truth(few)
+    assert found.words.startswith("muscl van-leer on 32 cells") and 0.0 < found.doubt.trajectory < 1.0
     assert np.array_equal(spectrum(few, {}), spectrum(few, {"numerics.scheme": "upwind"}))
 
 

@@ -17,10 +17,10 @@ import fvsolve
 from fvsolve import exact
 from fvsolve.errors import CaseError
 from fvsolve.model import unsteady
-from fvsolve.studies.accuracy.reference import start_of
 from fvsolve.studies.accuracy.rungs import column
 from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.ports.response import response
+from fvsolve.studies.truth import start_of
 
 CASES = Path(__file__).parent.parent / "cases"
 FOOT = 0.3048

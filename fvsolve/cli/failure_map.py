@@ -110,7 +110,7 @@ def _show(found, files: list[Path]) -> None:
         if word in seen:
             terminal.line(console, f"{word}: {VERDICTS[word]}")
     terminal.line(console, f"tolerance: {found.tolerance:g} of a probe's range, mean over the run, worst probe")
-    terminal.line(console, f"reference: {found.reference}; they differ by {found.doubt:.2g}")
+    terminal.line(console, f"reference: {found.reference}; off by up to {found.doubt:.2g}")
     terminal.line(console, "predicted limit: first step at which an eigenvalue grows by 1000 within the run (13)")
     if found.limited:
         terminal.line(

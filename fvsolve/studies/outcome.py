@@ -26,6 +26,7 @@ class Outcome:
     """How a run ended and what it holds, in SI; a refused one has only its reason.
 
     y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
+    envelope : pipe -> "least_pressure", "greatest_pressure" [Pa], ... of its cells over the run
     counts : steps, rejections, rhs, ...; seconds : stepping alone, nothing compiled [s]; processor : its CPU time [s]
     slate : what the run wrote, its envelope and flags
     """
@@ -37,6 +38,7 @@ class Outcome:
     y: np.ndarray = field(default_factory=lambda: np.zeros(0))
     rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))
     probes: tuple[str, ...] = ()
+    envelope: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     seconds: float = float("nan")
     processor: float = float("nan")
@@ -117,8 +119,8 @@ def _once(model, y, run) -> Outcome:
     rows = np.concatenate([np.empty((0, 1 + len(model.probes))), *sink.blocks])
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(
-        summary.reason, summary.finished, False, summary.t, made.loop.now.copy(), rows, names, summary.counts,
-        summary.seconds, made.processor, model, made.slate,
+        summary.reason, summary.finished, False, summary.t, made.loop.now.copy(), rows, names,
+        summary.envelope, summary.counts, summary.seconds, made.processor, model, made.slate,
     )  # fmt: skip
 
 

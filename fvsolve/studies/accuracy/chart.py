@@ -15,15 +15,15 @@ from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import from_files
-from fvsolve.studies.accuracy.distance import Distance, distance, track
 from fvsolve.studies.accuracy.front import Point, Row, cheapest, coarser, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
 from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, left_out, settings
-from fvsolve.studies.accuracy.setting import Setting, adaptive, longest
+from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
-from fvsolve.studies.accuracy.witnesses import Witnesses, witnesses
+from fvsolve.studies.distance import Distance, distance, moving
 from fvsolve.studies.outcome import Progress, names, prepared, refusal
 from fvsolve.studies.points import Points
+from fvsolve.studies.truth import Truth, truth
 
 WRONG = 1.0  # an error as great as all that the component does
 
@@ -174,15 +174,20 @@ class _Study:
         )  # fmt: skip
 
     @cached_property
-    def witnesses(self) -> Witnesses:
-        """The references, run only where some point is not known yet; what runs need is compiled before."""
+    def truth(self) -> Truth:
+        """What judges, found only where some point is not known yet; what runs need is compiled before."""
         for setting in {one.curve: one for one in reversed(self.all)}.values():
             self.progress(self.done, self.total, f"compiling {setting.name}")
             self.compiling += self.compile(setting)
         stiff = self.coarse is not None and self.coarse.stiff
-        return witnesses(
-            self.case, self.finest, stiff, lambda name: self.progress(self.done, self.total, f"reference {name}")
-        )
+        found = truth(
+            self.case, None if self.finest is None else cell_keys(self.case, self.finest), stiff=stiff,
+            tell=lambda name: self.progress(self.done, self.total, f"reference {name}"),
+        )  # fmt: skip
+        if not moving(found.run, found):
+            told = "every probe stands still, so an error has no range; probe what moves, or run longer"
+            raise FvsolveError(f"{self.case.name}: {told}")
+        return found
 
     def coarsely(self) -> dict:
         """The coarse run, kept, so that the same cells are found again."""
@@ -192,9 +197,9 @@ class _Study:
         """What the references are called and how far they disagree."""
 
         def make() -> dict:
-            found = self.witnesses
-            said = {"reference": found.name, "second": found.second, "told": found.told}
-            return said | asdict(found.floor)
+            found = self.truth
+            said = {"reference": found.words, "second": found.second, "told": found.told}
+            return said | asdict(found.doubt)
 
         found = self.points.get(self.case, {"study": "chart", "floor": self.finest}, make)
         self.done += 1
@@ -243,9 +248,8 @@ class _Study:
             model = prepared(self.case, setting.keys)
         except CaseError as error:
             return nothing(refusal(error))
-        judge = self.witnesses.judge
-        found = best(model)
-        errors = asdict(distance(track(found), judge) if found.ok else Distance())
+        judge, found = self.truth, best(model)
+        errors = asdict(distance(found, judge))
         ok, reason = found.ok, found.reason
         if ok and not errors["trajectory"] <= WRONG:
             ok, reason = False, f"wrong: off by {errors['trajectory']:.3g} times the range of {errors['worst']}"

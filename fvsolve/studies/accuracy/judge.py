@@ -10,19 +10,20 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.methods import METHODS
-from fvsolve.studies.accuracy.apart import NORMS, differences, recorded, size_of
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, order_varies, space_order, starts_with_jump
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.plane import unit_of
-from fvsolve.studies.accuracy.reference import ROUNDING, WORTH, Reference, of_run, reference
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.accuracy.rows import Order, Row
 from fvsolve.studies.accuracy.timing import lasting
+from fvsolve.studies.distance import NORMS, differences, recorded, size_of
 from fvsolve.studies.outcome import Outcome, Progress, outcome, prepared
 from fvsolve.studies.points import Points
+from fvsolve.studies.truth import ROUNDING, Truth, of_run, truth
 
 BEST_OF, BRIEF = 2, 1.0  # timings of a row; [s] that the first may take for there to be a second
 BEYOND = 1.5  # by which a fitted order may exceed that of scheme and method, as some do at a point
+WORTH = 10.0  # times the truth's own error that an error must be to mean anything
 UNSURE = "reference"  # the mark of rows that the reference cannot judge
 FINEST = "finest"  # the mark of a row that ran, with no finer one to judge it
 SURE_FACTOR = 0.25  # error that an extrapolated error may have
@@ -39,7 +40,6 @@ class Judge:
             raise FvsolveError('against = "exact": the case names no solution under [exact]; wanted "finer"')
         if against == "auto" and case.exact is None and basins(case):  # runs four times finer both ways are too dear
             self.against = "richardson"
-        self.truth: Reference | None = None
 
     @cached_property
     def breaks(self) -> list[tuple[float, bool]]:
@@ -88,16 +88,22 @@ class Judge:
     def about(self, progress: Progress, total: int) -> dict:
         """The reference in words and numbers."""
         progress(0, total, "reference")
-        truth = self.reference()
-        return {"kind": truth.kind, "words": truth.words, "own": truth.own, "sizes": self.sizes()}
+        found = self.truth
+        return {"kind": found.kind, "words": found.words, "own": found.own, "sizes": self.sizes()}
 
-    def reference(self) -> Reference:
-        """What rows are measured against, found when first asked for."""
-        if self.truth is None:
-            finest, avoid = self.plan.levels[-1].set, (self.case.numerics.scheme,)
-            way = "both" if self.against == "exact" else self.plan.way
-            self.truth = reference(self.case, finest, avoid, way, self.against != "finer")
-        return self.truth
+    @cached_property
+    def truth(self) -> Truth:
+        """What rows are measured against."""
+        way = "both" if self.against == "exact" else self.plan.way
+        return self.finer(way, self.against != "finer")
+
+    def finer(self, way: str, exact: bool, **others) -> Truth:
+        """The truth for the finest row by one kind of runs, made otherwise than it; in time by the same cells."""
+        method = METHODS.get(self.case.numerics.method)
+        return truth(
+            self.case, recorded(self.case, self.plan.levels[-1].set), opinions=1, judged=True, way=way,
+            stiff=method is None or not method.explicit, exact=exact, **others,
+        )  # fmt: skip
 
     def run(self, level: Level) -> Outcome:
         """The run of a row."""
@@ -108,13 +114,13 @@ class Judge:
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
-                return {name: size_of(run, name) for name in differences(run, self.reference(), self.own)}
+                return {name: size_of(run, name) for name in differences(run, self.truth, self.own)}
         raise FvsolveError(f"no row could be run: {run.reason}")
 
     def row(self, level: Level) -> Row:
         """A run with its errors."""
         run = self.run(level)
-        errors = differences(run, self.reference(), self.own) if run.ok else {}
+        errors = differences(run, self.truth, self.own) if run.ok else {}
         return measured(level, run, errors)
 
     def made(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:

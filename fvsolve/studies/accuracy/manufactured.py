@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import Slate
-from fvsolve.studies.accuracy.apart import recorded
 from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
-from fvsolve.studies.accuracy.reference import ExactFields, ExactRows, Reference, finer_reference
 from fvsolve.studies.accuracy.rows import Order
+from fvsolve.studies.distance import recorded
 from fvsolve.studies.outcome import Outcome, outcome, prepared
+from fvsolve.studies.truth import Truth, of_solution
 
 
 class Manufactured(Judge):
@@ -45,29 +46,21 @@ class Manufactured(Judge):
         """As of every case, but nothing is kept on disk: functions have no name to know them by."""
         return super().study(None, progress)
 
-    def reference(self) -> Reference:
+    @cached_property
+    def truth(self) -> Truth:
         """The exact function, or a finer run from the same start and with the same source."""
-        if self.truth is None:
-            grid = self.plan.way == "time" and self.against == "auto"  # whose own error would hide that of the step
-            known = self.exact is not None and self.against != "finer" and not grid
-            self.truth = self.of_function() if known else self.of_finer()
-        return self.truth
+        grid = self.plan.way == "time" and self.against == "auto"  # whose own error would hide that of the step
+        known = self.exact is not None and self.against != "finer" and not grid
+        return self.of_function() if known else self.finer(self.plan.way, False, run=self.outcome)
 
-    def of_function(self) -> Reference:
+    def of_function(self) -> Truth:
         """The exact function; nodes show what it says at the ends of their pipes."""
         laws = {}
         for name, pipe in pipes(self.case).items():
             for node, x in ((pipe.from_, 0.0), (pipe.to, pipe.length)):
                 laws[node] = lambda t, name=name, x=x: self.exact(name, np.full(np.shape(t), x), t)[0]
-        truth = Solution(self.case, pressure=laws, pipe=self.exact)
-        return Reference("function", "exact solution given as a function", ExactFields(truth), ExactRows(truth))
-
-    def of_finer(self) -> Reference:
-        """A finer run of another kind."""
-        from fvsolve.case import load
-
-        case = load(self.case, recorded(self.case, self.plan.levels[-1].set))
-        return finer_reference(case, (case.numerics.scheme,), self.plan.way, run=self.outcome)
+        known = Solution(self.case, pressure=laws, pipe=self.exact)
+        return of_solution(known, "function", "exact solution given as a function")
 
     def run(self, level) -> Outcome:
         """The run of a row."""

@@ -19,7 +19,9 @@ from fvsolve.kernels.schedules import value_until
 from fvsolve.model.checks import velocities
 from fvsolve.studies.accuracy.rungs import Misfit, finer, restated, structures
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
+from fvsolve.studies.distance import Gap, moving
 from fvsolve.studies.outcome import Outcome, outcome, without_basins
+from fvsolve.studies.truth import of_run
 
 TARGET = 1e-2
 BEST_OF, BRIEF = 3, 0.3  # timings of a rung; [s] that the first may take for there to be others
@@ -204,7 +206,7 @@ def refined(case, law: str, whole: Outcome, target: float, tell: Callable[[str],
         one = _run(case, name, law)
         if not one.ok:
             break
-        gaps.append(max((_rms(gap) for gap in differences(runs[-1][1], one).values()), default=0.0))
+        gaps.append(max((_rms(gap) for gap in moving(runs[-1][1], of_run(one)).values()), default=0.0))
         if len(gaps) > 1 and gaps[-2] > 0.0:
             ratio = min(max(gaps[-1] / gaps[-2], 0.1), 0.9)
         if gaps[-1] <= target * (1.0 - ratio):
@@ -251,40 +253,29 @@ def patient(model, state, sink, progress) -> Capped:
 def _rung(name: str, law: str, one: Outcome, richest: Outcome) -> Rung:
     if not one.ok:
         return Rung(name, law, one.reason)
-    gaps = differences(one, richest)
+    gaps = moving(one, of_run(richest))
     errors = {name: _rms(gap) for name, gap in gaps.items()}
-    worst, greatest = max(errors.values(), default=None), max((float(np.max(x)) for x in gaps.values()), default=None)
+    worst = max(errors.values(), default=None)
+    greatest = max((gap.ranges()["max"] for gap in gaps.values()), default=None)
     reason = "" if errors else "none of the probes is left in it"
     return Rung(name, law, reason, one.model.y_size, worst, greatest, errors, one.seconds, one.counts["rhs"])
 
 
-def differences(one: Outcome, richest: Outcome) -> dict[str, np.ndarray]:
-    """Probe -> sizes of the differences over the rows of both, over the range of the probe in the richest."""
-    found = {}
-    for k, name in enumerate(one.probes, 1):
-        if name not in richest.probes:
-            continue
-        truth = richest.rows[:, 1 + richest.probes.index(name)]
-        span = float(np.ptp(truth))
-        if span > 0.0:  # a probe that does not move there says nothing
-            found[name] = np.abs(one.rows[:, k] - truth) / span
-    return found
-
-
-def _rms(gap: np.ndarray) -> float:
-    return math.sqrt(float(np.mean(gap**2)))
+def _rms(gap: Gap) -> float:
+    return gap.ranges()["L2"]
 
 
 def apart(plain: Outcome, richest: Outcome) -> Apart | None:
     """How one law differs from another on the same structure; None where that is the same run, or one failed."""
     if plain is richest or not plain.ok:
         return None
-    gaps = differences(plain, richest)
+    gaps = moving(plain, of_run(richest))
     probe = max(gaps, key=lambda name: _rms(gaps[name]))
     truth = richest.rows[:, 1 + richest.probes.index(probe)]
     level = max((float(abs(change[0])) for change in pressures(richest)), default=0.0) / stiffness(richest)
     moves = float(np.ptp(truth) / np.max(np.abs(truth)))
-    return Apart(probe, _rms(gaps[probe]), float(gaps[probe][0]), moves, level, velocity_head(richest.model))
+    start = float(abs(gaps[probe].off[0]) / gaps[probe].span)
+    return Apart(probe, _rms(gaps[probe]), start, moves, level, velocity_head(richest.model))
 
 
 def velocity_head(model) -> float:

@@ -5,8 +5,6 @@ A variable is called "BASIN at the end: QUANTITY", its values are the deviations
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 
 from fvsolve.model.basins import units
@@ -34,27 +32,6 @@ def unit_of(case, variable: str) -> str | None:
     if not quantity or node is None or node.kind != "basin":
         return None
     return units.unit_of(node.physics, quantity)
-
-
-def end_errors(model, y: np.ndarray, truth: Mapping, norms: Callable) -> dict[str, dict[str, float]]:
-    """Variable -> norms of what cells of basins hold less what they should, weighted by area."""
-    found = {}
-    for basin in model.basins:
-        theirs = truth.get(("basin", basin.name))
-        if theirs is not None:
-            share = basin.mesh.area / basin.mesh.area.sum()
-            for (what, one), other in zip(contents(basin, y).items(), theirs, strict=True):
-                found[variable_of(basin, what)] = norms(one - other, share)
-    return found
-
-
-def size_at_end(run, variable: str) -> float | None:
-    """How large a variable of a run is, None where it is none of a basin."""
-    for basin in run.model.basins:
-        for what, one in contents(basin, run.y).items():
-            if variable == variable_of(basin, what):
-                return float(np.max(np.abs(one)))
-    return None
 
 
 def lowered(fine, values, coarse) -> np.ndarray:

@@ -13,12 +13,12 @@ from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, 
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
 from fvsolve.studies.failure.columns import Columns, columns, default_schemes
-from fvsolve.studies.failure.converged import Converged, converged
 from fvsolve.studies.failure.eigen_limit import greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
 from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
+from fvsolve.studies.truth import Truth, truth
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # mean error over the range of a probe
@@ -120,7 +120,8 @@ def failures(
             if progress:
                 progress(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
             squares.append(trials.square(scheme, method, k))
-        words = trials.reference(0).words
+        found = trials.reference(0)
+        words = f"{found.words}, checked by {found.second}"
     limited = tuple(name for name in schemes if name in LIMITED and across.wave_rate)
     return FailureMap(
         case.name, across.name, tuple(across.values), schemes, methods, tuple(squares), tolerance,
@@ -134,25 +135,25 @@ class Trials:
     def __init__(self, case, base: dict, across: Columns, tolerance: float, points: Points) -> None:
         self.case, self.base, self.across, self.tolerance, self.points = case, base, across, tolerance, points
         self.span = across.span
-        self._references: dict[int, Converged] = {}
+        self._references: dict[int, Truth] = {}
         self._spectra: dict[tuple, np.ndarray | None] = {}
         self._limits: dict[tuple, float | None] = {}
 
     @property
     def doubt(self) -> float:
         """The greatest of all references."""
-        return max(one.doubt for one in self._references.values())
+        return max(one.doubt.trajectory for one in self._references.values())
 
-    def reference(self, k: int) -> Converged:
+    def reference(self, k: int) -> Truth:
         """Of column k; one for all where only the step changes. FvsolveError where it is worth too little."""
         at = k if self.across.keys(k) else 0
         if at not in self._references:
-            found = converged(self.case, {**self.base, **self.across.keys(k)}, self.across.stiff(k))
-            if found.doubt > self.tolerance / 2:
+            found = truth(self.case, {**self.base, **self.across.keys(k)}, stiff=self.across.stiff(k))
+            doubt = found.doubt.trajectory
+            if doubt > self.tolerance / 2:
                 raise FvsolveError(
-                    f"the reference is no better than the runs it judges: its check is {found.doubt:.2g} of a probe's "
-                    f"range away, the tolerance is {self.tolerance:g}; give --tolerance {4 * found.doubt:.1g}, or "
-                    "more cells"
+                    f"the reference is no better than the runs it judges: it may be off by {doubt:.2g} of a probe's "
+                    f"range, the tolerance is {self.tolerance:g}; give --tolerance {4 * doubt:.1g}, or more cells"
                 )
             self._references[at] = found
         return self._references[at]
@@ -192,7 +193,7 @@ class Trials:
         reference = self.reference(k)
 
         def make() -> dict:
-            return asdict(measured(*watched(self.case, {**trial, "output.every": every}), reference.rows))
+            return asdict(measured(*watched(self.case, {**trial, "output.every": every}), reference))
 
         found = self.points.get(self.case, {"study": "map", "set": trial, "reference": reference.words}, make)
         return Measures(**{name: math.nan if value is None else value for name, value in found.items()})

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.studies.accuracy.timing import GIVEN_UP
+from fvsolve.studies.distance import Gap, ranges, times
 from fvsolve.studies.outcome import grown
 
 STABLE, RINGING, COARSE, WRONG, BLOWN, REFUSED, SKIPPED = (
@@ -29,7 +30,6 @@ SWING, FAINT = 0.02, 1e-3  # ranges: swings of a run that count, and those of th
 HASTE = 0.5
 MORE = 0.25  # of the reference's variation: what a probe may swing more
 HELPS = 0.75  # of the error is left at most where a shorter step helps
-STILL = 1e-9  # of its greatest value: a probe that moves less stands still
 
 
 @dataclass(frozen=True)
@@ -131,21 +131,20 @@ def _medians(rows: np.ndarray) -> np.ndarray:
 
 def ranges_of(reference: np.ndarray) -> np.ndarray:
     """Greatest less least value of each probe; inf for one that stands still : float64[probes]."""
-    found = np.ptp(reference, axis=0)
-    return np.where(found > STILL * np.abs(reference).max(axis=0), found, np.inf)
+    return np.nan_to_num(ranges(reference), nan=np.inf)
 
 
-def measured(outcome, bursts: Sequence[np.ndarray], reference: np.ndarray) -> Measures:
-    """A run against the reference's rows : float64[k, 1 + probes], read at the run's own times."""
+def measured(outcome, bursts: Sequence[np.ndarray], truth) -> Measures:
+    """A run against the truth's rows, read at the run's own times."""
     if not outcome.ok:
         return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
-    times, rows, span = outcome.rows[:, 0], outcome.rows[:, 1:], reference[:, 1:]
-    true = np.column_stack([np.interp(times, reference[:, 0], column) for column in span.T])
-    ranges, seen = ranges_of(span), np.concatenate([rows[-1:], *bursts])
+    t, rows, known = outcome.rows[:, 0], outcome.rows[:, 1:], truth.rows(truth.run)
+    true = np.column_stack([np.interp(t, truth.run.rows[:, 0], column) for column in known.T])
+    wide, seen = ranges_of(known), np.concatenate([rows[-1:], *bursts])
     with np.errstate(over="ignore", invalid="ignore"):
-        error = np.abs(rows - true).mean(axis=0) / ranges
-        outside = np.maximum(seen - span.max(axis=0), span.min(axis=0) - seen) / ranges
+        error = [Gap(off, times(t), width).ranges()["L1"] for off, width in zip((rows - true).T, wide, strict=True)]
+        outside = np.maximum(seen - known.max(axis=0), known.min(axis=0) - seen) / wide
         return Measures(
-            outcome.reason, True, False, float(error.max()), max(0.0, float(outside.max())), ringing(bursts, ranges),
-            excess(rows, true, ranges), outcome.counts["steps"], outcome.seconds,
+            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())), ringing(bursts, wide),
+            excess(rows, true, wide), outcome.counts["steps"], outcome.seconds,
         )  # fmt: skip
