@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated
 
@@ -13,6 +13,7 @@ import typer
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.sheet import Column, Sheet
 
 Asked = Annotated[str | None, typer.Argument(metavar="[CASE]", help="a case; without one, schemes and methods alone")]
 Port = Annotated[str | None, typer.Option(metavar="NODE", help="ask whether the network is passive at this port")]
@@ -21,6 +22,23 @@ Methods = Annotated[str | None, typer.Option(metavar="M,M,...", help="methods, l
 LINES = 12  # of one kind on the terminal; the rest is in energy.csv
 AGAIN = "the same command starts anew"
 FILES = ("energy.csv", "energy.png", "energy.svg")
+
+
+def _limit(key: str) -> Callable[[Mapping], str]:
+    """What says the greatest step of a row: any, none or a number."""
+    return lambda row: "any" if math.isinf(row[key]) else "none" if row[key] == 0.0 else f"{row[key]:.6g}"
+
+
+SCHEME = (
+    Column("scheme"), Column("passive", "never grows"), Column("rate", "rate [per cell time]", ".4g"),
+    Column("gain", "greatest gain", ".4g"),
+)  # fmt: skip
+METHOD = (
+    Column("method"), Column("any_network", "any network"),
+    Column("chamber", "driven chamber",
+           lambda row: "-" if row["chamber"] is None else "keeps" if row["chamber"] >= 0.0 else "creates"),
+    Column("leak", "leak: h/tau", _limit("leak")), Column("resonator", "resonator: h w", _limit("resonator")),
+)  # fmt: skip
 
 
 @app.command()
@@ -123,20 +141,19 @@ def _amount(value: float, one) -> list[str]:
 def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     """A case by several schemes and methods: what each makes of its energy."""
     from fvsolve.cli.progress import stoppable
-    from fvsolve.cli.terminal import console, line, table
-    from fvsolve.studies.energy.pairs import PAIR, measured, write_pairs
+    from fvsolve.cli.terminal import console, line, sheet
+    from fvsolve.studies.energy.pairs import PAIR, measured
     from fvsolve.studies.points import Points
 
     folder = folder_of(case, "energy", out)
     with told() as progress, stoppable() as watch, Points(folder) as points:
         rows = measured(case, schemes, methods, port, progress, points, watch)
-    write_pairs(rows, folder / "pairs.csv")
+    Sheet(PAIR, rows).write(folder / "pairs.csv")
     if as_json:
         print_json({"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]})
         sys.exit(2 if all(row["creates"] is None for row in rows) else 0)
     where = console()
-    shown = [key for key in PAIR if key not in ("relative", "margin")] if port is None else list(PAIR)
-    table([PAIR[key] for key in shown], [[_said(row[key]).partition(":")[0] for key in shown] for row in rows], where)
+    sheet(Sheet([one for one in PAIR if port or one.key not in ("relative", "margin")], rows), where)
     refused = _outcome(case, rows, where)
     line(where, f"{folder}: pairs.csv, points.jsonl")
     if len(refused) == len(rows):
@@ -184,7 +201,7 @@ def _pair(row) -> str:
 
 def claims(schemes, methods, as_json: bool) -> None:
     """What schemes and methods promise by their coefficients."""
-    from fvsolve.cli.terminal import console, line, table
+    from fvsolve.cli.terminal import console, line, sheet
     from fvsolve.studies.energy.passivity import CELLS, passivity
 
     with told() as progress, leaving(f"interrupted: nothing is kept; {AGAIN}"):
@@ -194,9 +211,8 @@ def claims(schemes, methods, as_json: bool) -> None:
         return
     where = console()
     known = [one for one in found.schemes if one.passive is not None]
-    rows = [[one.scheme, "yes" if one.passive else "no", _said(one.rate), _said(one.gain)] for one in known]
     line(where, f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold")
-    table(["scheme", "never grows", "rate [per cell time]", "greatest gain"], rows, where)
+    sheet(Sheet(SCHEME, [vars(one) for one in known]), where)
     for one in found.schemes:
         if one.passive is None:
             line(where, f"{one.scheme} is limited and has no matrix: try it on a case")
@@ -204,34 +220,11 @@ def claims(schemes, methods, as_json: bool) -> None:
     line(where, "Methods: any network at any step; limits on a leaking chamber, a resonator, and a closed pipe", "bold")
     good = [one.scheme for one in known if one.passive]
     limit = {(one.scheme, one.method): one.courant for one in found.pairs}
-    rows = [
-        [one.method, _word(one.any_network), _keeps(one.chamber), _limit(one.leak), _limit(one.resonator),
-         *[_limit(limit[name, one.method]) for name in good]]
-        for one in found.methods
-    ]  # fmt: skip
-    table(["method", "any network", "driven chamber", "leak: h/tau", "resonator: h w", *[f"{x}: C" for x in good]],
-          rows, where)  # fmt: skip
+    rows = [vars(one) | {name: limit[name, one.method] for name in good} for one in found.methods]
+    sheet(Sheet([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), where)
     bad = [one.scheme for one in known if not one.passive]
     if bad:
         line(where, f"{', '.join(bad)}: create energy at pipe ends with every method, up to the gain above")
     never = [f"{one.scheme} with {one.method}" for one in found.pairs if one.courant == 0.0 and one.scheme in good]
     if never:
         line(where, f"create energy at every step: {', '.join(never)}")
-
-
-def _said(value) -> str:
-    if value is None:
-        return "-"
-    return value if isinstance(value, str) else _word(value) if isinstance(value, bool) else f"{value:.4g}"
-
-
-def _word(value: bool | None) -> str:
-    return "-" if value is None else "yes" if value else "no"
-
-
-def _keeps(least: float | None) -> str:
-    return "-" if least is None else "keeps" if least >= 0.0 else "creates"
-
-
-def _limit(value: float) -> str:
-    return "any" if math.isinf(value) else "none" if value == 0.0 else f"{value:.6g}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json, value_of
 from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.units import parse
 
 
@@ -73,11 +73,8 @@ def _key(text: str | None) -> tuple[str, list] | None:
 def _written(found, folder: Path) -> list[Path]:
     from fvsolve.draw.failure_map import failure_map_figure
 
-    table, rows = folder / "map.csv", found.plain()["squares"]
-    with open(table, "w", newline="", encoding="utf-8") as file:
-        sheet = csv.writer(file)
-        sheet.writerow(["value", *rows[0]])
-        sheet.writerows([found.values[row["column"]], *row.values()] for row in rows)
+    rows = [{"value": found.values[row["column"]]} | row for row in found.plain()["squares"]]
+    table = Sheet([Column(key) for key in rows[0]], rows).write(folder / "map.csv")
     figure = failure_map_figure(found, f"{found.case}: where methods fail")
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
     for picture in pictures:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import Out, folder_of, listed
+from fvsolve.studies.sheet import Sheet, write
 
 SHOWN = 24  # poles on the terminal; the others are in the file
 
@@ -45,7 +45,7 @@ def linearise(
     """A case as A, B, C, D about a state, with its poles."""
     from fvsolve.model.energy import energy_form
     from fvsolve.studies.linear.linearise import linearise as ask
-    from fvsolve.studies.linear.spectrum import poles_of, write_poles
+    from fvsolve.studies.linear.spectrum import POLES, poles_of
 
     found = ask(
         load_case(case, set),
@@ -58,7 +58,7 @@ def linearise(
     values = poles_of(found.a, energy_form(found.at.model, found.at.y))
     poles = values.poles()
     folder = folder_of(found.at.model.case, "linearise", out)
-    write_poles(folder / "poles.csv", poles)
+    Sheet(POLES, poles).write(folder / "poles.csv")
     write_matrices(folder, found)
     said = found.plain() | {"poles": poles, "poles_are": values.said, "directory": str(folder)}
     if as_json:
@@ -84,12 +84,12 @@ def write_matrices(folder: Path, found) -> None:
     if found.sparse:
         entries = a.tocoo()
         rows = zip((rates[i] for i in entries.row), (names[j] for j in entries.col), entries.data.tolist(), strict=True)
-        write_rows(folder / "A-sparse.csv", ["rate", "state", "value"], rows)
+        write(folder / "A-sparse.csv", ["rate", "state", "value"], rows)
     else:
-        write_rows(folder / "A.csv", ["", *names], labelled(rates, a))
-    write_rows(folder / "B.csv", ["", *found.inputs], labelled(rates, found.b))
-    write_rows(folder / "C.csv", ["", *names], labelled(found.outputs, found.c))
-    write_rows(folder / "D.csv", ["", *found.inputs], labelled(found.outputs, found.d))
+        write(folder / "A.csv", ["", *names], labelled(rates, a))
+    write(folder / "B.csv", ["", *found.inputs], labelled(rates, found.b))
+    write(folder / "C.csv", ["", *names], labelled(found.outputs, found.c))
+    write(folder / "D.csv", ["", *found.inputs], labelled(found.outputs, found.d))
 
 
 def labelled(names, matrix):
@@ -97,17 +97,10 @@ def labelled(names, matrix):
     return ([name, *row] for name, row in zip(names, matrix.tolist(), strict=True))
 
 
-def write_rows(path: Path, header: list[str], rows) -> None:
-    """A CSV."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        made = csv.writer(file)
-        made.writerow(header)
-        made.writerows(rows)
-
-
 def show(found, values, poles: list[dict], folder: Path) -> None:
     """What a person reads: where, how well, and the slowest poles."""
     from fvsolve.cli import terminal
+    from fvsolve.studies.linear.spectrum import POLES
 
     where = terminal.console()
     moving = np.abs(found.at.rate) / found.at.model.scale
@@ -118,14 +111,7 @@ def show(found, values, poles: list[dict], folder: Path) -> None:
                              "stand still at that time")  # fmt: skip
     worst = max(found.error.values())
     terminal.line(where, f"  two steps of the differences agree to {worst:.1e} of each row")
-    rows = [
-        [f"{p['real']:.6g}", f"±{p['imaginary']:.6g}" if p["pair"] else "-", f"{p['frequency']:.6g}",
-         "-" if p["damping"] is None else f"{p['damping']:.4f}",
-         "-" if p["time_constant"] is None else f"{p['time_constant']:.4g}"]
-        for p in poles[:SHOWN]
-    ]  # fmt: skip
-    headers = ["real [1/s]", "imaginary [1/s]", "frequency [Hz]", "damping", "time constant [s]"]
-    terminal.table(headers, rows, where)
+    terminal.sheet(Sheet([one for one in POLES if one.key != "pair"], poles[:SHOWN]), where)
     more = len(poles) - SHOWN
     terminal.line(where, f"poles: {values.said}" + (f"; {more} more, quicker ones, in poles.csv" if more > 0 else ""))
     terminal.line(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -12,11 +11,20 @@ import typer
 from fvsolve.cli import terminal
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.output.summary import plain
 from fvsolve.studies.accuracy.picture import NORMS, SHOWN, title, unit
+from fvsolve.studies.sheet import Column, Sheet, columns
 
-COLUMNS = (
-    "scheme", "method", "reference", "variable", "unit", "norm", "cells", "size", "step [s]", "error", "order", "mark",
-    "fitted order", "spread", "steps", "rhs", "cell updates", "seconds",
+FILE = columns(
+    scheme="scheme", method="method", reference="reference", variable="variable", unit="unit", norm="norm",
+    cells="cells", size="size", step="step [s]", error="error", pairwise="order", mark="mark", order="fitted order",
+    spread="spread", steps="steps", rhs="rhs", updates="cell updates", seconds="seconds",
+)  # fmt: skip
+
+TABLE = (
+    Column("cells"), Column("step", "step [s]", ".4g"),
+    *(one for norm in NORMS for one in (Column(norm, words=".4g"), Column(f"order {norm}", "order", ".2f"))),
+    Column("rhs"), Column("seconds", words=".4g"), Column("mark"),
 )  # fmt: skip
 
 
@@ -44,7 +52,7 @@ def order(
         found = study(scene, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
                       methods=methods_of(method), against=against, out=points, progress=progress)  # fmt: skip
     found = found if isinstance(found, list) else [found]
-    files = [write_table(folder / "order.csv", found), *draw(folder, found)]
+    files = [Sheet(FILE, [*lines(found)]).write(folder / "order.csv"), *draw(folder, found)]
     if as_json:
         print_json({"studies": [one.plain() for one in found], "files": [str(file) for file in files],
                     "reused": points.reused})  # fmt: skip
@@ -64,32 +72,19 @@ def draw(folder: Path, found) -> list[Path]:
     return files
 
 
-def write_table(path: Path, found) -> Path:
-    """All rows of all studies, variables and norms, SI."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        sheet = csv.writer(file)
-        sheet.writerow(COLUMNS)
-        for one in found:
-            for variable, fits in one.fits.items():
-                for norm in NORMS:
-                    sheet.writerows(lines(one, variable, norm, fits[norm]))
-    return path
-
-
-def lines(one, variable: str, norm: str, fit):
-    """The rows of one norm."""
-    for k, row in enumerate(one.rows):
-        yield [
-            one.scheme, one.method, one.kind, variable, unit(variable, one.units), norm, row.level.cells,
-            repr(row.level.size), number(row.level.step), number(row.errors.get(variable, {}).get(norm, math.nan)),
-            number(fit.pairwise[k - 1]) if k else "", fit.marks[k], number(fit.order), number(fit.spread), row.steps,
-            row.rhs, row.cell_updates, number(row.seconds),
-        ]  # fmt: skip
-
-
-def number(x: float) -> str:
-    """A number in full, nothing for NaN."""
-    return "" if math.isnan(x) else repr(float(x))
+def lines(found) -> Iterator[dict]:
+    """A line of order.csv for each row of each study, variable and norm, SI."""
+    for one in found:
+        known = {"scheme": one.scheme, "method": one.method, "reference": one.kind}
+        for variable, fits in one.fits.items():
+            for norm in NORMS:
+                what = {"variable": variable, "unit": unit(variable, one.units), "norm": norm}
+                pairs = zip(one.rows, [None, *fits[norm].pairwise], fits[norm].marks, strict=True)
+                for row, pairwise, mark in pairs:
+                    yield known | what | vars(fits[norm]) | vars(row) | vars(row.level) | {
+                        "error": row.errors.get(variable, {}).get(norm), "pairwise": pairwise, "mark": mark,
+                        "updates": row.cell_updates,
+                    }  # fmt: skip
 
 
 def show(one) -> None:
@@ -101,8 +96,7 @@ def show(one) -> None:
         terminal.line(console, "")
         where = " at the end, all pipes" if variable in ("pressure", "flow") else ""
         terminal.line(console, f"{variable} [{unit(variable, one.units)}]{where}")
-        terminal.table(["cells", "step [s]", "L1", "order", "L2", "order", "max", "order", "rhs", "seconds", "mark"],
-                       rows_of(one, variable), console)  # fmt: skip
+        terminal.sheet(rows_of(one, variable), console)
     terminal.line(console, "")
     terminal.table(["fitted order of", "L1", "L2", "max"], fitted(one), console)
     for text in dict.fromkeys([*reasons(one), *one.notes]):
@@ -110,28 +104,19 @@ def show(one) -> None:
     terminal.line(console, "")
 
 
-def rows_of(one, variable: str) -> list[list[str]]:
-    """Rows of a variable's table."""
+def rows_of(one, variable: str) -> Sheet:
+    """A variable's table."""
     fits, found = one.fits[variable], []
     for k, row in enumerate(one.rows):
-        cells = [str(row.level.cells or "-"), brief(row.level.step)]
-        if one.plan.measure == "rtol":
-            cells[1] = f"rtol {row.level.size:g}"
-        for norm in NORMS:
-            cells += [
-                brief(row.errors.get(variable, {}).get(norm, math.nan)),
-                f"{fits[norm].pairwise[k - 1]:.2f}" if k and not math.isnan(fits[norm].pairwise[k - 1]) else "-",
-            ]
+        step = f"rtol {row.level.size:g}" if one.plan.measure == "rtol" else row.level.step
+        cells = {"cells": row.level.cells or None, "step": step, "rhs": row.rhs, "seconds": row.seconds}
+        cells |= {norm: row.errors.get(variable, {}).get(norm) for norm in NORMS}
+        cells |= {f"order {norm}": fits[norm].pairwise[k - 1] if k else None for norm in NORMS}
         marks = {norm: fits[norm].marks[k] for norm in NORMS}
         same = len(set(marks.values())) == 1
         told = marks["L1"] if same else ", ".join(f"{mark} ({norm})" for norm, mark in marks.items() if mark)
-        found.append([*cells, str(row.rhs), brief(row.seconds), told])
-    return found
-
-
-def brief(x: float) -> str:
-    """Four digits."""
-    return "-" if math.isnan(x) else f"{x:.4g}"
+        found.append(plain(cells | {"mark": told}))
+    return Sheet(TABLE, found)
 
 
 def fitted(one) -> list[list[str]]:

@@ -9,8 +9,9 @@ import numpy as np
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.linearise import At, Before, time_of, write_rows
+from fvsolve.cli.linearise import At, Before, time_of
 from fvsolve.cli.studying import Out, folder_of
+from fvsolve.studies.sheet import write
 
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 
@@ -36,7 +37,7 @@ def response(
     header = ["frequency [Hz]", "w [rad/s]", "real", "imaginary", f"magnitude [{unit_of(found)}]", "phase [deg]"]
     h = found.h
     columns = [found.w / (2.0 * np.pi), found.w, h.real, h.imag, np.abs(h), np.degrees(np.angle(h))]
-    write_rows(folder / f"{name}.csv", header, np.column_stack(columns).tolist())
+    write(folder / f"{name}.csv", header, np.column_stack(columns).tolist())
     np.savez(folder / f"{name}.npz", A=found.a, B=found.b, C=found.c, D=found.d, states=np.array(found.states))
     draw(found, folder / name)
     if as_json:

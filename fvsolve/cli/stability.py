@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Annotated
 
@@ -12,15 +11,16 @@ import typer
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.linearise import At, Before, time_of
 from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.studies.sheet import Column, Sheet, columns
 
 PICTURES = 12  # pairs beyond which no picture is drawn
-FILE = {  # columns of stability.csv
-    "scheme": "scheme", "method": "method", "steps": "steps", "threshold": "threshold", "states": "states",
-    "predicted": "predicted [s]", "predicted_courant": "predicted Courant", "after": "after steps",
-    "measured": "measured [s]", "measured_courant": "measured Courant", "difference": "difference",
-    "eigenvalues": "eigenvalues [s]", "field_of_values": "field of values [s]", "von_neumann": "von Neumann [s]",
-    "longer": "measured, ten times the steps [s]", "where": "grows in", "share": "share of energy",
-}  # fmt: skip
+FILE = columns(
+    scheme="scheme", method="method", steps="steps", threshold="threshold", states="states",
+    predicted="predicted [s]", predicted_courant="predicted Courant", after="after steps",
+    measured="measured [s]", measured_courant="measured Courant", difference="difference",
+    eigenvalues="eigenvalues [s]", field_of_values="field of values [s]", von_neumann="von Neumann [s]",
+    longer="measured, ten times the steps [s]", where="grows in", share="share of energy", notes="notes",
+)  # fmt: skip
 
 
 @app.command()
@@ -60,7 +60,8 @@ def stability(
             out=folder,
             progress=progress,
         )
-    files = [write(folder / "stability.csv", found.rows)]
+    table = Sheet(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in found.rows])
+    files = [table.write(folder / "stability.csv").name]
     if len(found.rows) <= PICTURES:
         files += pictures(found, folder)
     if as_json:
@@ -77,17 +78,6 @@ def refuse(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
     if idle:
         where = "with a case: only a periodic grid has them" if case else "without a case: fvsolve stability CASE"
         raise FvsolveError(f"{', '.join(idle)}: nothing to say {where}")
-
-
-def write(path: Path, rows) -> str:
-    """The table as CSV; returns its name."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        made = csv.writer(file)
-        made.writerow([*FILE.values(), "notes"])
-        for row in rows:
-            plain = row.plain()
-            made.writerow([*("" if plain[name] is None else plain[name] for name in FILE), "; ".join(row.notes)])
-    return path.name
 
 
 def pictures(found, folder: Path) -> list[str]:
@@ -123,11 +113,7 @@ def show(found, folder: Path, files: list[str]) -> None:
                          f"by {first.threshold:g} (energy norm) within {first.steps} steps")  # fmt: skip
     if cells:
         terminal.line(where, f"Courant number: step times {first.rate:.6g} 1/s; bounds as Courant numbers")
-    courant = ["Courant"] if cells else []
-    headers = [*(["scheme"] if cells else []), "method", "predicted [s]", *courant, "measured [s]", *courant,
-               "difference", "eigenvalues", "field of values", *(["von Neumann"] if cells else []),
-               "grows in"]  # fmt: skip
-    terminal.table(headers, [line for row in rows for line in lines(row, cells)], where)
+    terminal.sheet(Sheet(shown(cells), [line for row in rows for line in lines(row)]), where)
     for row in rows:
         for note in row.notes:
             terminal.line(where, f"  {label(row)}: {note}")
@@ -138,31 +124,30 @@ def show(found, folder: Path, files: list[str]) -> None:
     terminal.line(where, f"{folder}: {', '.join(files)}")
 
 
-def lines(row, cells: bool) -> list[list[str]]:
+def shown(cells: bool) -> list[Column]:
+    """Columns on the terminal; with cells steps stand as Courant numbers too, and bounds as these alone."""
+    heads = {"scheme": "scheme", "method": "method"}
+    for what in ("predicted", "measured"):
+        heads |= {what: f"{what} [s]", f"{what}_courant": "Courant"}
+    heads["percent"] = "difference"
+    for bound in ("eigenvalues", "field_of_values", "von_neumann"):
+        heads[f"{bound}_courant" if cells else bound] = bound.replace("_", " ").replace("von n", "von N")
+    heads["part"] = "grows in"
+    idle = () if cells else ("scheme", "predicted_courant", "measured_courant", "von_neumann")
+    return [Column(key, head, ".5g") for key, head in heads.items() if key not in idle]
+
+
+def lines(row) -> list[dict]:
     """Lines of the table that one row takes: a limited scheme has one for each frozen one."""
+    from fvsolve.studies.stability.row import said
 
-    def step(x: float) -> list[str]:
-        return [number(x), *([number(row.courant(x))] if cells else [])]
-
-    def bound(x: float) -> str:
-        return number(row.courant(x) if cells else x)
-
-    rest = ["-"] * 7
-    found = [[f"{row.scheme}: {name}", row.method, *step(h), *rest] for name, h in row.frozen.items()]
-    difference = f"{100 * row.difference:+.2f} %" if np.isfinite(row.difference) else "-"
-    found.append([
-        *([row.scheme] if cells else []), row.method, *step(row.predicted), *step(row.measured), difference,
-        bound(row.eigenvalues), bound(row.field_of_values), *([bound(row.von_neumann)] if cells else []),
-        f"{row.where} ({100 * row.share:.0f} %)" if row.where else "-",
-    ])  # fmt: skip
-    return found
+    found = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": said(h),
+              "predicted_courant": said(row.courant(h))} for name, h in row.frozen.items()]  # fmt: skip
+    percent = f"{100 * row.difference:+.2f} %" if np.isfinite(row.difference) else None
+    part = f"{row.where} ({100 * row.share:.0f} %)" if row.where else None
+    return [*found, row.plain() | {"percent": percent, "part": part}]
 
 
 def label(row) -> str:
     """What a line below the table is about."""
     return f"{row.scheme}, {row.method}" if row.rate > 0.0 else row.method
-
-
-def number(x: float) -> str:
-    """A number, `none` for infinity: no step fails, `-` for what is not known."""
-    return "-" if np.isnan(x) else "none" if np.isinf(x) else f"{x:.5g}"

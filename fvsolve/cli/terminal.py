@@ -35,6 +35,11 @@ def table(headers: list[str], rows: list[list[str]], where=None) -> None:
     (where or console()).print(made)
 
 
+def sheet(made, where=None) -> None:
+    """A sheet in its words."""
+    table(*made.words(), where)
+
+
 def _numeric(text: str) -> bool:
     if text == "-":
         return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import functools
 
 import numpy as np
@@ -13,13 +12,21 @@ from fvsolve.studies.energy.energy import ROUNDING, check_port, energy
 from fvsolve.studies.energy.passivity import AUTO, checked, method_names
 from fvsolve.studies.outcome import refusal
 from fvsolve.studies.points import Points
+from fvsolve.studies.sheet import Column
 
-PAIR = {  # of a row that was measured: key, heading
-    "scheme": "scheme", "method": "method", "remainder": "remainder [J]", "scheme_loss": "by the scheme [J]",
-    "step_loss": "by the step [J]", "newton_loss": "left by Newton [J]",
-    "least": "least on the way [J]", "relative": "of what passed",
-    "creates": "creates energy", "margin": "margin at the port [J]", "reason": "run",
-}  # fmt: skip
+PAIR = (  # of a row that was measured
+    Column("scheme"),
+    Column("method"),
+    Column("remainder", words=".4g", head="remainder [J]"),
+    Column("scheme_loss", words=".4g", head="by the scheme [J]"),
+    Column("step_loss", words=".4g", head="by the step [J]"),
+    Column("newton_loss", words=".4g", head="left by Newton [J]"),
+    Column("least", words=".4g", head="least on the way [J]"),
+    Column("relative", words=".4g", head="of what passed"),
+    Column("creates", head="creates energy"),
+    Column("margin", words=".4g", head="margin at the port [J]"),
+    Column("reason", words=lambda row: row["reason"].partition(":")[0], head="run"),
+)
 
 
 def measured(
@@ -68,11 +75,3 @@ def one_run(case, scheme: str, method: str, port: str | None, watch=None) -> dic
         "least": least, "relative": one.relative, "creates": not sound or least < -ROUNDING * one.through,
         "margin": None if one.port is None else one.port.margin, "reason": one.reason,
     }  # fmt: skip
-
-
-def write_pairs(rows: list[dict], path) -> None:
-    """pairs.csv: a row per pair; an empty field is what is not known."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(PAIR), extrasaction="ignore")
-        writer.writeheader()
-        writer.writerows({key: "" if row[key] is None else row[key] for key in PAIR} for row in rows)

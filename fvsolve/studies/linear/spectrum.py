@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy import EnergyForm
+from fvsolve.studies.sheet import Column
 
 MANY = 1500  # states up to which all eigenvalues are found; beyond, some by ARPACK
 SOME = 20  # eigenvalues that ARPACK is asked for at each place
 RIM = 5  # places, from straight up to straight left: the lower half mirrors the upper one
 RESTARTS, LONGEST = 12, 10.0  # of ARPACK at each place; at all of them together [s]
+POLES = (
+    Column("real", "real [1/s]", ".6g"),
+    Column("imaginary", "imaginary [1/s]", lambda pole: f"±{pole['imaginary']:.6g}" if pole["pair"] else "-"),
+    Column("pair"),
+    Column("frequency", "frequency [Hz]", ".6g"),
+    Column("damping", words=".4f"),
+    Column("time_constant", "time constant [s]", ".4g"),
+)
 ZERO = 1e-10  # of the greatest modulus: an eigenvalue, or a real part, below is round-off
 
 
@@ -125,13 +132,3 @@ def tidy(values: np.ndarray) -> np.ndarray:
     real, imaginary = (np.where(np.abs(part) <= floor, 0.0, part) for part in (values.real, values.imag))
     values = real + 1j * imaginary
     return values[np.lexsort((-values.imag, -values.real, np.round(np.abs(values), 12)))]
-
-
-def write_poles(path: Path, poles: list[dict]) -> None:
-    """A CSV of poles."""
-    names = {"real": "real [1/s]", "imaginary": "imaginary [1/s]", "pair": "pair", "frequency": "frequency [Hz]",
-             "damping": "damping", "time_constant": "time constant [s]"}  # fmt: skip
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        made = csv.writer(file)
-        made.writerow(names.values())
-        made.writerows([pole[name] for name in names] for pole in poles)
