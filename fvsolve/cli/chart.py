@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Annotated
 
 import typer
@@ -9,6 +10,7 @@ import typer
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
+from fvsolve.studies.sheet import Column, Sheet
 
 
 @app.command()
@@ -79,15 +81,12 @@ def _numbers(name: str, text: str | None) -> list | None:
 
 
 def _show(made, paths) -> None:
-    from fvsolve.cli.terminal import console, line, table
+    from fvsolve.cli.terminal import console, line, sheet
 
     where = console()
     floor = made.floor["trajectory"]
     line(where, f"{made.case}: error over the trajectory (mean over time, of the worst probe's range)")
-    table(
-        ["error", "cheapest by CPU time", "ms", "cheapest by updates", "updates", "default", "ms", "times", "updates"],
-        [_row(row) for row in made.front], where,
-    )  # fmt: skip
+    sheet(Sheet(FRONT, [vars(row) for row in made.front]), where)
     stands = made.stands
     line(where, f"default: {made.default}; times and updates between two runs of a curve are interpolated")
     if stands is not None:
@@ -110,22 +109,28 @@ def _show(made, paths) -> None:
         _show_aim(where, made)
 
 
-def _row(row) -> list[str]:
-    def ms(seconds) -> str:
-        return "-" if seconds is None else f"{seconds * 1e3:.3g}"
+def _ms(key: str) -> Callable[[Mapping], str]:
+    """What says the seconds of a row in milliseconds."""
+    return lambda row: "-" if row[key] is None else f"{row[key] * 1e3:.3g}"
 
-    def count(number) -> str:
-        return "-" if number is None else f"{number:.2e}"
 
-    name = f"{row.name}, {row.fineness}" if row.name else "none"
-    if row.default_seconds is None:
-        default, times = "not reached", "-"
-    else:
-        default, times = row.default_fineness, f"{row.default_seconds / row.seconds:.2g}"
-    return [
-        f"{row.target:.0e}", name, ms(row.seconds), row.by_updates or "none", count(row.updates), default,
-        ms(row.default_seconds), times, count(row.default_updates),
-    ]  # fmt: skip
+def _times(row: Mapping) -> str:
+    """How many times as long the default takes."""
+    default = row["default_seconds"]
+    return "-" if default is None else f"{default / row['seconds']:.2g}"
+
+
+FRONT = (
+    Column("target", "error", ".0e"),
+    Column("name", "cheapest by CPU time", lambda row: f"{row['name']}, {row['fineness']}" if row["name"] else "none"),
+    Column("seconds", "ms", _ms("seconds")),
+    Column("by_updates", "cheapest by updates", lambda row: row["by_updates"] or "none"),
+    Column("updates", words=".2e"),
+    Column("default", words=lambda row: "not reached" if row["default_seconds"] is None else row["default_fineness"]),
+    Column("default_seconds", "ms", _ms("default_seconds")),
+    Column("times", words=_times),
+    Column("default_updates", "updates", ".2e"),
+)
 
 
 def _show_aim(where, made) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 
@@ -11,9 +10,12 @@ from fvsolve.cli.app import print_json
 from fvsolve.cli.studying import listed, methods_of, told, writable
 from fvsolve.limits.grid import AdvectionLimit, advection_limits
 from fvsolve.limits.symbol import WEIGHTS
+from fvsolve.studies.sheet import Column, Sheet, text
 from fvsolve.studies.stability.limited import LIMITED, LimitedLimit, limited_limits
 from fvsolve.studies.stability.periodic import THRESHOLD, Measured, measured_limits
 
+RUNS = (Column("scheme"), Column("method"), Column("predicted", words=".7g"), Column("measured", words=".7g"),
+        Column("ratio", words=".7f"))  # fmt: skip
 FEW = 8  # pairs that get a line each
 SET_BY = {
     "longest": "the longest waves (theta -> 0)",
@@ -44,9 +46,10 @@ def without_case(
     limits = advection_limits(linear, methods, courant) if linear is None or linear else []
     if out is not None:
         writable(out)
-        _write(out / "limits.csv", [one.plain() for one in limits])
-        _write(out / "measured.csv", [one.plain() for one in runs])
-        _write(out / "limited.csv", [one.flat() for one in limited])
+        for name, rows in (("limits", [one.plain() for one in limits]), ("measured", [one.plain() for one in runs]),
+                           ("limited", [one.flat() for one in limited])):  # fmt: skip
+            if rows:
+                Sheet([Column(key) for key in rows[0]], rows).write(out / f"{name}.csv")
     if as_json:
         print_json({name: [one.plain() for one in found] for name, found in
                     (("limits", limits), ("measured", runs), ("limited", limited))})  # fmt: skip
@@ -77,50 +80,34 @@ def _table_of_runs(runs: list[Measured]) -> None:
     terminal.line(console, "")
     head = f"Least Courant number that fails on a circle of {first.cells} cells: a wave grows {THRESHOLD:g}-fold"
     terminal.line(console, f"{head} in {first.steps} steps", "bold")
-    rows = [
-        [
-            one.scheme,
-            one.method,
-            _courant(one.predicted),
-            _courant(one.measured),
-            "-" if one.ratio is None else f"{one.ratio:.7f}",
-        ]
-        for one in runs
-    ]
-    terminal.table(["scheme", "method", "predicted", "measured", "ratio"], rows, console)
+    terminal.sheet(Sheet(RUNS, [one.plain() for one in runs]), console)
 
 
 def _show_limited(one: LimitedLimit) -> None:
     """One limited scheme and method, in sentences and a table."""
     console, name = terminal.console(), f"{one.scheme} ({one.limiter})" if one.limiter else one.scheme
     terminal.line(console, f"{name} with {one.method}: {SHARP[one.sharp]}", "bold")
-    frozen = ", ".join(
-        f"{branch} {_courant(limit.limit) if limit.limit else 'none'}" for branch, limit in one.frozen.items()
-    )
+    frozen = ", ".join(f"{branch} {_limit(limit.limit)}" for branch, limit in one.frozen.items())
     terminal.line(console, f"  limits with frozen weights: {frozen}")
     if one.monotone is not None:
         terminal.line(console, f"  total variation cannot grow up to {one.monotone:.6g}")
     terminal.line(
         console, f"  least Courant number found to fail on {one.cells} cells, real runs of the limited scheme:"
     )
-    rows = [[str(n), *(_found(row[i]) for row in one.measured.values())] for i, n in enumerate(one.steps)]
-    terminal.table(["  steps", *one.measured], [["  " + row[0], *row[1:]] for row in rows], console)
-
-
-def _courant(x: float | None) -> str:
-    return "-" if x is None else "every" if math.isinf(x) else f"{x:.7g}"
-
-
-def _found(x: float | None) -> str:
-    return "-" if x is None else f"{x:.3g}"
+    rows = [[f"  {n}", *(text(row[i], ".3g") for row in one.measured.values())] for i, n in enumerate(one.steps)]
+    terminal.table(["  steps", *one.measured], rows, console)
 
 
 def _show(one: AdvectionLimit) -> None:
     """One pair in sentences."""
     console = terminal.console()
     terminal.line(console, f"{one.scheme} with {one.method}: {_limit_in_words(one)}", "bold")
-    for text in _sentences(one):
-        terminal.line(console, f"  {text}")
+    for words in _sentences(one):
+        terminal.line(console, f"  {words}")
+
+
+def _limit(x: float) -> str:
+    return "every" if math.isinf(x) else f"{x:.7g}" if x else "none"
 
 
 def _limit_in_words(one: AdvectionLimit) -> str:
@@ -186,12 +173,3 @@ def _cell(one: AdvectionLimit) -> str:
     if math.isinf(one.limit):
         return "every"
     return (f"{one.limit:.7f} {one.wave[0]}" if one.limit > 0.0 else "none") + again
-
-
-def _write(path: Path, rows: list[dict]) -> None:
-    if not rows:
-        return
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)

@@ -5,6 +5,12 @@ from __future__ import annotations
 from fvsolve.cli import terminal
 from fvsolve.cli.app import print_json
 from fvsolve.cli.studying import told
+from fvsolve.studies.sheet import Column, Sheet
+
+TABLE = (
+    Column("name", "model"), Column("law"), Column("states"), Column("error", words=".4g"), Column("of"),
+    Column("greatest", words=".4g"), Column("ms", "time [ms]", ".4g"), Column("rhs", "calls of f"),
+)  # fmt: skip
 
 
 def show_models(case, target: float, as_json: bool) -> None:
@@ -17,13 +23,8 @@ def show_models(case, target: float, as_json: bool) -> None:
         print_json(found.plain())
         return
     console = terminal.console()
-    heads = ["model", "law", "states", "error", "of", "greatest", "time [ms]", "calls of f"]
-    rows = [
-        [one.name, one.law, *map(_number, (one.states, one.error)), one.worst,
-         *map(_number, (one.greatest, 1e3 * one.seconds, one.rhs))]
-        for one in found.rungs if one.error is not None
-    ]  # fmt: skip
-    terminal.table(heads, rows, console)
+    rows = [vars(one) | {"of": one.worst, "ms": 1e3 * one.seconds} for one in found.rungs if one.error is not None]
+    terminal.sheet(Sheet(TABLE, rows), console)
     richest, cheapest = found.richest, found.cheapest
     terminal.line(
         console, "error: root mean square over time, of the worst probe, over its range; greatest: at any time;"
@@ -35,13 +36,9 @@ def show_models(case, target: float, as_json: bool) -> None:
     gain = richest.seconds / cheapest.seconds
     terminal.line(
         console,
-        f"cheapest within {target:g}: {cheapest.name}, {cheapest.law}, {_number(cheapest.states)} states, "
+        f"cheapest within {target:g}: {cheapest.name}, {cheapest.law}, {cheapest.states} states, "
         f"{gain:.3g} times quicker than the richest",
         "bold",
     )
     for text in found.thumb:
         terminal.line(console, text)
-
-
-def _number(value) -> str:
-    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)

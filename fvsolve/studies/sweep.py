@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,6 +16,7 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.shown import Shown
 from fvsolve.studies.outcome import grown, refusal
 from fvsolve.studies.points import Points
+from fvsolve.studies.sheet import Column, Sheet
 
 FIRST = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST = ("expectations", "steps", "seconds")
@@ -47,7 +47,7 @@ class Sweep(Shown):
         return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {wrong} of them not ok"
 
     def listed(self) -> dict[str, list]:
-        return {name: [row.get(name) for row in self.rows] for name in self.columns}
+        return Sheet([Column(name) for name in self.columns], self.rows).listed()
 
     @property
     def columns(self) -> list[str]:
@@ -62,10 +62,8 @@ class Sweep(Shown):
 
     def write(self, path: Path) -> None:
         """The table as CSV, the values of the keys as `--set` reads them."""
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, self.columns, restval="")
-            writer.writeheader()
-            writer.writerows({name: self._cell(name, x) for name, x in row.items()} for row in self.rows)
+        rows = ({name: self._cell(name, x) for name, x in row.items()} for row in self.rows)
+        Sheet([Column(name) for name in self.columns], [*rows]).write(path)
 
     def _cell(self, name: str, value: Any) -> Any:
         if name == "warnings":

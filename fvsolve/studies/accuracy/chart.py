@@ -23,8 +23,13 @@ from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.distance import Distance, distance, moving
 from fvsolve.studies.outcome import Progress, names, prepared, refusal
 from fvsolve.studies.points import Points
+from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.studies.truth import Truth, truth
 
+FRAME = (
+    "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
+    "steps", "ok", "reason",
+)  # fmt: skip
 WRONG = 1.0  # an error as great as all that the component does
 
 
@@ -69,9 +74,12 @@ class Chart(Shown):
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
 
     def listed(self) -> dict[str, list]:
-        names = ("trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates", "steps", "ok", "reason")
-        own = {key: [getattr(one.setting, key) for one in self.points] for key in ("scheme", "method", "cells", "size")}
-        return own | {key: [getattr(one, key) for one in self.points] for key in names}
+        return Sheet([Column(key) for key in FRAME], self.rows).listed()
+
+    @property
+    def rows(self) -> list[dict]:
+        """All points, each with what its setting says."""
+        return [vars(one.setting) | vars(one) for one in self.points]
 
     def curves(self) -> dict[str, list[Point]]:
         """Points by name of scheme and method, from coarse to fine."""

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
 from fvsolve.studies.accuracy.chart import Chart
 from fvsolve.studies.accuracy.pareto import front
+from fvsolve.studies.sheet import Sheet, columns
 
-COLUMNS = (
-    "scheme", "method", "control", "size", "cells", "ok", "trajectory error", "greatest error", "end error",
-    "overshoot", "worst", "cpu [s]", "rhs", "cell updates", "steps", "below floor", "front by cpu",
-    "front by updates", "reason",
+FILE = columns(
+    scheme="scheme", method="method", control="control", size="size", cells="cells", ok="ok",
+    trajectory="trajectory error", greatest="greatest error", end="end error", overshoot="overshoot", worst="worst",
+    seconds="cpu [s]", rhs="rhs", updates="cell updates", steps="steps", below="below floor",
+    by_seconds="front by cpu", by_updates="front by updates", reason="reason",
 )  # fmt: skip
 ERRORS = ("mean error over the run [range]", "error at the end [range]")
 
@@ -32,23 +33,16 @@ def write(found: Chart, folder: Path, title: str = "", dpi: float | None = None)
 
 def write_csv(found: Chart, path: Path) -> None:
     """One line per setting, failed ones included."""
-    good = [k for k, point in enumerate(found.points) if point.ok]
-    errors = [max(found.points[k].trajectory, found.floor["trajectory"]) for k in good]
-    fronts = [
-        {good[k] for k in front(errors, [getattr(found.points[k], cost) for k in good])}
-        for cost in ("seconds", "updates")
-    ]
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        out = csv.writer(file)
-        out.writerow(COLUMNS)
-        for k, point in enumerate(found.points):
-            one = point.setting
-            out.writerow([
-                one.scheme or "", one.method, one.control, one.size, one.cells or "", int(point.ok), point.trajectory,
-                point.greatest, point.end, point.overshoot, point.worst, point.seconds, point.rhs, point.updates,
-                point.steps, int(point.ok and point.trajectory < found.floor["trajectory"]),
-                *(int(k in one) for one in fronts), point.reason,
-            ])  # fmt: skip
+    rows, floor = found.rows, found.floor["trajectory"]
+    good = [row for row in rows if row["ok"]]
+    errors = [max(row["trajectory"], floor) for row in good]
+    for cost in ("seconds", "updates"):
+        best = front(errors, [row[cost] for row in good])
+        for row in rows:
+            row[f"by_{cost}"] = int(any(row is good[k] for k in best))
+    for row in rows:
+        row |= {"ok": int(row["ok"]), "below": int(row["ok"] and row["trajectory"] < floor)}
+    Sheet(FILE, rows).write(path)
 
 
 def figure(found: Chart, title: str = ""):
