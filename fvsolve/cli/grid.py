@@ -51,8 +51,7 @@ def without_case(
             if rows:
                 Sheet([Column(key) for key in rows[0]], rows).write(out / f"{name}.csv")
     if as_json:
-        print_json({name: [one.plain() for one in found] for name, found in
-                    (("limits", limits), ("measured", runs), ("limited", limited))})  # fmt: skip
+        print_json({"limits": limits, "measured": runs, "limited": limited})
         return
     if len(limits) <= FEW:
         for one in limits:

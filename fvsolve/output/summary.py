@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 
 from fvsolve.errors import RunError, listing
@@ -51,7 +51,10 @@ def described(summary, model) -> dict:
 
 
 def plain(value):
-    """`value` with numpy numbers and arrays as Python's own, and what JSON cannot say (NaN) as None."""
+    """`value` with numpy numbers and arrays as Python's own, objects as what they say, complex numbers as [re, im], and
+    what JSON cannot say (NaN) as None."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(value.plain() if hasattr(value, "plain") else vars(value))
     if isinstance(value, dict):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, (list, tuple)):
@@ -60,6 +63,8 @@ def plain(value):
         return plain(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
     return value if isinstance(value, (str, int, bool, type(None))) else str(value)
 
 

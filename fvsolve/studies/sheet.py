@@ -7,11 +7,21 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from fvsolve.output.summary import plain
+
+
+class Plain:
+    """What says itself in plain values: all its fields, and what is asked of them besides."""
+
+    also: ClassVar[tuple[str, ...]] = ()  # names of properties
+
+    def plain(self) -> dict:
+        """For JSON: complex numbers as [re, im], None for what is not finite."""
+        return {name: plain(getattr(self, name)) for name in (*(one.name for one in fields(self)), *self.also)}
 
 
 @dataclass(frozen=True)

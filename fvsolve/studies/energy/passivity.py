@@ -17,6 +17,7 @@ import numpy as np
 
 from fvsolve.doors import CALL, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.output.summary import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT
 from fvsolve.studies.outcome import names
@@ -83,15 +84,8 @@ class Passivity:
 
     def plain(self) -> dict:
         """For JSON; None for a limit that is not there, and `any_step` beside a Courant number."""
-        pairs = [{"scheme": one.scheme, "method": one.method, "courant": finite(one.courant),
-                  "any_step": one.courant == math.inf} for one in self.pairs]  # fmt: skip
-        methods = [vars(one) | {"leak": finite(one.leak), "resonator": finite(one.resonator)} for one in self.methods]
-        return {"cells": CELLS, "methods": methods, "schemes": [vars(one) for one in self.schemes], "pairs": pairs}
-
-
-def finite(value: float | None) -> float | None:
-    """None for infinity."""
-    return None if value is None or math.isinf(value) else value
+        pairs = [vars(one) | {"any_step": one.courant == math.inf} for one in self.pairs]
+        return plain({"cells": CELLS, "methods": self.methods, "schemes": self.schemes, "pairs": pairs})
 
 
 @door(schemes=NAMES, methods=NAMES, progress=CALL)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from fvsolve.doors import CALL, COMPLEX, NUMBER, POSITIVE, Kind, door, is_number, made
 from fvsolve.errors import FvsolveError
-from fvsolve.output.summary import plain
+from fvsolve.studies.sheet import Plain
 from fvsolve.units import show
 
 MOST = 200_000  # samples of one sweep
@@ -62,7 +62,7 @@ class LineImpedance:
 
 
 @dataclass(frozen=True)
-class SweepVerdict:
+class SweepVerdict(Plain):
     """What a sweep proved: Re H >= `floor` on Re s = shift, 0 <= w <= high [rad/s], or where Re H < 0.
 
     positive_real : False with a frequency where Re H < 0, True where the bound shows Re H >= 0, None between
@@ -77,10 +77,6 @@ class SweepVerdict:
     shift: float
     high: float
     samples: int
-
-    def plain(self) -> dict:
-        """For JSON, None for what is not finite."""
-        return plain(asdict(self))
 
 
 BOUND = Kind(lambda given: callable(given) or (is_number(given) and given >= 0), "a number from 0 on, or a function")

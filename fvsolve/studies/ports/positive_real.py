@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 
 from fvsolve.errors import FvsolveError
-from fvsolve.output.summary import plain
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import odd_part
 from fvsolve.studies.ports.rational import (
@@ -21,6 +20,7 @@ from fvsolve.studies.ports.rational import (
     shared,
     sides,
 )
+from fvsolve.studies.sheet import Plain
 
 FATES = {  # of a pole that the numerator cancels
     "right": "in the right half plane: a system that holds it is unstable, which H does not show",
@@ -59,7 +59,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Plain):
     """What `positive_real` decided, and why.
 
     positive_real : the course's definition (4.1), pole at infinity included
@@ -84,6 +84,8 @@ class Verdict:
     numerator: tuple[Fraction, ...]
     denominator: tuple[Fraction, ...]
 
+    also = ("reason", "hidden_unstable")
+
     @property
     def reason(self) -> str:
         """All reasons in one line."""
@@ -96,15 +98,6 @@ class Verdict:
 
     def __bool__(self) -> bool:
         return self.positive_real
-
-    def plain(self) -> dict:
-        """For JSON: complex numbers as [re, im], fractions as text, None for what is not finite."""
-        found = asdict(self) | {"reason": self.reason, "hidden_unstable": self.hidden_unstable}
-        for mode in (*found["poles"], *found["hidden"]):
-            mode["near"] = [mode["near"].real, mode["near"].imag]
-        for pole in found["axis_poles"]:
-            pole["residue"] = None if pole["residue"] is None else [pole["residue"].real, pole["residue"].imag]
-        return plain(found)
 
 
 def positive_real(numerator, denominator) -> Verdict:

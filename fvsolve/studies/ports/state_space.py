@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from fvsolve.doors import COMPLEX, MATRIX, NUMBER, POSITIVE, SERIES, door, made
 from fvsolve.errors import FvsolveError
-from fvsolve.output.summary import plain
+from fvsolve.studies.sheet import Plain
 
 TOLERANCE = 1e-9  # of Re H / |H|: what differences and floats leave undecided
 DECADES = 1.0  # searched below the slowest and above the quickest pole, more where Re H changes its sign beyond
@@ -100,7 +100,7 @@ class Dip:
 
 
 @dataclass(frozen=True)
-class StateVerdict:
+class StateVerdict(Plain):
     """Whether H is positive real: True, False, or None where floats cannot tell.
 
     margin : least Re H / |H|, the cosine of the phase, found at `worst` [rad/s]; with poles on the axis, that on
@@ -122,6 +122,8 @@ class StateVerdict:
     axis: tuple[complex, ...]
     hidden: tuple[complex, ...]
 
+    also = ("reason", "answer")
+
     @property
     def reason(self) -> str:
         """All reasons in one line."""
@@ -131,13 +133,6 @@ class StateVerdict:
     def answer(self) -> str:
         """yes, no, or undecided within the tolerance."""
         return {True: "yes", False: "no", None: f"undecided within {self.tolerance:.0e}"}[self.positive_real]
-
-    def plain(self) -> dict:
-        """For JSON: complex numbers as [re, im], None for what is not finite."""
-        found = asdict(self) | {"reason": self.reason, "answer": self.answer}
-        for key in ("unstable", "axis", "hidden"):
-            found[key] = [[s.real, s.imag] for s in found[key]]
-        return plain(found)
 
 
 @door(h=made(Transfer), tolerance=POSITIVE)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from fvsolve.schemes import LIMITED, LIMITERS, branches
 from fvsolve.steppers.analysis.facts import analyse
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import Progress, names
+from fvsolve.studies.sheet import Plain
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
@@ -34,7 +35,7 @@ SEED = 1
 
 
 @dataclass(frozen=True)
-class LimitedLimit:
+class LimitedLimit(Plain):
     """What is known of a limited scheme with a method.
 
     frozen : limits of the linear schemes by name; monotone : up to which Courant number total variation cannot grow,
@@ -52,6 +53,8 @@ class LimitedLimit:
     steps: tuple[int, ...]
     measured: dict[str, tuple[float | None, ...]]
 
+    also = ("least", "sharp")
+
     @property
     def least(self) -> tuple[float | None, ...]:
         """Over the starts, for each count of steps."""
@@ -62,11 +65,6 @@ class LimitedLimit:
     def sharp(self) -> bool | None:
         first, last = self.least[0], self.least[-1]
         return None if first is None or last is None else last >= (1 - FALLS) * first
-
-    def plain(self) -> dict:
-        found = asdict(self) | {"least": self.least, "sharp": self.sharp}
-        found["frozen"] = {name: one.plain() for name, one in self.frozen.items()}
-        return found
 
     def flat(self) -> dict:
         """As one row of a table."""

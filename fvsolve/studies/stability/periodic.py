@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, names
+from fvsolve.studies.sheet import Plain
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
@@ -36,7 +37,7 @@ SMALL = 1e-18  # WENO's, against values of one
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measured(Plain):
     """One pair on a circle of cells: least Courant number that fails, predicted and measured; None where none does."""
 
     scheme: str
@@ -46,13 +47,12 @@ class Measured:
     predicted: float | None
     measured: float | None
 
+    also = ("ratio",)
+
     @property
     def ratio(self) -> float | None:
         """Predicted over measured."""
         return self.predicted / self.measured if self.predicted and self.measured else None
-
-    def plain(self) -> dict:
-        return asdict(self) | {"ratio": self.ratio}
 
 
 class Circle:
