@@ -17,7 +17,7 @@ COARSEST_RTOL = 0.1  # a tolerance beyond says nothing
 class Point:
     """One setting and what came of it.
 
-    trajectory, greatest, end, overshoot : errors over the range of the worst component (studies/accuracy/distance.py)
+    trajectory, greatest, end, overshoot : errors over the range of the worst component (studies/distance.py)
     seconds : CPU time of the steps, the best of several [s]; updates : calls of the rates times cells (states)
     """
 
