@@ -190,65 +190,15 @@ def valve_drive(tables, out, k):
 
 @njit
 def valve_target(tables, out, k, g):
-    """`target_under` the rule that holds now."""
-    return target_under(rule_of(tables, k) if tables.valves[k]["law"] == POWER else FREE, tables, out, k, g)
-
-
-@njit
-def target_under(rule, tables, out, k, g):
-    """(M |M| that a valve asks for, or the flow where its law has a laminar part or is a power; its G now)."""
+    """(M |M| that a valve asks for by the root, or the flow where that has a laminar part; its G now)."""
     valve = tables.valves[k]
     drop, denser = valve_drive(tables, out, k)
     dense = g * denser
-    if valve["law"] == POWER:
-        dense *= denser  # it is its volume that follows the drop
-        return emitter_flow(tables.floats, valve["data"], dense, drop, rule), dense
-    if valve["law"] == TWO_WAY and drop < 0.0:
+    if drop < 0.0:
         dense *= valve["back"]
     if valve["transition"] > 0.0:
         return flow_at_drop(dense, transition_of(valve, dense), drop), dense
     return dense * drop, dense
-
-
-@njit
-def valve_move(tables, out, k, g, m, wide):
-    """a, s with dM = a + s d(p_i - p_j) for the next Newton step of valve k, which carries m [kg/s]."""
-    valve = tables.valves[k]
-    if valve["law"] == CURVE:
-        rho, drop = head_drop(tables, out, k)
-        return pump_step(tables, out, k, rho, g, m, drop)
-    if valve["law"] == POWER:
-        drop, denser = valve_drive(tables, out, k)
-        return emitter_step(tables.floats, valve["data"], g * denser * denser, m, drop, rule_of(tables, k))
-    target, slope = valve_target(tables, out, k, g)
-    transition = transition_of(valve, slope)
-    if valve["law"] == LIFT and is_lifting(tables, k):
-        return lifting_step(tables, out, k, full_flow(target, transition), slope, m, wide)
-    if transition > 0.0:
-        steepest = 45.0 / 32.0 * slope / transition
-        return target - m, min(steepest, slope / max(abs(target) + abs(m), 1e-300))
-    chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(slope))
-    upstream = valve["from_node"] if target >= 0.0 else valve["to_node"]
-    if inner_row(tables.nodes, upstream) >= 0:  # whose density grows with its pressure
-        slope += abs(target) / tables.settings[0]["beta"]
-    return (target - abs(m) * m) / chord, slope / chord
-
-
-@njit
-def full_flow(target, transition):
-    """The flow that a valve asks for, from what `valve_target` says."""
-    if transition > 0.0:
-        return target
-    return sqrt(target) if target >= 0.0 else -sqrt(-target)
-
-
-@njit
-def valve_lift(tables, out, k, g, wide):
-    """`restriction_lift` at the density upstream."""
-    valve = tables.valves[k]
-    if valve["law"] != LIFT or not is_lifting(tables, k):
-        return 0.0
-    return lifting_slope(tables, out, k, full_flow(valve_target(tables, out, k, g)[0], valve["transition"]), wide)
 
 
 @njit

@@ -1,7 +1,7 @@
 """Calls of compiled functions by their addresses, so that each is compiled once and a scene is a list of them.
 
 Numba compiles whatever a function calls into it again; an address ends that. All pieces of a job take the same
-arguments: `t, y, dydt, out, handle` and, where they read a state, the vector that they fill. The law of a device is
+arguments: `t, y, dydt, out, handle` and, where they read a state, the vector that they fill. The law of a part is
 functions named as `HOOKS`, each taking its own. What they raise is lost.
 """
 
@@ -20,7 +20,7 @@ RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, JOBS = range(8)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
 ARGUMENTS = dict.fromkeys((RHS, CLOSE), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
-HOOKS = {  # of the law of a device: arguments, and what it returns
+HOOKS = {  # of the law of a part: arguments, and what it returns
     "set": (
         "tVVTD",
         "",
@@ -31,6 +31,10 @@ HOOKS = {  # of the law of a device: arguments, and what it returns
     "outside": ("VTD", "i"),  # out, tables, device: 1 where its law is not to be trusted, or PASSING
     "power": ("tVVVTD", "ttt"),  # t, y, dydt, out, tables, device: supplied, rate of what it stores, dissipated [W]
     "stored": ("VTD", "t"),  # y, tables, device: what it stores, since the profile [J]
+    "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton's, see `kernels.restrictions`
+    "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
+    "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d pressure before it, beside the drop's
+    "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, by the drop alone
     "lead": ("tVTDtttb", "tt"),  # t, y, tables, device, p' before, p' behind, drop, ahead: as `kernels.led` asks
 }
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
@@ -143,6 +147,26 @@ if COMPILING:
         return call(*HOOKS["stored"])
 
     @intrinsic
+    def call_step(typingctx, address, out, tables, k, g, m, drop, denser, wide):
+        """Call the hook at an address."""
+        return call(*HOOKS["step"])
+
+    @intrinsic
+    def call_slope(typingctx, address, out, tables, k, g, drop):
+        """Call the hook at an address."""
+        return call(*HOOKS["slope"])
+
+    @intrinsic
+    def call_lift(typingctx, address, out, tables, k, g, drop, denser, wide):
+        """Call the hook at an address."""
+        return call(*HOOKS["lift"])
+
+    @intrinsic
+    def call_bends(typingctx, address, tables, k, drop, g):
+        """Call the hook at an address."""
+        return call(*HOOKS["bends"])
+
+    @intrinsic
     def call_lead(typingctx, address, t, y, tables, device, before, behind, drop, ahead):
         """Call the hook at an address."""
         return call(*HOOKS["lead"])
@@ -154,6 +178,7 @@ else:
 
     call_reader = call_energies = call_rates
     call_set = call_move = call_events = call_value = call_outside = call_power = call_stored = call_lead = call_rates
+    call_step = call_slope = call_lift = call_bends = call_rates
 
 
 @njit(forceinline=True)

@@ -24,7 +24,6 @@ UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
 )  # scheme families; LINEAR ones are six weights, SHORT upwind3
 MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3  # FLAT: no slope, of scalars that are linearised
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
-ROOT, TWO_WAY, CURVE, POWER, LIFT = 0, 1, 2, 3, 4  # laws of restrictions; all but ROOT are solved in a cluster
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
 # Status codes that travel up; the message is made in Python.
@@ -159,12 +158,12 @@ VALVE = np.dtype(
         ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
         ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 where pipes soften the root
         ("unseen", "f8"),  # drop below which it is so at any opening [Pa]: error control sees none as small
-        ("law", "i8"),
+        ("hooks", "i8"),  # row of `hooks`: the functions of its own law; -1 for the root
         ("device", "i8"),  # which device sets its conductance; -1: its schedule does
         ("data", "i8"),  # offset of a law's own numbers in `floats`
-        ("event", "i8"),  # POWER: place of its flags in `armed`
-        ("back", "f8"),  # TWO_WAY: share of the conductance that holds for flow from `to` to `from`
-        ("drive", "f8"),  # CURVE: relative speed of the profile
+        ("event", "i8"),  # place of its own flags in `armed`, of a law with bends
+        ("back", "f8"),  # of a root: share of the conductance that holds for flow from `to` to `from`
+        ("drive", "f8"),  # of a pump: relative speed of the profile
         ("open", "f8"),  # conductance of the profile; 0 where its flow does not obey it
         ("flow", "f8"),  # of the profile [kg/s]
         ("drop", "f8"),  # of the profile [Pa]

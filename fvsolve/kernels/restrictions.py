@@ -3,11 +3,13 @@
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.curves import curve_step
+from fvsolve.kernels.calls import call_bends, call_lift, call_slope, call_step
 from fvsolve.kernels.density import density, enthalpy
-from fvsolve.kernels.emitters import emitter_slope, emitter_step, rule_of
-from fvsolve.kernels.records import CURVE, LAW_LINEAR, LIFT, POWER, TWO_WAY
-from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of, valve_conductance, valve_step
+from fvsolve.kernels.devices import BENDS, LIFT, SLOPE, STEP
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.isolated import inner_row
+from fvsolve.kernels.records import LAW_LINEAR
+from fvsolve.kernels.valves import LEAST, flow_slope, transition_of, valve_conductance, valve_step
 
 
 @njit(forceinline=True)
@@ -32,29 +34,33 @@ def conductance_at(t, tables, out, k):
 
 
 @njit
-def restriction_step(tables, out, k, g, m, drop, wide):
+def restriction_step(tables, out, k, g, m, drop, denser, wide):
     """a, s with dM = a + s d(drop) for the next Newton step of restriction k, which carries m [kg/s] at a drop [Pa].
 
-    g : its conductance now, above zero. wide : as of `lift_of`.
+    g : its conductance now, above zero; denser : density upstream over that of reference, 1 under the linear law
+    wide : where two flows would do, Newton comes from above, from where what pressures lift is `wide` open
     """
     valve = tables.valves[k]
-    if valve["law"] == POWER:
-        return emitter_step(tables.floats, valve["data"], g, m, drop, rule_of(tables, k))
-    if valve["law"] == CURVE:
-        rho = tables.settings[0]["rho"]
-        return pump_step(tables, out, k, rho, g, m, drop)
-    if valve["law"] == LIFT and is_lifting(tables, k):
-        return lifting_step(tables, out, k, flow_at_drop(g, transition_of(valve, g), drop), g, m, wide)
-    if valve["law"] == TWO_WAY and drop < 0.0:
-        g *= valve["back"]
-    return valve_step(g, transition_of(valve, g), m, drop)
+    if valve["hooks"] >= 0:
+        return call_step(tables.hooks[valve["hooks"], STEP], out, tables, k, g, m, drop, denser, wide)
+    return root_step(tables, k, g, m, drop, denser)
 
 
 @njit
-def pump_step(tables, out, k, rho, g, m, drop):
-    """The same of a pump whose fluid has the density rho [kg/m3]."""
-    at, speed = tables.valves[k]["data"], out[tables.layout[0]["drive"] + k]
-    return curve_step(tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop)
+def root_step(tables, k, g, m, drop, denser):
+    """The same by the root, M |M| = G dp."""
+    valve, g = tables.valves[k], g * denser
+    if drop < 0.0:
+        g *= valve["back"]
+    transition = transition_of(valve, g)
+    if transition > 0.0 or tables.settings[0]["law"] == LAW_LINEAR:
+        return valve_step(g, transition, m, drop)
+    target = g * drop
+    chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(g))
+    upstream = valve["from_node"] if target >= 0.0 else valve["to_node"]
+    if inner_row(tables.nodes, upstream) >= 0:  # whose density grows with its pressure
+        g += abs(target) / tables.settings[0]["beta"]
+    return (target - abs(m) * m) / chord, g / chord
 
 
 @njit
@@ -76,84 +82,51 @@ def head_drop(tables, out, k):
 def restriction_slope(tables, out, k, drop):
     """d flow / d drop of restriction k at a drop [kg/s/Pa]."""
     valve, g = tables.valves[k], conductance(tables, out, k)
-    if valve["law"] == POWER:
-        return emitter_slope(tables.floats, valve["data"], g, drop, rule_of(tables, k))
-    if valve["law"] == CURVE:
-        m = out[tables.layout[0]["valve"] + k]
-        return pump_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
-    if valve["law"] == LIFT and is_lifting(tables, k):
-        x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, transition_of(valve, g), drop)
-        return x * flow_slope(g, transition_of(valve, g), drop) + max(full, 0.0) * lift_rise(tables, k)
-    if valve["law"] == TWO_WAY and drop < 0.0:
+    if valve["hooks"] >= 0:
+        return call_slope(tables.hooks[valve["hooks"], SLOPE], out, tables, k, g, drop)
+    return root_slope(tables, k, g, drop)
+
+
+@njit
+def root_slope(tables, k, g, drop):
+    """The same by the root."""
+    valve = tables.valves[k]
+    if drop < 0.0:
         g *= valve["back"]
     return flow_slope(g, transition_of(valve, g), drop)
 
 
 @njit
-def is_lifting(tables, k):
-    """Whether a valve that the pressure before it lifts is between shut and fully open."""
-    armed, at = tables.armed, tables.devices[tables.valves[k]["device"]]["event"]
-    return armed[at] == 0.0 and armed[at + 2] == 0.0
-
-
-@njit
-def pressure_lift(tables, out, k):
-    """Lift x of such a valve, linear in the pressure before it and not held between 0 and 1."""
-    floats, valve = tables.floats, tables.valves[k]
-    change = out[tables.layout[0]["pressure"] + valve["from_node"]]
-    return floats[valve["data"]] + change / floats[valve["data"] + 1]
-
-
-@njit
-def lift_rise(tables, k):
-    """Lift of such a valve over the pressure before it [1/Pa]."""
-    return 1.0 / tables.floats[tables.valves[k]["data"] + 1]
-
-
-@njit
-def lift_of(tables, out, k, full, wide):
-    """Lift that counts in the nodes; `full` is the flow at full opening [kg/s].
-
-    Flow that comes back raises the pressure that lifts, so a lift is held between 0 and 1, and there may be two: the
-    greater one is stable. Newton comes to it from above, from where all of these are `wide` open.
-    """
-    x = pressure_lift(tables, out, k)
-    if full >= 0.0:
-        return x
-    return 1.0 if wide else min(max(x, 0.0), 1.0)
-
-
-@njit
-def lifting_step(tables, out, k, full, g, m, wide):
-    """a, s of the flow x `full` of a lifting valve: of the root the chord as in `valve_step`, backwards its slope."""
-    x, transition = lift_of(tables, out, k, full, wide), transition_of(tables.valves[k], g)
-    if x <= 0.0:
-        return x * full - m, 0.0
-    near = x * abs(full) if full < 0.0 and not wide else abs(m)
-    s = x * x * g / max(x * abs(full) + near, x * LEAST * sqrt(g))
-    if transition > 0.0:
-        s = min(s, 45.0 / 32.0 * x * g / transition)
-    return x * full - m, s
-
-
-@njit
-def lifting_slope(tables, out, k, full, wide):
-    """What the pressure before a lifting valve adds to its flow by its lift [kg/s/Pa]; backwards it takes."""
-    if full < 0.0 and (wide or not 0.0 < pressure_lift(tables, out, k) < 1.0):
-        return 0.0
-    return full * lift_rise(tables, k)
-
-
-@njit
-def restriction_lift(tables, out, k, g, drop, wide):
-    """The same of restriction k at a drop; none of other laws. A Newton step adds it times the change before it."""
+def lifts(tables, k):
+    """Whether the pressure before restriction k lifts it: its law has a hook for that, its device no flag against it."""
     valve = tables.valves[k]
-    if valve["law"] != LIFT or not is_lifting(tables, k):
+    if valve["hooks"] < 0 or tables.hooks[valve["hooks"], LIFT] == 0:
+        return False
+    at = tables.devices[valve["device"]]["event"]
+    return tables.armed[at] == 0.0 and tables.armed[at + 2] == 0.0
+
+
+@njit
+def restriction_lift(tables, out, k, g, drop, denser, wide):
+    """What the pressure before restriction k adds to its flow, beside the drop [kg/s/Pa]; 0 where it lifts nothing."""
+    if not lifts(tables, k):
         return 0.0
-    return lifting_slope(tables, out, k, flow_at_drop(g, transition_of(valve, g), drop), wide)
+    return call_lift(tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide)
 
 
 @njit
 def runs_back(tables, k, m):
-    """Whether restriction k is such a valve and carries its flow m backwards."""
-    return m < 0.0 and tables.valves[k]["law"] == LIFT and is_lifting(tables, k)
+    """Whether the pressure before restriction k lifts it and it carries its flow m backwards."""
+    return m < 0.0 and lifts(tables, k)
+
+
+@njit
+def restriction_events(t, y, out, handle, g):
+    """Event functions of restrictions whose laws have bends, from closed nodes; what is outside lies on their level."""
+    tables = open_tables(handle)
+    nodes, valves, pressure = tables.nodes, tables.valves, tables.layout[0]["pressure"]
+    for k in range(valves.size):
+        i, j = valves[k]["from_node"], valves[k]["to_node"]
+        if valves[k]["hooks"] >= 0 and tables.hooks[valves[k]["hooks"], BENDS] != 0:
+            drop = nodes[i]["pressure"] - nodes[j]["pressure"] + (out[pressure + i] - out[pressure + j])
+            call_bends(tables.hooks[valves[k]["hooks"], BENDS], tables, k, drop, g)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from fvsolve.parts.node import Node
-from fvsolve.parts.outlet import out_of
+from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Number, Quantity, between
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.parts.link import Link
-from fvsolve.parts.outlet import out_of
+from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Number, Text, Usual, between, positive
 

@@ -8,13 +8,24 @@ torque is n^2 P(q / n) / rated speed with P the shaft's power at rated speed, or
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.curves import COUNT, LAST, LAW, OWN, SCALE, SUTER, curve_head, piecewise, suter_value
 from fvsolve.kernels.devices import PASSING
 from fvsolve.kernels.either import either
 from fvsolve.kernels.records import RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.parts.check_valve.law import RELUCTANCE
+from fvsolve.parts.pump.law_curve import (
+    COUNT,
+    LAST,
+    LAW,
+    OWN,
+    SCALE,
+    SUTER,
+    curve_head,
+    curve_step,
+    piecewise,
+    suter_value,
+)
 
 # Numbers of a pump: how its speed comes about, whether it has a check valve, the schedule of its trip, the relative
 # speed from which the shaft then runs free, J times rated speed [N m s], torque that is not balanced at the start and
@@ -207,3 +218,24 @@ def outside(out, tables, device):
         return 0
     down = floats[device["data"] + CHECK] > 0.0 and n < begun and 0.0 < q <= begun * last
     return PASSING if down else 1
+
+
+@njit
+def step(out, tables, k, g, m, drop, denser, wide):
+    """a, s by its curve, which asks for the drop of heads at the density before it."""
+    rho, fall = head_drop(tables, out, k)
+    return pump_step(tables, out, k, rho, g, m, fall)
+
+
+@njit
+def slope(out, tables, k, g, drop):
+    """d flow / d drop [kg/s/Pa]; none behind its shut check valve."""
+    m = out[tables.layout[0]["valve"] + k]
+    return pump_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
+
+
+@njit
+def pump_step(tables, out, k, rho, g, m, drop):
+    """`curve_step` of a pump whose fluid has the density rho [kg/m3], at the speed that it has."""
+    at, speed = tables.valves[k]["data"], out[tables.layout[0]["drive"] + k]
+    return curve_step(tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop)

@@ -38,18 +38,6 @@ def bent(floats, at, drop, rule):
 
 
 @njit
-def emitter_events(tables, k, drop, g):
-    """g: until restriction k shuts, or opens; until it gives all that is asked, or less [Pa]."""
-    valve, floats, armed = tables.valves[k], tables.floats, tables.armed
-    at, event = valve["data"], valve["event"]
-    above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
-    if most < NO_END:
-        missing = span * (most ** (1.0 / floats[at]) + (-NEAR if armed[event + 2] > 0.0 else NEAR)) - above
-    either(tables, g, event, above - SLIGHT if armed[event] > 0.0 else above + SLIGHT)
-    either(tables, g, event + 2, missing)
-
-
-@njit
 def emitter_flow(floats, at, g, drop, rule):
     """Mass flow [kg/s] at a drop [Pa]; g : conductance now, (flow at x = 1)^2 / span [kg2/s2/Pa]."""
     n, span = floats[at], floats[at + 2]
@@ -104,3 +92,27 @@ def emitter_step(floats, at, g, m, drop, rule):
     if near or (drop - floats[at + 1] < LEAST_DROP and asked - floats[at + 1] < LEAST_DROP):
         return target - m, emitter_slope(floats, at, g, drop, rule)
     return target - m, max(0.0, (target - m) / (drop - asked))
+
+
+@njit
+def bends(tables, k, drop, g):
+    """g: until it shuts, or opens; until it gives all that is asked, or less [Pa]."""
+    valve, floats, armed = tables.valves[k], tables.floats, tables.armed
+    at, event = valve["data"], valve["event"]
+    above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
+    if most < NO_END:
+        missing = span * (most ** (1.0 / floats[at]) + (-NEAR if armed[event + 2] > 0.0 else NEAR)) - above
+    either(tables, g, event, above - SLIGHT if armed[event] > 0.0 else above + SLIGHT)
+    either(tables, g, event + 2, missing)
+
+
+@njit
+def step(out, tables, k, g, m, drop, denser, wide):
+    """a, s under the rule that holds; it is its volume that follows the drop."""
+    return emitter_step(tables.floats, tables.valves[k]["data"], g * denser * denser, m, drop, rule_of(tables, k))
+
+
+@njit
+def slope(out, tables, k, g, drop):
+    """d flow / d drop [kg/s/Pa]."""
+    return emitter_slope(tables.floats, tables.valves[k]["data"], g, drop, rule_of(tables, k))
