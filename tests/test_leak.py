@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.kernels.emitters import FREE, LEAST_DROP, emitter_flow, emitter_slope
+from fvsolve.parts.outlet.law import FREE, LEAST_DROP, emitter_flow, emitter_slope
 from fvsolve.studies.energy.energy import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}

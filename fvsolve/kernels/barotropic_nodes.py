@@ -4,8 +4,6 @@ From what the cells say of a pipe end a simple wave leads to the end's own state
 h(p_node); but a jet into a tank, chamber or reservoir loses its v^2 / 2. Knows ends and nodes; knows no cells.
 """
 
-from math import sqrt
-
 import numpy as np
 
 from fvsolve.jit import njit
@@ -32,7 +30,6 @@ from fvsolve.kernels.density import (
     pressure_of_mass,
     velocity_change,
 )
-from fvsolve.kernels.emitters import FREE, emitter_flow, emitter_step, rule_of
 from fvsolve.kernels.ends import end_value
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.isolated import find_held, inner_row
@@ -40,21 +37,17 @@ from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import (
     CHAMBER,
     CLUSTER,
-    CURVE,
     FIXED,
     JUNCTION,
-    LIFT,
     NO_SOLUTION,
-    POWER,
     STATUS,
     TANK,
-    TWO_WAY,
     WHERE,
 )
-from fvsolve.kernels.restrictions import conductance, head_drop, is_lifting, lifting_slope, lifting_step, pump_step
+from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step
 from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
-from fvsolve.kernels.valves import LEAST, flow_at_drop, transition_of
+from fvsolve.kernels.valves import flow_at_drop, transition_of
 
 
 @njit
@@ -216,8 +209,9 @@ def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matri
         i, j = inner_row(nodes, valves[which]["from_node"]), inner_row(nodes, valves[which]["to_node"])
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if g[e] > 0.0:
-            a[e], s[e] = valve_move(tables, out, which, g[e], m[e], wide)
-            lift[e] = valve_lift(tables, out, which, g[e], wide)
+            drop, denser = valve_drive(tables, out, which)
+            a[e], s[e] = restriction_step(tables, out, which, g[e], m[e], drop, denser, wide)
+            lift[e] = restriction_lift(tables, out, which, g[e], drop, denser, wide)
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for r in range(n):
         if held[r] == 0.0:
@@ -226,7 +220,7 @@ def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matri
 
 @njit
 def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
-    """One Newton step of a cluster; returns its greatest change, relative. wide: as of `lift_of`."""
+    """One Newton step of a cluster; returns its greatest change, relative. wide: as of `restriction_step`."""
     n, k = c.size, g.size
     matrix, right = work[: n * n], work[n * n : n * n + n]
     at = n * n + n
@@ -301,7 +295,7 @@ def node_space(tables):
 
 @njit
 def cluster_space(tables):
-    """How far each cluster is: (whether it is done, its last change and the one before it, wide: as of `lift_of`)."""
+    """How far each cluster is: (whether it is done, its last change and the one before it, wide)."""
     n, v, many = tables.nodes.size, tables.valves.size, tables.clusters.size
     work = tables.scratch[4 * n + 2 * v :]
     return work[:many], work[many : 2 * many], work[2 * many : 3 * many], work[3 * many : 4 * many]

@@ -11,6 +11,7 @@ import os
 
 import numpy as np
 
+from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit, once
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import table_types
@@ -71,6 +72,15 @@ def addressed(function, letters: str):
     compile_as(function.within, letters)
     (compiled,) = function.within.overloads.values()
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
+
+def hook_of(law, name: str):
+    """The function of a law at a hook, None where it has none; FvsolveError where it takes other arguments."""
+    function, wanted = getattr(law, name, None), len(HOOKS[name][0])
+    if function is None or function.__code__.co_argcount == wanted:
+        return function
+    said = f"{law.__name__}.{name} takes {function.__code__.co_argcount} arguments"
+    raise FvsolveError(f"{said}; wanted {wanted}, as kernels.calls.HOOKS says, or another name")
 
 
 def empty_calls(rows: int, columns: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.isolated import check_unserved, find_held, float_shut, inner_row
-from fvsolve.kernels.records import NO_SOLUTION, NOT_CONVERGED, STATUS, TWO_WAY, WHERE
+from fvsolve.kernels.records import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step, runs_back
 
 BAR = 1e5
@@ -110,7 +110,7 @@ def put_valve(i, j, m, a, s, lift, n, matrix, right):
 
 @njit
 def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wide):
-    """Linear system for the change of the pressures, with the valves' changes put in; wide: as of `lift_of`."""
+    """Linear system for the change of the pressures, with the valves' changes put in."""
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
     for i in range(matrix.size):
@@ -126,8 +126,8 @@ def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wid
         if g[e] > 0.0:
             drop = out[layout["pressure"] + valve["from_node"]] - out[layout["pressure"] + valve["to_node"]]
             k = integers[cluster["first_valve"] + e]
-            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop, wide)
-            lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop, wide)
+            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop, 1.0, wide)
+            lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop, 1.0, wide)
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for i in range(n):
         if held[i] == 0.0:
@@ -173,7 +173,7 @@ def prepare(cluster, tables, out, g, m):
         k = integers[cluster["first_valve"] + e]
         valve = valves[k]
         g[e], m[e] = conductance(tables, out, k), valve["flow"]
-        if valve["law"] <= TWO_WAY and 0.0 < g[e] < valve["open"]:
+        if valve["hooks"] < 0 and 0.0 < g[e] < valve["open"]:
             m[e] *= sqrt(g[e] / valve["open"])  # at the profile's drop: all but shut, its flow would ask for any
         quiet = quiet and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):

@@ -14,7 +14,9 @@ from fvsolve.kernels.calls import (
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import DEVICE_VALUE
 
-SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(len(HOOKS))  # columns of `hooks`
+SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(
+    len(HOOKS)
+)  # columns of `hooks`
 PASSING = 2  # of a law's `outside`: to be known, but it passes with the shutting of a check valve
 ROWS = 3  # of `power` a device
 

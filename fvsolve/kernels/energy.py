@@ -77,11 +77,11 @@ def gauge(tables, out, i):
 @njit(forceinline=True)
 def potential(tables, out, i):
     """P = p - p_ambient + rho g z of node i [Pa]."""
-    return gauge(tables, out, i) + lift(tables.settings[0], tables.nodes[i])
+    return gauge(tables, out, i) + height_pressure(tables.settings[0], tables.nodes[i])
 
 
 @njit(forceinline=True)
-def lift(st, node):
+def height_pressure(st, node):
     """rho g z of a node [Pa]."""
     return st["rho"] * st["gravity"] * (node["elevation"] - st["datum"])
 
@@ -136,7 +136,7 @@ def power_linear(t, y, dydt, out, handle, power):
         pipe = pipes[k]
         n, o, end = pipe["cells"], pipe["y"], layout["ends"] + 4 * k
         first = nodes[pipe["from_node"]]
-        start = (first["pressure"] - st["ambient"]) + lift(st, first)
+        start = (first["pressure"] - st["ambient"]) + height_pressure(st, first)
         into = potential(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
         into -= potential(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
         power[at] = into * per
@@ -219,7 +219,7 @@ def power_pistons(y, dydt, out, tables, power, at):
             p = (nodes[i]["pressure"] - st["ambient"]) + change
             excess, swept = dydt[nodes[i]["y"]], area * speed
             own = p * swept * (0.5 * p / st["beta"] - change / st["beta"])
-            power[NODE * i + 1] = per * (p * excess + lift(st, nodes[i]) * (excess + sweep * speed)) + own
+            power[NODE * i + 1] = per * (p * excess + height_pressure(st, nodes[i]) * (excess + sweep * speed)) + own
             law += (per * p * sweep * speed - p * swept) - own
         power[at] = drop * piston["leakage"] * (gauge(tables, out, a) - gauge(tables, out, b))
         power[at + 1], power[at + 2] = piston["damping"] * speed * speed, law
@@ -237,7 +237,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
         stored[i] = 0.0
         if node["kind"] == CHAMBER:
             change, p0 = out[layout["pressure"] + i], node["pressure"] - st["ambient"]
-            stored[i] = per * y[node["y"]] * (p0 + 0.5 * change + lift(st, node))
+            stored[i] = per * y[node["y"]] * (p0 + 0.5 * change + height_pressure(st, node))
         elif node["kind"] == TANK:
             stored[i] = tank_energy(st, tables.floats, node, st["rho"], y[node["y"]])
     for k in range(pistons.size):
@@ -247,13 +247,13 @@ def stored_linear(t, y, dydt, out, handle, stored):
             i, area, sweep = moving_side(tables, piston, side)
             change, p0 = out[layout["pressure"] + i], nodes[i]["pressure"] - st["ambient"]
             squeezed = nodes[i]["volume"] * change * (2.0 * p0 + change) + area * x * (p0 + change) * (p0 + change)
-            height = per * lift(st, nodes[i]) * (y[nodes[i]["y"]] + sweep * x)
+            height = per * height_pressure(st, nodes[i]) * (y[nodes[i]["y"]] + sweep * x)
             stored[i] = 0.5 * squeezed / st["beta"] + height
     at = nodes.size
     for k in range(pipes.size):
         pipe = pipes[k]
         n, o, first = pipe["cells"], pipe["y"], nodes[pipe["from_node"]]
-        start = (first["pressure"] - st["ambient"]) + lift(st, first)
+        start = (first["pressure"] - st["ambient"]) + height_pressure(st, first)
         pipe_energy(st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2])
         at += 2
     for k in range(columns.size):

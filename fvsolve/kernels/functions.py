@@ -8,25 +8,26 @@ from fvsolve.kernels.phases import CLOSING, PHASES, Cast
 
 READERS = "from fvsolve.kernels.functions import Cast, compile_readers; "
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
-READING, ENERGIES = ("value", "outside", "events"), ("power", "stored")
+MOVING, READING = ("set", "move", "step", "slope", "lift"), ("value", "outside", "events", "bends")
+ENERGIES = ("power", "stored")
 MARCH = "from fvsolve.steppers.march import compiled; compiled()"
 
 
 class Functions:
     """Compiled functions of a scene: `rhs`, `observe`, `record`, `events`, and `energies` once they are asked for.
 
-    calls : int64[jobs, n]  addresses of pieces; hooks : int64[laws, hooks]  of functions of devices' laws; both stand
+    calls : int64[jobs, n]  addresses of pieces; hooks : int64[laws, hooks]  of functions of parts' laws; both stand
     behind the handle of a model
     """
 
     def __init__(self, cast: Cast) -> None:
         self.cast, rates = cast, cast.functions(*PHASES)
         self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
-        self.hooks = calls.empty_calls(len(cast.devices), len(calls.HOOKS))
-        others = "" if all(name.startswith("fvsolve.") for name in cast.devices) else "import fvsolve.parts; "
+        self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
+        others = "" if all(name.startswith("fvsolve.") for name in cast.laws) else "import fvsolve.parts; "
         with beside(f"{others}{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
-            self.hang("set", "move", *["lead"] * cast.columns)
+            self.hang(*MOVING, *["lead"] * cast.columns)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))
         self.observe = self.all(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, cast.functions("record"))
@@ -40,9 +41,9 @@ class Functions:
 
     def hang(self, *hooks: str) -> None:
         """Note the addresses of these hooks of all laws."""
-        for row, law in zip(self.hooks, self.cast.laws(), strict=True):
+        for row, law in zip(self.hooks, self.cast.modules(), strict=True):
             for hook in hooks:
-                if (function := getattr(law, hook, None)) is not None:
+                if (function := calls.hook_of(law, hook)) is not None:
                     row[HOOK[hook]] = calls.addressed(function, calls.HOOKS[hook][0])
 
     def all(self, job: int, functions: list, in_turn):
@@ -66,9 +67,9 @@ def compile_readers(cast: Cast) -> tuple:
     """(record, events) of a scene, compiled with all that they call."""
     for function in cast.functions("observe", "record", "events"):
         calls.addressed(function, calls.READS)
-    for law in cast.laws():
+    for law in cast.modules():
         for hook in READING:
-            if (function := getattr(law, hook, None)) is not None:
+            if (function := calls.hook_of(law, hook)) is not None:
                 calls.addressed(function, calls.HOOKS[hook][0])
     calls.compile_as(calls.record_in_turn, calls.READS.lower())
     calls.compile_as(calls.events_in_turn, "tvhv")

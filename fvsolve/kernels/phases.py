@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from importlib import import_module
 
+from fvsolve.kernels.calls import hook_of
 from fvsolve.kernels.records import (
     ACOUSTIC_GRID,
     CARRIED_FACES,
@@ -84,7 +85,7 @@ COLUMNS = {"inflow": "columns: column_inflows", "brake": "columns: quickest_colu
 MEMBERS = {
     "pipes": Pieces(record="observer: record_pipes"),
     "valves": Pieces(brake="network: quickest_valve"),
-    "outlets": Pieces(events="outlets: outlet_events"),
+    "bends": Pieces(events="restrictions: restriction_events"),
     "closed": Pieces(events="calls: close_in_turn"),
     "clusters": Pieces(close="clusters: close_clusters"),
     "columns": Pieces(hold="columns: hold_columns", move="columns: column_rates", **COLUMNS),
@@ -148,9 +149,9 @@ class Cast:
     """What decides which functions a scene is made of.
 
     family : of kernels that the density law runs on, "linear", "barotropic" or "cavitating"; basins : codes of the
-    kinds that there are; devices : modules of their laws, as rows of `hooks` lie
+    kinds that there are; laws : modules of the laws of parts, as rows of `hooks` lie
     fifth : order of what carries scalars on grids; spread : whether any scalar does
-    alone : whether there is nothing but basins, and no link; outlets : whether leaks, or demands that follow pressure
+    alone : whether there is nothing but basins, and no link
     """
 
     family: str
@@ -159,14 +160,14 @@ class Cast:
     columns: bool = False
     bodies: bool = False
     memory: bool = False
-    devices: tuple[str, ...] = ()
+    devices: bool = False
+    laws: tuple[str, ...] = ()
     basins: tuple[int, ...] = ()
     scalars: bool = False
     fifth: bool = False
     spread: bool = False
     valves: bool = False
     alone: bool = False
-    outlets: bool = False
 
     def members(self) -> Iterator[Pieces]:
         """Of what it consists, in the order in which pieces of one phase run."""
@@ -178,10 +179,11 @@ class Cast:
             yield PIPES[family]
         if self.valves:
             yield MEMBERS["valves"]
-        if self.devices or self.outlets:  # whose events are read off closed nodes
+        bends = any(hook_of(law, "bends") is not None for law in self.modules())
+        if self.devices or bends:  # whose events are read off closed nodes
             yield MEMBERS["closed"]
-        if self.outlets:
-            yield MEMBERS["outlets"]
+        if bends:
+            yield MEMBERS["bends"]
         if self.clusters and linear:
             yield MEMBERS["clusters"]
         if self.columns:
@@ -237,9 +239,9 @@ class Cast:
         if self.basins:
             yield CARRIED["all"]
 
-    def laws(self) -> list:
-        """The modules of the laws of its devices."""
-        return [import_module(name) for name in self.devices]
+    def modules(self) -> list:
+        """The laws of its parts."""
+        return [import_module(name) for name in self.laws]
 
     def functions(self, *jobs: str) -> list:
         """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""

@@ -98,11 +98,11 @@ def root_slope(tables, k, g, drop):
 
 @njit
 def lifts(tables, k):
-    """Whether the pressure before restriction k lifts it: its law has a hook for that, its device no flag against it."""
+    """Whether the pressure before restriction k lifts it, by its law: it is not shut (first flag) nor open (third)."""
     valve = tables.valves[k]
     if valve["hooks"] < 0 or tables.hooks[valve["hooks"], LIFT] == 0:
         return False
-    at = tables.devices[valve["device"]]["event"]
+    at = valve["event"]
     return tables.armed[at] == 0.0 and tables.armed[at + 2] == 0.0
 
 
@@ -130,3 +130,9 @@ def restriction_events(t, y, out, handle, g):
         if valves[k]["hooks"] >= 0 and tables.hooks[valves[k]["hooks"], BENDS] != 0:
             drop = nodes[i]["pressure"] - nodes[j]["pressure"] + (out[pressure + i] - out[pressure + j])
             call_bends(tables.hooks[valves[k]["hooks"], BENDS], tables, k, drop, g)
+
+
+@njit
+def step_at(hook, out, handle, k, g, m, drop, denser):
+    """`restriction_step` of restriction k by the step of its law, as Python asks."""
+    return call_step(hook, out, open_tables(handle), k, g, m, drop, denser, False)

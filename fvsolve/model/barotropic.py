@@ -8,9 +8,8 @@ import numpy as np
 
 from fvsolve.kernels import density as kernels
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.barotropic_nodes import drive, end_flow, target_under
+from fvsolve.kernels.barotropic_nodes import drive, end_flow, valve_target
 from fvsolve.kernels.density.profile import profile_along
-from fvsolve.kernels.emitters import FREE
 from fvsolve.model.start import PRESSURE_SCALE, Start
 
 
@@ -183,20 +182,20 @@ class BarotropicStart(Start):
             small = 1e-10 * (PRESSURE_SCALE + abs(change)) + abs(row["base"] - change)
             row["offset"] = offset if abs(offset) > small else 0.0
 
-    def law_of(self, k: int) -> tuple[float, float]:
+    def drive_of(self, k: int) -> tuple[float, float]:
         i, j = int(self.valves[k]["from_node"]), int(self.valves[k]["to_node"])
         p, z = self.nodes["pressure"], self.nodes["elevation"]
         drop, rho = drive(self.st, self.floats, p[i], z[i], p[j], z[j])
-        return float(self.valves[k]["conductance"]) * rho / self.rho, drop
+        return drop, rho / self.rho
 
     def fill_valves(self) -> None:
-        out = np.zeros(int(self.draft.tables.layout[0]["size"]))
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
-            if row["open"] > 0.0 and row["law"] < rec.CURVE:
-                target = target_under(FREE, self.draft.tables, out, k, float(row["open"]))[0]
-                follows = row["transition"] > 0.0 or row["law"] == rec.POWER
-                asked = target if follows else np.sign(target) * np.sqrt(abs(target))
+            if row["hooks"] >= 0:
+                self.lowered(k).follow(self, k)
+            elif row["open"] > 0.0:
+                target = valve_target(self.draft.tables, self.out, k, float(row["open"]))[0]
+                asked = target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
                 if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                     row["open"] = 0.0

@@ -8,14 +8,15 @@ import numpy as np
 
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, Fault, FvsolveError, Notice
-from fvsolve.kernels import emitters, limits
+from fvsolve.kernels import calls, limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.device import Device, device_of, lower_devices
+from fvsolve.model.device import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
+from fvsolve.model.lowering import Lowering, lowering_of
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
@@ -31,7 +32,7 @@ from fvsolve.schemes import quicker
 
 KINDS = ("pipe", "rigid-column", "valve", "spool-valve", "device")  # of links that carry the fluid
 
-ALIKE = dict.fromkeys(("orifice", "connection", "outlet"), "valve")
+ALIKE = dict.fromkeys(("orifice", "connection"), "valve")
 
 
 def build(case) -> Model:
@@ -65,6 +66,7 @@ class Draft:
         self.faults: list[Fault] = []
         self.warnings: list[Notice] = [*case.notes]
         self.size = self.tanks = self.cells = 0
+        self.laws: list[str] = []  # modules of compiled laws, as rows of `hooks` lie
         self.events: list[tuple[str, str]] = []  # (what, what it means); of those that mean nothing to a reader ""
         self.state_names: list[str] = []
         self.scale: list[float] = []
@@ -104,6 +106,18 @@ class Draft:
         """Numbers that basins have taken so far."""
         return self.plane_size + self.work_size + len(self.integers)
 
+    def flags(self, name: str, events: tuple[str, ...]) -> int:
+        """Offset in `armed` of new flags, one an event function of a part."""
+        found = limits.EVENTS * self.tanks + len(self.events)
+        self.events += [(name.removesuffix(".inside"), text) for text in events]
+        return found
+
+    def hooks(self, lowering: Lowering) -> int:
+        """Row of `hooks` of the functions of a law."""
+        law = lowering.law.__name__
+        self.laws += [] if law in self.laws else [law]
+        return self.laws.index(law)
+
     @property
     def device_names(self) -> list[str]:
         """Parts that are devices, as their table has them."""
@@ -123,7 +137,7 @@ class Draft:
         for i, (name, node) in enumerate(self.case.places.items()):
             row = table[i]
             row["elevation"] = self.case.elevation(name)
-            device = device_of(type(node))
+            device = lowering_of(type(node))
             if device is None:
                 getattr(self, "node_" + node.kind)(name, node, row)
             if name in self.moving_names or (device is not None and device.vessel):
@@ -193,7 +207,8 @@ class Draft:
     def links(self) -> None:
         by_kind: dict[str, list] = {}
         for name, link in self.case.conduits.items():
-            kind = "device" if device_of(type(link)) else ALIKE.get(link.kind, link.kind)
+            own = lowering_of(type(link))
+            kind = ALIKE.get(link.kind, link.kind) if own is None else "device" if own.acts else "valve"
             by_kind.setdefault(kind, []).append((name, link))
         pipes, columns, valves, spools, devices = (by_kind.get(kind, []) for kind in KINDS)
         self.pipe_names = [name for name, _ in pipes]
@@ -203,7 +218,8 @@ class Draft:
         self.pipe_table = np.zeros(len(self.pipe_names), rec.PIPE)
         self.column_table = np.zeros(len(self.column_names), rec.COLUMN)
         self.valve_table = np.zeros(len(self.valve_names), rec.VALVE)
-        self.valve_table["device"], self.valve_table["back"] = -1, 1.0
+        self.valve_table["device"] = self.valve_table["hooks"] = -1
+        self.valve_table["back"] = 1.0
         self.meshes: list[PipeMesh] = []
         for k, (name, link) in enumerate(pipes):
             self.pipe(name, link, self.pipe_table[k])
@@ -214,9 +230,7 @@ class Draft:
         for k, (name, link) in enumerate(spools):
             self.spool(name, link, self.valve_table[len(valves) + len(EDGES) * k :])
         for (name, link), row in zip(devices, self.valve_table[len(self.valve_table) - len(devices) :], strict=True):
-            self.ends(link, row)
-            row["schedule"] = -1
-            device_of(type(link)).restriction(self, name, link, row)
+            self.lower(name, link, row)
         lower_devices(self)
         for row in self.pipe_table:
             self.node_table["admittance"][row["from_node"]] += row["admittance"]
@@ -258,9 +272,11 @@ class Draft:
         row["y"] = self.states([f"{name}.flow"], 0.1 * self.fluid.density * row["area"])
 
     def valve(self, name, link, row) -> None:
+        if lowering_of(type(link)) is not None:
+            return self.lower(name, link, row)
         self.ends(link, row)
-        if link.kind in ("connection", "outlet"):
-            return getattr(self, link.kind)(name, link, row)
+        if link.kind == "connection":
+            return self.connection(name, link, row)
         row["schedule"] = self.schedules.add(link.opening)
         self.restriction(name, link, row)
         if link.characteristic == "equal-percentage":
@@ -273,19 +289,19 @@ class Draft:
     def connection(self, name, link, row) -> None:
         """A throat with a loss each way."""
         row["schedule"], row["back"] = self.schedules.add(constant(1.0)), link.back
-        row["law"] = rec.ROOT if link.back == 1.0 else rec.TWO_WAY
         self.restriction(name, link, row)
 
-    def outlet(self, name, link, row) -> None:
-        """A way out to ambient, its flow a power of the drop."""
-        row["schedule"], row["law"] = self.schedules.add(link.opening, 1.0 / link.full), rec.POWER
-        row["data"] = len(self.floats)
-        least = 0.0 if link.least is None else link.least - self.case.ambient_pressure
-        span = 1e5 if link.upper is None else link.upper - self.case.ambient_pressure - least
-        row["conductance"] = (self.fluid.density * link.flow) ** 2 / span
-        self.floats += [link.exponent, least, span, link.most]
-        row["event"] = limits.EVENTS * self.tanks + len(self.events)
-        self.events += emitters.EVENTS * [(name, "")]
+    def lower(self, name, link, row) -> None:
+        """A restriction with a law of its own."""
+        found = lowering_of(type(link)).of(link)
+        self.ends(link, row)
+        row["schedule"] = -1
+        found.restriction(self, name, link, row)
+        if calls.hook_of(found.law, "step") is not None:
+            row["hooks"] = self.hooks(found)
+        if not found.acts:
+            row["data"], row["event"] = len(self.floats), self.flags(name, found.events)
+            self.floats += found.numbers(self, name, link)
 
     def spool(self, name, link, rows) -> None:
         """Four valves; those of one side of zero share a schedule of their opening."""
@@ -403,7 +419,7 @@ class Draft:
             case, self.tables, self.shapes, self.state_names, np.array(self.scale), inside, self.schedules.spacing,
             self.meshes, list(case.places), list(case.links), self.valve_names, self.column_names, self.piston_names,
             self.body_names, {name: case.elevation(name) for name in case.places}, case.probes, self.warnings,
-            self.steady, self.profiles, self.devices, start, self.events,
+            self.steady, self.profiles, self.devices, self.laws, start, self.events,
             self.basins,
         )  # fmt: skip
 

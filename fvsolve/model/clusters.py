@@ -27,10 +27,10 @@ def sort_nodes(draft) -> None:
     integers = draft.integers = []
     clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
-    nodes["solve"] = rec.ALONE
+    nodes["solve"], even = rec.ALONE, is_root(valves)
     for root, ks in touched.items():
         soft = np.all(nodes["admittance"][members[root]] > 0.0)
-        plain = np.all(valves["law"][ks] == rec.ROOT)
+        plain = np.all(even[ks])
         single = len(ks) == 1 and soft and plain and draft.case.law.linear
         nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
         valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
@@ -41,7 +41,7 @@ def sort_nodes(draft) -> None:
         nodes["row"][members[root]] = np.arange(len(members[root]))
         clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
         integers += members[root] + ks
-    for k in np.flatnonzero(known & (valves["law"] != rec.ROOT)):  # a cluster without nodes
+    for k in np.flatnonzero(known & ~even):  # a cluster without nodes
         valves["solve"][k] = rec.CLUSTER
         clusters.append((len(integers), 0, len(integers), 1))
         integers.append(int(k))
@@ -60,6 +60,11 @@ def sort_nodes(draft) -> None:
             name = list(draft.case.places)[i]
             draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+
+def is_root(valves) -> np.ndarray:
+    """Which of them are solved by a root that is the same both ways : bool[valves]."""
+    return (valves["hooks"] < 0) & (valves["back"] == 1.0)
 
 
 def gates(draft) -> None:
@@ -105,7 +110,7 @@ def asks_nothing(draft, i: int) -> bool:
 def carries_its_column(draft, members, ks) -> bool:
     """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
     ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
-    plain = draft.valve_table["law"][ks[0]] == rec.ROOT
+    plain = is_root(draft.valve_table)[ks[0]]
     return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
 
 
@@ -121,7 +126,7 @@ def soften(draft, ks) -> None:
     places, unseen = list(draft.case.places.values()), unseen_drop(draft, ks)
     for k in ks:
         row = draft.valve_table[k]
-        if row["transition"] == 0.0 and row["law"] <= rec.TWO_WAY:
+        if row["transition"] == 0.0 and row["hooks"] < 0:
             link = draft.case.conduits[draft.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
             row["transition"] = draft.hydraulics.transition_flow(draft.valve_names[k], link, 10.0, draft.fault)

@@ -1,53 +1,33 @@
-"""How parts with a law of their own become rows of tables. Knows scenes while they are built; knows no rhs."""
+"""How parts that act by a law of their own become rows of tables. Knows drafts; knows no rhs."""
 
 from __future__ import annotations
 
-import functools
 import math
-from importlib import import_module
-from importlib.util import find_spec
-from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
 
-from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
+from fvsolve.model.lowering import Lowering, lowering_of
 
 
-class Device:
-    """Parts of one kind: their rows, their numbers, how they start, what their events mean.
+class Device(Lowering):
+    """Parts of one kind with a row among the devices: what they hold, how they stand in a steady state.
 
-    law : module of its compiled law, whose functions are named as `kernels.calls.HOOKS`; mode : what that knows it as
+    mode : what their law knows the row as; quantities : probes, in the order in which its `value` numbers them
     sudden : whether events alone open it; leads : which of its events lets it lead a rigid column, -1 for none
-    states : names of what each holds
-    quantities : probes, in the order in which `device_value` numbers them
-    events : what it means that each event function falls to zero; remedy : what to try where they go to and fro
+    states : names of what each holds; remedy : what to try where its events go to and fro
     """
 
-    kinds: ClassVar[dict[str, Device]] = {}
-    law: ClassVar[ModuleType]
+    acts = True
     mode: ClassVar[int] = 0
     sudden: ClassVar[bool] = False
     leads: ClassVar[int] = -1
     states: ClassVar[tuple[str, ...]] = ()
     quantities: ClassVar[tuple[str, ...]] = ()
-    events: ClassVar[tuple[str, ...]] = ()
     remedy: ClassVar[str] = "give it a time_constant"
     vessel: ClassVar[bool] = False  # a place whose pressure it computes
-
-    def __init_subclass__(cls, kind: str) -> None:
-        if kind:
-            Device.kinds[kind] = cls()
-
-    def of(self, part: Any) -> Device:
-        """What lowers this part: itself, but where its keys ask for other states."""
-        return self
-
-    def restriction(self, draft, name: str, link: Any, row) -> None:
-        """Fill the VALVE row of a link."""
-        draft.restriction(name, link, row)
 
     def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
@@ -55,10 +35,6 @@ class Device:
     def gate(self, name: str) -> str | None:
         """The link that a vessel opens and shuts beside."""
         return None
-
-    def numbers(self, draft, name: str, part: Any) -> list[float]:
-        """Its numbers, in the order in which its kernel reads them; those of the start come with `begin`."""
-        return []
 
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of what one holds."""
@@ -69,8 +45,11 @@ class Device:
         return []
 
     def edge(self, start, k: int):
-        """Its edge in the steady problem, k its VALVE row; None for that of a valve, open as `start.shut` has it."""
+        """As of `Lowering`; None unless it has one of its own."""
         return None
+
+    def follow(self, start, k: int) -> None:
+        """Nothing: `begin` sees to it."""
 
     def revise(self, start, part: Any, row) -> bool:
         """Whether a steady solution asks for another state of it, which is then set."""
@@ -80,18 +59,11 @@ class Device:
         """Fill in what depends on the profile; returns what moves, in words."""
         return []
 
-    def resists(self, part: Any) -> bool:
-        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
-        return True
-
     def settle(self, slate, row, y: np.ndarray, scale: np.ndarray) -> None:
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
-        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.
-
-        Of a vessel, m^2 dp/dm / (2 rho) of its mass; nothing of others.
-        """
+        """As of `Lowering`: of a vessel, m^2 dp/dm / (2 rho) of its mass; nothing of others."""
         if not self.vessel:
             return []
         node = model.tables.nodes[row["node"]]
@@ -104,19 +76,20 @@ class Device:
 
 
 def lower_devices(draft) -> None:
-    """Fill the table of devices of a scene, with their states, numbers and event functions."""
+    """Fill the table of devices of a draft, with their states, numbers and event functions."""
     parts = [*draft.case.places.items(), *draft.case.conduits.items()]
-    draft.devices = [(name, part, device.of(part)) for name, part in parts if (device := device_of(type(part)))]
+    lowered = [(name, part, found.of(part)) for name, part in parts if (found := lowering_of(type(part)))]
+    draft.devices = [(name, part, device) for name, part, device in lowered if device.acts]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
-    laws = list(laws_of(draft.devices))
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
-        row["hooks"], row["mode"], row["states"] = laws.index(device.law.__name__), device.mode, len(states)
-        row["sudden"] = device.sudden
+        row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
+        row["sudden"], row["event"] = device.sudden, draft.flags(name, device.events)
+        row["leads"] = row["event"] + device.leads if device.leads >= 0 else -1
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
-            draft.valve_table["device"][row["valve"]] = k
+            draft.valve_table["device"][row["valve"]], draft.valve_table["event"][row["valve"]] = k, row["event"]
         elif name in draft.node_index:
             row["node"] = draft.node_index[name]
             row["row"] = draft.node_table[row["node"]]["row"]
@@ -128,23 +101,6 @@ def lower_devices(draft) -> None:
         for state, scale in zip(states, device.scales(draft, name, part), strict=True):
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
-        row["event"] = limits.EVENTS * draft.tanks + len(draft.events)
-        row["leads"] = row["event"] + device.leads if device.leads >= 0 else -1
-        draft.events += [(name.removesuffix(".inside"), text) for text in device.events]
-
-
-def laws_of(devices: list[tuple]) -> tuple[str, ...]:
-    """The modules of the laws of devices, as rows of `hooks` lie."""
-    return tuple(dict.fromkeys(device.law.__name__ for _, _, device in devices))
-
-
-@functools.cache
-def device_of(part: type) -> Device | None:
-    """What lowers parts of a kind that have a law of their own: of the module `lower` beside theirs; None of others."""
-    home = part.__module__.rpartition(".")[0]
-    if find_spec(f"{home}.lower") is not None:
-        import_module(f"{home}.lower")
-    return Device.kinds.get(part.kind)
 
 
 def opening_of(start, k: int) -> float:

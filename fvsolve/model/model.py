@@ -125,6 +125,7 @@ class Model(Shown):
     steady: dict[str, Any]  # what the start looks like, for `check`
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
     devices: list[tuple]  # (name, part, what it is lowered by), as their table has them
+    laws: list[str]  # modules of compiled laws of parts, as rows of `hooks` lie
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
     basins: list[Basin]  # as their table has them
@@ -187,18 +188,16 @@ class Model(Shown):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.phases import Cast
-        from fvsolve.model.device import laws_of
 
-        devices, many = laws_of(self.devices), rec.Tables(*(len(table) > 0 for table in self.tables))
+        many = rec.Tables(*(len(table) > 0 for table in self.tables))
         there = [many.clusters, many.columns, many.bodies]
         basins = tuple(int(kind) for kind in np.unique(self.tables.basins["kind"]))
         spread, valves = bool(self.tables.scalars["diffusivity"].any()), many.valves
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
-        alone = bool(basins and patches) and not (self.cells or valves or devices or any(there))
-        outlets = bool((self.tables.valves["law"] == rec.POWER).any())
+        alone = bool(basins and patches) and not (self.cells or valves or many.devices or any(there))
         fifth = SCHEMES[self.case.numerics.scheme].on(True).order > 2
-        cast = Cast(self.case.law.family, self.cells > 0, *there, self.unsteady, devices, basins, many.scalars, fifth,
-                    spread, valves, alone, outlets)  # fmt: skip
+        cast = Cast(self.case.law.family, self.cells > 0, *there, self.unsteady, many.devices, tuple(self.laws),
+                    basins, many.scalars, fifth, spread, valves, alone)  # fmt: skip
         return functions(cast)
 
     @property

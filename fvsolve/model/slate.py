@@ -23,6 +23,12 @@ def lined(size: int) -> np.ndarray:
     return room[first : first + size]
 
 
+def wiped(shapes: rec.Written) -> rec.Written:
+    """What runs write, of these shapes, all zero."""
+    _, work, *others = shapes
+    return rec.Written(np.zeros(1, rec.CLOCK), lined(work), *map(np.zeros, others))
+
+
 class Slate:
     """Wiped at first, and new with each run; the model beside it is only read, by as many runs at once as there are.
 
@@ -32,8 +38,7 @@ class Slate:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model, (_, work, *shapes) = model, model.shapes
-        self.written = rec.Written(np.zeros(1, rec.CLOCK), lined(work), *map(np.zeros, shapes))
+        self.model, self.written = model, wiped(model.shapes)
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from functools import cached_property
 from random import Random
 from typing import Any
 
@@ -11,11 +12,13 @@ import numpy as np
 
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.emitters import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_step
 from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
+from fvsolve.kernels.handle import make_handle
 from fvsolve.kernels.schedules import value_until
 from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.bodies import start_bodies
+from fvsolve.model.lowering import lowering_of
+from fvsolve.model.slate import wiped
 from fvsolve.steady import Edge, solve_steady
 
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
@@ -50,6 +53,21 @@ class Start:
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.modes: dict[int, str] = {}  # as what those stand that regulate
+
+    @cached_property
+    def out(self) -> np.ndarray:
+        """What the rhs writes beside dydt, where nothing has moved."""
+        return np.zeros(int(self.draft.tables.layout[0]["size"]))
+
+    @cached_property
+    def slate(self) -> rec.Written:
+        """What runs write, where nothing has happened."""
+        return wiped(self.draft.shapes)
+
+    @cached_property
+    def handle(self) -> np.ndarray:
+        """The tables as compiled laws take them."""
+        return make_handle((*self.draft.tables, *self.slate))
 
     def pressure(self, i: int) -> float:
         """Pressure [Pa] at node i, as it was just found."""
@@ -185,15 +203,11 @@ class Start:
     def valve_edge(self, k: int) -> Edge:
         """A valve: M |M| = G dP, with the chord of the root as slope."""
         row = self.valves[k]
-        if row["device"] >= 0:
-            own = self.draft.devices[row["device"]][2].edge(self, k)
-            if own is not None:
-                return own
-        g = self.conductance(k)
-        if row["law"] == rec.POWER:
-            row["open"] = g
-            return self.outlet_edge(k, g)
-        back = float(row["back"])
+        lowered = self.lowered(k)
+        own = lowered.edge(self, k) if lowered is not None else None
+        if own is not None:
+            return own
+        g, back = self.conductance(k), float(row["back"])
         row["open"] = g
         g *= self.factor.get(k, 1.0)
         i, j = int(row["from_node"]), int(row["to_node"])
@@ -214,21 +228,11 @@ class Start:
 
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
 
-    def outlet_edge(self, k: int, g: float) -> Edge:
-        """A way out, M = f(drop), with its own chord as slope."""
-        row, floats, denser, wider = self.valves[k], self.draft.tables.floats, *self.dense_of.get(k, (1.0, 1.0))
-        i, j, at = int(row["from_node"]), int(row["to_node"]), int(row["data"])
-        if g <= 0.0:
-            return Edge(i, j, None, 0.0, shut=True)
-        if self.rest:
-            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        g, per = g * denser**2, math.sqrt(PRESSURE_SCALE / g)
-
-        def newton(flow, present):
-            a, s = emitter_step(floats, at, g, flow, present * wider, FREE)
-            return per, per * s * wider, per * a
-
-        return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
+    def lowered(self, k: int):
+        """What says how valve k stands, if not its schedule alone."""
+        if self.valves[k]["device"] >= 0:
+            return self.draft.devices[self.valves[k]["device"]][2]
+        return lowering_of(type(self.case.conduits[self.draft.valve_names[k]]))
 
     def conductance(self, k: int) -> float:
         """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""
@@ -368,16 +372,15 @@ class Start:
             row["offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
 
     def fill_valves(self) -> None:
-        for row, flow in zip(self.valves, self.valve_flow, strict=True):
+        for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
             row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
             if flow == 0.0 and abs(row["drop"]) <= SNAP * (
                 PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
             ):
                 row["drop"] = 0.0
-            if row["law"] == rec.POWER:
-                self.fill_outlet(row, flow)
-            if row["law"] >= rec.CURVE:
+            if row["hooks"] >= 0:
+                self.lowered(k).follow(self, k)
                 continue
             here = row["open"] * (row["back"] if row["drop"] < 0.0 else 1.0)
             law = flow_at_drop(here, transition_of(row, here), row["drop"])
@@ -385,17 +388,6 @@ class Start:
                 row["open"] = 0.0
             elif row["transition"] == 0.0 and row["open"] > 0.0:
                 row["drop"] = abs(flow) * flow / here
-
-    def fill_outlet(self, row, flow: float) -> None:
-        """The drop at which a way out carries its flow exactly; none where its flow does not obey its law."""
-        floats, at, g = self.draft.tables.floats, int(row["data"]), float(row["open"])
-        asked = emitter_flow(floats, at, g, float(row["drop"]), FREE)
-        if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
-            row["open"] = 0.0
-            return
-        bends = g > 0.0 and asked < math.sqrt(g * floats[at + 2]) * floats[at + 3]  # not yet all that is asked
-        if bends and row["drop"] - floats[at + 1] >= LEAST_DROP:
-            row["drop"] = emitter_drop(floats, at, g, flow, FREE)
 
     def begin_devices(self) -> None:
         """Let every device fill in what depends on the profile."""
@@ -406,9 +398,14 @@ class Start:
         """Error of what a device keeps as set that is rounding: of a pressure [Pa] at an end, else of a flow [kg/s]."""
         return 1e-6 * PRESSURE_SCALE if end else 1e-6 * self.flow_scale
 
+    def drive_of(self, k: int) -> tuple[float, float]:
+        """(the drop that drives valve k in the profile [Pa], density that it meets over that of reference)."""
+        return float(self.valves[k]["drop"]), 1.0
+
     def law_of(self, k: int) -> tuple[float, float]:
         """(conductance of valve k, whole, at the density that it meets, the drop that drives it) in the profile."""
-        return float(self.valves[k]["conductance"]), float(self.valves[k]["drop"])
+        drop, denser = self.drive_of(k)
+        return float(self.valves[k]["conductance"]) * denser, drop
 
     def report(self) -> dict[str, Any]:
         moving = start_bodies(self.draft, self) + self.moving

@@ -9,7 +9,7 @@ from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density, log_density, pressure_of_log
-from fvsolve.kernels.energy import lift
+from fvsolve.kernels.energy import height_pressure
 from fvsolve.kernels.energy_barotropic import vessel_energy, vessel_power
 from fvsolve.kernels.records import LAW_LINEAR
 
@@ -128,7 +128,7 @@ def accumulator_energy(st, floats, node, at, y):
         came, p = min(y - empty, 0.0), p0 + floats[at + SHED]
     if neck > 0.0:
         found += came * (p - st["ambient"] + 0.5 * neck * came) / st["rho"]
-    return found + lift(st, node) * y / st["rho"]
+    return found + height_pressure(st, node) * y / st["rho"]
 
 
 @njit

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import curves
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import value_until
 from fvsolve.model.device import Device
 from fvsolve.parts import Schedule
 from fvsolve.parts.pump import law
+from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point, shaft_points
 from fvsolve.steady import Edge
 
@@ -25,7 +25,7 @@ SNAP = 1e-12  # share of the torques on a shaft below which their sum is roundin
 
 
 class Pump(Device, kind="pump"):
-    """A restriction of law CURVE; its steady state is that in which no flow passes its check valve backwards."""
+    """A restriction that follows its curve; its steady state is that in which no flow passes its check valve back."""
 
     law = law
     quantities = ("head", "speed", "torque", "power")
@@ -41,7 +41,7 @@ class Pump(Device, kind="pump"):
     def restriction(self, draft, name, link, row) -> None:
         weight = draft.fluid.density * draft.case.gravity
         flow, head = rated_point(link, weight)
-        row["law"], row["data"] = rec.CURVE, len(draft.floats)
+        row["data"] = len(draft.floats)
         draft.floats += curve_numbers(link, weight)
         row["conductance"] = (draft.fluid.density * flow) ** 2 / (weight * head)
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fvsolve.kernels import curves
+from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.head_curve import Points, first_root
 from fvsolve.parts.pump.part import EFFICIENCY
 
@@ -15,7 +15,7 @@ HIGHEST, LOWEST = 1000.0, 0.1  # heads between which a pump of constant power ke
 
 
 def curve_numbers(part, weight: float) -> list[float]:
-    """Numbers of a pump's head curve, in the order that `kernels.curves` states; weight = rho g [N/m3]."""
+    """Numbers of a pump's head curve, in the order that `law_curve` states; weight = rho g [N/m3]."""
     if part.suter is not None:
         one = part.suter
         return [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
 from fvsolve.model.device import Device
 from fvsolve.parts.disc.law import RELIEF
 from fvsolve.parts.disc.lower import Lifting
@@ -58,10 +57,6 @@ class Relief(ReliefDisc, kind="relief-valve"):
 
     def of(self, part) -> Device:
         return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
-
-    def restriction(self, draft, name, link, row) -> None:
-        draft.restriction(name, link, row)
-        row["law"] = rec.ROOT if link.moves else rec.LIFT
 
     def numbers(self, draft, name, part) -> list[float]:
         draft.valve_table["data"][draft.valve_names.index(name)] = len(draft.floats)
