@@ -22,7 +22,7 @@ from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
 from fvsolve.parts.basin import Place
 from fvsolve.parts.meant import MEANT
-from fvsolve.parts.pipe import MOST_CELLS
+from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
 from fvsolve.parts.value import (

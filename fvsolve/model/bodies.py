@@ -7,46 +7,31 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import rows_in
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
 SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of bodies that no chamber holds, of bodies that nothing holds
-FAR = 1e300  # room before a stop that is not there
 SNAP = 1e-12  # share of the forces on a body below which their sum is rounding
 
 
 def lower_bodies(draft) -> None:
-    """Fill the tables of bodies, braces, stops and pistons of a scene."""
+    """Fill the tables of bodies, braces, stops and pistons of a model."""
     case = draft.case
     draft.body_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
-    of = {kind: [(name, link) for name, link in case.links.items() if link.kind == kind] for kind in KINDS}
-    braces = [pair for kind in ("spring", "damper", "force") for pair in of[kind]]
-    draft.brace_table = np.zeros(len(braces), rec.BRACE)
-    draft.stop_table = np.zeros(len(of["end-stop"]), rec.STOP)
-    draft.piston_table = np.zeros(len(of["cylinder"]), rec.PISTON)
-    draft.piston_names = [name for name, _ in of["cylinder"]]
-    draft.push_names = [name for name, _ in [*braces, *of["end-stop"], *of["cylinder"]]]
-    outside = any(link.from_ is None for _, link in of["force"])
+    outside = any(link.from_ is None for _, link, _ in rows_in(case, "brace"))
     draft.body_table = np.zeros(len(draft.body_names) + outside, rec.BODY)
     draft.body_index = {name: i for i, name in enumerate(draft.body_names)}
     draft.body_index |= {None: len(draft.body_names)}
     for name, row in zip(draft.body_names, draft.body_table, strict=False):
-        fill_body(case.nodes[name], row)
-    for (_, link), row in zip(braces, draft.brace_table, strict=True):
-        fill_brace(draft, link, row)
-    for (_, link), row in zip(of["end-stop"], draft.stop_table, strict=True):
-        fill_stop(draft, link, row)
-    for (name, link), row in zip(of["cylinder"], draft.piston_table, strict=True):
-        fill_piston(draft, name, link, row)
+        node = case.nodes[name]
+        row["position"] = node.initial_position
+        if (mass := getattr(node, "mass", None)) is not None:  # a frame stands still
+            row["velocity"], row["lightness"] = node.initial_velocity, 1.0 / mass
+    braces, draft.brace_table = draft.fill("brace", rec.BRACE)
+    stops, draft.stop_table = draft.fill("stop", rec.STOP)
+    draft.piston_names, draft.piston_table = draft.fill("piston", rec.PISTON)
+    draft.push_names = [*braces, *stops, *draft.piston_names]
     add_states(draft)
-
-
-KINDS = ("spring", "damper", "force", "end-stop", "cylinder")
-
-
-def fill_body(node, row) -> None:
-    row["position"] = node.initial_position
-    if node.kind == "mass":
-        row["velocity"], row["lightness"] = node.initial_velocity, 1.0 / node.mass
 
 
 def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str]) -> tuple[float, float]:
@@ -55,37 +40,6 @@ def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str]) -> 
         row[port] = draft.body_index[place]
     first, second = (draft.body_table[int(row[port])] for port in ports)
     return second["position"] - first["position"], second["velocity"] - first["velocity"]
-
-
-def fill_brace(draft, link, row) -> None:
-    x, speed = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
-    row["schedule"], row["speed"] = -1, speed
-    if link.kind == "spring":
-        row["stiffness"] = link.stiffness
-        row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
-    elif link.kind == "damper":
-        row["damping"], row["force"] = link.damping, -link.damping * speed
-    else:
-        row["schedule"] = draft.schedules.add(link.force)
-
-
-def fill_stop(draft, link, row) -> None:
-    from fvsolve.kernels.mechanics import contact  # scenes without bodies load none of it
-
-    x, speed = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
-    row["stiffness"], row["damping"] = link.stiffness, link.damping
-    row["below"] = FAR if link.least is None else x - link.least
-    row["above"] = FAR if link.greatest is None else link.greatest - x
-    for room, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
-        if room <= 0.0:
-            row["force"] += sign * contact(float(link.stiffness), float(link.damping), -room, float(-sign * speed))
-
-
-def fill_piston(draft, name: str, link, row) -> None:
-    row["position"], row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
-    row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
-    row["area_a"], row["area_b"] = link.areas()
-    row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction
 
 
 def add_states(draft) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, Fault, FvsolveError, Notice
-from fvsolve.kernels import calls, limits
+from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
@@ -16,7 +16,7 @@ from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.device import Device, lower_devices
 from fvsolve.model.hydraulics import Hydraulics
-from fvsolve.model.lowering import Lowering, lowering_of
+from fvsolve.model.lowering import Lowering, lowering_of, rows_in
 from fvsolve.model.model import Model, PipeMesh
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
@@ -25,14 +25,6 @@ from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.schemes import scheme_settings
 from fvsolve.model.slate import LINE, lined
-from fvsolve.model.unsteady import reserve
-from fvsolve.parts import EDGES
-from fvsolve.parts.schedule import constant
-from fvsolve.schemes import quicker
-
-KINDS = ("pipe", "rigid-column", "valve", "spool-valve", "device")  # of links that carry the fluid
-
-ALIKE = dict.fromkeys(("orifice", "connection"), "valve")
 
 
 def build(case) -> Model:
@@ -60,16 +52,16 @@ class Draft:
         self.floats: list[float] = []
         self.pieces_of_plane: list[np.ndarray] = []
         self.plane_size = self.work_size = 0
-        cylinders = [name for name, link in case.links.items() if link.kind == "cylinder"]
-        self.moving_names = {f"{name}.{place}" for name in cylinders for place in "AB"}
+        self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.faults: list[Fault] = []
         self.warnings: list[Notice] = [*case.notes]
-        self.size = self.tanks = self.cells = 0
+        self.size = self.tanks = self.cells = self.moving = 0
         self.laws: list[str] = []  # modules of compiled laws, as rows of `hooks` lie
         self.events: list[tuple[str, str]] = []  # (what, what it means); of those that mean nothing to a reader ""
         self.state_names: list[str] = []
         self.scale: list[float] = []
+        self.meshes: list[PipeMesh] = []
 
     def fault(self, place: str, message: str) -> None:
         self.faults.append(Fault(place, message))
@@ -127,191 +119,50 @@ class Draft:
         """What a device is lowered by."""
         return self.devices[self.device_names.index(name)][2]
 
-    # nodes ------------------------------------------------------------------------------------------------
+    # rows ---------------------------------------------------------------------------------------------------
 
     def nodes(self) -> None:
-        table = np.zeros(len(self.case.places), rec.NODE)
+        table = self.node_table = np.zeros(len(self.case.places), rec.NODE)
         table["y"] = table["shape"] = table["schedule"] = table["row"] = -1
         table["full"] = np.inf
-        moving, gas = 0, self.fluid.air is not None and self.fluid.air.fraction > 0.0
-        for i, (name, node) in enumerate(self.case.places.items()):
-            row = table[i]
+        for row, (name, node) in zip(table, self.case.places.items(), strict=True):
             row["elevation"] = self.case.elevation(name)
-            device = lowering_of(type(node))
-            if device is None:
-                getattr(self, "node_" + node.kind)(name, node, row)
-            if name in self.moving_names or (device is not None and device.vessel):
-                row["kind"], row["row"] = rec.MOVING if device is None else rec.VESSEL, moving
-                moving += 1
-            elif row["kind"] == rec.PATCH or (row["kind"] == rec.CHAMBER and gas):  # which softens it
-                row["row"], moving = moving, moving + 1
-            if device is not None:
-                device.place(self, name, node, row)
-        self.node_table, self.moving = table, moving
-
-    def node_reservoir(self, name, node, row) -> None:
-        row["kind"] = rec.FIXED
-        if node.head is not None:
-            row["schedule"] = self.hydraulics.add_head(self.schedules, node.head, row)
-        else:
-            row["schedule"] = self.schedules.add(node.pressure)
-
-    def node_outside(self, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.FIXED, self.schedules.add(constant(self.case.ambient_pressure))
-
-    def node_junction(self, name, node, row) -> None:
-        row["kind"] = rec.JUNCTION
-        row["schedule"] = self.schedules.add(node.demand, self.fluid.density)
-
-    def node_inflow(self, name, node, row) -> None:
-        row["kind"] = rec.JUNCTION
-        row["schedule"] = self.schedules.add(node.flow, -self.fluid.density)
-
-    def node_tank(self, name, node, row) -> None:
-        rho = self.case.law.open_density
-        row["kind"], row["level"], row["density"] = rec.TANK, node.level, rho
-        if hasattr(node.area, "area"):
-            level, area = node.area.level, node.area.area
-            volume = np.concatenate(([0.0], np.cumsum(np.diff(level) * 0.5 * (area[1:] + area[:-1]))))
-            row["shape"], row["shapes"] = len(self.floats), len(level)
-            if len(level) == 1:
-                row["shape"] = -1
-            else:
-                self.floats += [*level, *area, *volume]
-            row["area"] = area.min()
-            if len(level) == 1:
-                row["area"] = area[0]
-            contents = lambda z: shaped_volume(level, area, volume, z)  # noqa: E731
-        else:
-            row["area"] = node.area
-            contents = lambda z: node.area * z  # noqa: E731
-        row["mass"] = rho * contents(node.level)
-        if node.height is not None:
-            row["full"] = rho * contents(node.height)
-        row["stiffness"] = self.case.gravity / row["area"]
-        row["row"] = self.tanks
-        self.tanks += 1
-        row["y"] = self.states([f"{name}.mass"], 0.1 * rho * row["area"])
-
-    def node_patch(self, name, node, row) -> None:
-        row["kind"] = rec.PATCH
-
-    def node_chamber(self, name, node, row) -> None:
-        row["kind"], row["volume"] = rec.CHAMBER, node.volume
-        row["stiffness"] = self.fluid.bulk_modulus / (self.fluid.density * node.volume)
-        stored = "excess" if name in self.moving_names else "mass"
-        row["y"] = self.states([f"{name}.{stored}"], 1e5 / row["stiffness"])
-
-    # links ------------------------------------------------------------------------------------------------
+            lowering_of(type(node)).place(self, name, node, row)
 
     def links(self) -> None:
-        by_kind: dict[str, list] = {}
-        for name, link in self.case.conduits.items():
-            own = lowering_of(type(link))
-            kind = ALIKE.get(link.kind, link.kind) if own is None else "device" if own.acts else "valve"
-            by_kind.setdefault(kind, []).append((name, link))
-        pipes, columns, valves, spools, devices = (by_kind.get(kind, []) for kind in KINDS)
-        self.pipe_names = [name for name, _ in pipes]
-        self.column_names = [name for name, _ in columns]
-        self.valve_names = [name for name, _ in valves] + [name for name, _ in spools for _ in EDGES]
-        self.valve_names += [name for name, _ in devices]
-        self.pipe_table = np.zeros(len(self.pipe_names), rec.PIPE)
-        self.column_table = np.zeros(len(self.column_names), rec.COLUMN)
-        self.valve_table = np.zeros(len(self.valve_names), rec.VALVE)
-        self.valve_table["device"] = self.valve_table["hooks"] = -1
-        self.valve_table["back"] = 1.0
-        self.meshes: list[PipeMesh] = []
-        for k, (name, link) in enumerate(pipes):
-            self.pipe(name, link, self.pipe_table[k])
-        for k, (name, link) in enumerate(columns):
-            self.column(name, link, self.column_table[k])
-        for k, (name, link) in enumerate(valves):
-            self.valve(name, link, self.valve_table[k])
-        for k, (name, link) in enumerate(spools):
-            self.spool(name, link, self.valve_table[len(valves) + len(EDGES) * k :])
-        for (name, link), row in zip(devices, self.valve_table[len(self.valve_table) - len(devices) :], strict=True):
-            self.lower(name, link, row)
+        self.pipe_names, self.pipe_table = self.fill("pipe", rec.PIPE)
+        self.column_names, self.column_table = self.fill("column", rec.COLUMN)
+        self.valve_names, self.valve_table = self.fill("valve", rec.VALVE)
         lower_devices(self)
         for row in self.pipe_table:
             self.node_table["admittance"][row["from_node"]] += row["admittance"]
             self.node_table["admittance"][row["to_node"]] += row["admittance"]
         lower_bodies(self)
 
+    def fill(self, table: str, record: np.dtype) -> tuple[list[str], np.ndarray]:
+        """(names of links, the rows that they fill) of a table."""
+        parts = rows_in(self.case, table)
+        names = [name for name, _, lowering in parts for _ in range(lowering.rows)]
+        rows, at = np.zeros(len(names), record), 0
+        if table == "valve":
+            rows["device"] = rows["hooks"] = -1
+            rows["back"] = 1.0
+        for name, link, lowering in parts:
+            lowering.fill(self, name, link, rows[at : at + lowering.rows])
+            at += lowering.rows
+        return names, rows
+
     def ends(self, link, row) -> None:
+        """The nodes that a link joins."""
         row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
 
-    def pipe(self, name, link, row) -> None:
-        n, area = link.cells, math.pi / 4.0 * link.diameter**2
-        speed = self.case.wave_speed(name)
-        self.ends(link, row)
-        row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
-        row["quicker"] = quicker(self.case.numerics.scheme, n)
-        row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
-        row["cell"], self.cells = self.cells, self.cells + n
-        z = self.node_table["elevation"][[row["from_node"], row["to_node"]]]
-        row["slope"] = (z[1] - z[0]) / link.length
-        row["noise"] = (1e-9 * self.fluid.density * area * speed) ** 2
-        row["compliance"] = self.hydraulics.compliance(name, speed, self.fault)
-        self.hydraulics.friction(name, link, row, self.fault)
-        if link.friction.model == "unsteady":
-            reserve(self, row)
-        names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
-        row["y"] = self.states(names, 0.5e5 * row["admittance"])
-        x = (np.arange(n) + 0.5) * (link.length / n)
-        self.meshes.append(
-            PipeMesh(
-                name, link.from_, link.to, link.length, link.diameter, n, speed, x,
-                np.linspace(0.0, link.length, n + 1), z[0] + row["slope"] * x,
-            )
-        )  # fmt: skip
-
-    def column(self, name, link, row) -> None:
-        self.ends(link, row)
-        row["area"], row["length"] = math.pi / 4.0 * link.diameter**2, link.length
-        self.hydraulics.friction(name, link, row, self.fault)
-        row["y"] = self.states([f"{name}.flow"], 0.1 * self.fluid.density * row["area"])
-
-    def valve(self, name, link, row) -> None:
-        if lowering_of(type(link)) is not None:
-            return self.lower(name, link, row)
-        self.ends(link, row)
-        if link.kind == "connection":
-            return self.connection(name, link, row)
-        row["schedule"] = self.schedules.add(link.opening)
-        self.restriction(name, link, row)
-        if link.characteristic == "equal-percentage":
-            row["characteristic"] = 1
-        elif link.characteristic != "linear":
-            row["characteristic"], row["table"] = 2, len(self.floats)
-            row["table_size"] = len(link.characteristic.opening)
-            self.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
-
-    def connection(self, name, link, row) -> None:
-        """A throat with a loss each way."""
-        row["schedule"], row["back"] = self.schedules.add(constant(1.0)), link.back
-        self.restriction(name, link, row)
-
-    def lower(self, name, link, row) -> None:
-        """A restriction with a law of its own."""
-        found = lowering_of(type(link)).of(link)
-        self.ends(link, row)
-        row["schedule"] = -1
-        found.restriction(self, name, link, row)
-        if calls.hook_of(found.law, "step") is not None:
-            row["hooks"] = self.hooks(found)
-        if not found.acts:
-            row["data"], row["event"] = len(self.floats), self.flags(name, found.events)
-            self.floats += found.numbers(self, name, link)
-
-    def spool(self, name, link, rows) -> None:
-        """Four valves; those of one side of zero share a schedule of their opening."""
-        parts = {side: self.schedules.add_part(link.position, side) for side in (1, -1)}
-        for (start, end, side), row in zip(EDGES, rows, strict=False):
-            row["from_node"], row["to_node"] = (self.node_index[link.ports[port]] for port in (start, end))
-            row["schedule"] = parts[side]
-            self.restriction(name, link, row)
+    def stiff(self) -> int:
+        """Row of a place whose pressure follows what it holds by a stiffness that changes."""
+        self.moving += 1
+        return self.moving - 1
 
     def restriction(self, name, link, row) -> None:
+        """G of a valve's size, and below which flow it is laminar."""
         row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
         if link.laminar_reynolds is not None:
             row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)

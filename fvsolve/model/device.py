@@ -9,10 +9,10 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
-from fvsolve.model.lowering import Lowering, lowering_of
+from fvsolve.model.lowering import Restriction, lowering_of
 
 
-class Device(Lowering):
+class Device(Restriction):
     """Parts of one kind with a row among the devices: what they hold, how they stand in a steady state.
 
     mode : what their law knows the row as; quantities : probes, in the order in which its `value` numbers them
@@ -20,7 +20,7 @@ class Device(Lowering):
     states : names of what each holds; remedy : what to try where its events go to and fro
     """
 
-    acts = True
+    acts, rank = True, 2
     mode: ClassVar[int] = 0
     sudden: ClassVar[bool] = False
     leads: ClassVar[int] = -1
@@ -31,10 +31,23 @@ class Device(Lowering):
 
     def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
+        row["kind"], row["row"] = rec.VESSEL, draft.stiff()
+
+    def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
+        """As of `Lowering`: what a vessel is said to have at the start."""
+        return node.initial_pressure
+
+    def moves(self, name: str, node: Any, row, inflow: float, flow: float) -> str:
+        """As of `Lowering`."""
+        return f"{node.kind} {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s"
 
     def gate(self, name: str) -> str | None:
         """The link that a vessel opens and shuts beside."""
         return None
+
+    def row_of(self, model, name: str):
+        """The DEVICE row of one."""
+        return model.tables.devices[[one for one, _, _ in model.devices].index(name)]
 
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of what one holds."""
@@ -45,7 +58,7 @@ class Device(Lowering):
         return []
 
     def edge(self, start, k: int):
-        """As of `Lowering`; None unless it has one of its own."""
+        """As of `Restriction`; None unless it has one of its own."""
         return None
 
     def follow(self, start, k: int) -> None:
@@ -63,7 +76,10 @@ class Device(Lowering):
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
-        """As of `Lowering`: of a vessel, m^2 dp/dm / (2 rho) of its mass; nothing of others."""
+        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.
+
+        Of a vessel, m^2 dp/dm / (2 rho) of its mass; nothing of others.
+        """
         if not self.vessel:
             return []
         node = model.tables.nodes[row["node"]]
@@ -78,7 +94,7 @@ class Device(Lowering):
 def lower_devices(draft) -> None:
     """Fill the table of devices of a draft, with their states, numbers and event functions."""
     parts = [*draft.case.places.items(), *draft.case.conduits.items()]
-    lowered = [(name, part, found.of(part)) for name, part in parts if (found := lowering_of(type(part)))]
+    lowered = [(name, part, lowering_of(type(part)).of(part)) for name, part in parts]
     draft.devices = [(name, part, device) for name, part, device in lowered if device.acts]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1

@@ -11,14 +11,17 @@ from typing import Any, ClassVar
 
 from fvsolve.kernels import calls
 from fvsolve.kernels.restrictions import step_at
+from fvsolve.model.inputs import Input
 from fvsolve.steady import Edge
 
 SCALE = 1e5  # a typical drop [Pa]
 
 
 class Lowering:
-    """Parts of one kind that carry the fluid: their rows, their numbers, how they start.
+    """Parts of one kind: their rows, their numbers, how they start, what of them can be held.
 
+    table : of links, where their rows are: "pipe", "column", "valve", "brace", "stop" or "piston"; none for places
+    rows : how many each has there; rank : kinds of a greater one stand behind those of a lesser
     law : module of its compiled law, whose functions are named as `kernels.calls.HOOKS`; with a `step` it says what its
     restriction lets through, in place of the root
     events : what it means that each event function falls to zero, "" where that is nothing to a reader
@@ -26,7 +29,10 @@ class Lowering:
     """
 
     kinds: ClassVar[dict[str, Lowering]] = {}
-    law: ClassVar[ModuleType]
+    table: ClassVar[str] = ""
+    rows: ClassVar[int] = 1
+    rank: ClassVar[int] = 0
+    law: ClassVar[ModuleType | None] = None
     events: ClassVar[tuple[str, ...]] = ()
     acts: ClassVar[bool] = False
 
@@ -38,16 +44,63 @@ class Lowering:
         """What lowers this part: itself, but where its keys ask for other states."""
         return self
 
-    def restriction(self, draft, name: str, link: Any, row) -> None:
-        """Fill the VALVE row of a link."""
-        draft.restriction(name, link, row)
-
     def numbers(self, draft, name: str, part: Any) -> list[float]:
         """Its numbers, in the order in which its law reads them from the place that its row names as `data`."""
         return []
 
+    def inputs(self, model, name: str, part: Any) -> dict[str, Input]:
+        """Key -> what of it can be held at a value."""
+        return {}
+
+    # places ---------------------------------------------------------------------------------------------------
+
+    def place(self, draft, name: str, node: Any, row) -> None:
+        """Fill the NODE row of a place of the fluid."""
+
+    def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
+        """Pressure [Pa] that a place holds in the steady problem, None where flows decide."""
+        return None
+
+    def moves(self, name: str, node: Any, row, inflow: float, flow: float) -> str:
+        """What a net flow [kg/s], [m3/s] into a place does at the start, in words; "" for nothing."""
+        return f"junction {name}: {flow:.4g} m3/s more flow in than out"
+
+    # links ----------------------------------------------------------------------------------------------------
+
+    def fill(self, draft, name: str, link: Any, rows) -> None:
+        """Fill the rows of a link."""
+
+    def resists(self, part: Any) -> bool:
+        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
+        return True
+
+
+class Restriction(Lowering):
+    """Links of one row among the valves, by the root M |M| = G dp or a law of their own."""
+
+    table = "valve"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        draft.ends(link, row)
+        row["schedule"] = -1
+        self.restriction(draft, name, link, row)
+        if self.law is None:
+            return
+        if calls.hook_of(self.law, "step") is not None:
+            row["hooks"] = draft.hooks(self)
+        if not self.acts:
+            row["data"], row["event"] = len(draft.floats), draft.flags(name, self.events)
+            draft.floats += self.numbers(draft, name, link)
+
+    def restriction(self, draft, name: str, link: Any, row) -> None:
+        """Fill its VALVE row with what its law does not say."""
+        draft.restriction(name, link, row)
+
     def edge(self, start, k: int) -> Edge | None:
         """Its edge in the steady problem, k its VALVE row; None for that of a root, open as `start.shut` has it."""
+        if self.law is None:
+            return None
         row, (denser, wider) = start.valves[k], start.dense_of.get(k, (1.0, 1.0))
         row["open"] = g = start.conductance(k)
         i, j = int(row["from_node"]), int(row["to_node"])
@@ -85,18 +138,23 @@ class Lowering:
                 a, s = step(flow, drop)
             row["drop"] = drop
 
-    def resists(self, part: Any) -> bool:
-        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
-        return True
-
 
 ROUNDS = 5  # of Newton from a drop that is right to 1e-6
 
 
 @functools.cache
-def lowering_of(part: type) -> Lowering | None:
-    """What lowers parts of a kind that have a law of their own: of the module `lower` beside theirs; None of others."""
+def lowering_of(part: type) -> Lowering:
+    """What lowers parts of a kind: of the module `lower` beside their declaration."""
     home = part.__module__.rpartition(".")[0]
     if find_spec(f"{home}.lower") is not None:
         import_module(f"{home}.lower")
-    return Lowering.kinds.get(part.kind)
+    return Lowering.kinds.get(part.kind, PLAIN)
+
+
+PLAIN = Lowering()  # of what lies in no table
+
+
+def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
+    """(name, link, what it is lowered by) of the links that have rows in a table, in the order of these."""
+    links = ((name, link, lowering_of(type(link)).of(link)) for name, link in case.conduits.items())
+    return sorted((one for one in links if one[2].table == table), key=lambda one: one[2].rank)

@@ -21,6 +21,7 @@ from fvsolve.model.lowering import lowering_of
 from fvsolve.model.slate import wiped
 from fvsolve.steady import Edge, solve_steady
 
+HELD = (rec.FIXED, rec.TANK, rec.PATCH)  # at a pressure that flows do not change
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
 REVISIONS = 200  # of what devices do, at most
 AT_ONCE, ROUND = 10, 20  # of these, all of them together; after which those that regulate begin elsewhere
@@ -80,17 +81,6 @@ class Start:
     def given(self, schedule: int) -> float:
         """What a schedule gives up to the start."""
         return float(value_until(self.draft.tables.schedules, self.draft.tables.pieces, int(schedule), self.t, self.t))
-
-    def given_pressure(self, row, node) -> float:
-        """Pressure [Pa] of a reservoir or tank at the start."""
-        if row["kind"] == rec.PATCH and node.pressure is not None:
-            return node.pressure
-        if row["kind"] == rec.PATCH:
-            return self.law.pressure_under(node.depth) if node.depth else self.case.ambient_pressure
-        if row["kind"] == rec.TANK:
-            return self.law.pressure_under(node.level)
-        value = self.given(row["schedule"])
-        return self.law.pressure_under(value - row["elevation"]) if row["head_given"] else value
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
@@ -158,16 +148,10 @@ class Start:
         """Potentials that are held (nan: to be found) and demands of junctions [kg/s]."""
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
-            if row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH):
-                held[i] = self.law.potential_of(self.given_pressure(row, node), row["elevation"])
-            elif getattr(node, "at_ambient", False):
-                held[i] = self.law.potential_of(self.case.ambient_pressure, row["elevation"])
-            elif row["kind"] in STORED and node.initial_pressure is not None:
-                held[i] = self.law.potential_of(node.initial_pressure, row["elevation"])
-            elif row["kind"] == rec.MOVING and not self.touched(i):
-                held[i] = self.law.potential_of(self.case.ambient_pressure, row["elevation"])
-            elif row["kind"] == rec.JUNCTION:
+            if row["kind"] == rec.JUNCTION:
                 demand[i] = self.given(row["schedule"])
+            elif (pressure := lowering_of(type(node)).pressure_at_start(self, i, node, row)) is not None:
+                held[i] = self.law.potential_of(pressure, row["elevation"])
         return held, np.zeros_like(demand) if self.rest else demand
 
     def touched(self, i: int) -> bool:
@@ -203,8 +187,7 @@ class Start:
     def valve_edge(self, k: int) -> Edge:
         """A valve: M |M| = G dP, with the chord of the root as slope."""
         row = self.valves[k]
-        lowered = self.lowered(k)
-        own = lowered.edge(self, k) if lowered is not None else None
+        own = self.lowered(k).edge(self, k)
         if own is not None:
             return own
         g, back = self.conductance(k), float(row["back"])
@@ -324,8 +307,10 @@ class Start:
 
     def fill_nodes(self) -> None:
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
-            given = row["kind"] in (rec.FIXED, rec.TANK, rec.PATCH)
-            row["pressure"] = self.given_pressure(row, node) if given else self.pressure(i)
+            held = row["kind"] in HELD
+            row["pressure"] = (
+                lowering_of(type(node)).pressure_at_start(self, i, node, row) if held else self.pressure(i)
+            )
             if row["kind"] in STORED:
                 row["mass"] = self.law.held(row["pressure"], row["volume"])
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
@@ -414,18 +399,9 @@ class Start:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
         for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
             name = name.removesuffix(".inside")
-            if inflow == 0.0 or row["kind"] == rec.FIXED:
-                continue
-            flow = inflow / fluid.density
-            if row["kind"] == rec.PATCH:
-                moving.append(f"basin {name}: {flow:.4g} m3/s flow in")
-            elif row["kind"] == rec.TANK:
-                what = "rises" if flow > 0 else "falls"
-                moving.append(f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s")
-            elif row["kind"] in STORED:
-                moving.append(f"{node.kind} {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s")
-            else:
-                moving.append(f"junction {name}: {flow:.4g} m3/s more flow in than out")
+            if inflow != 0.0:
+                text = lowering_of(type(node)).moves(name, node, row, inflow, inflow / fluid.density)
+                moving += [text] if text else []
         for name, pressure in self.driven.items():
             moving.append(f"pipe {name}: {pressure:.4g} Pa drive it, unbalanced by friction")
         for name, row in zip(self.draft.column_names, self.columns, strict=True):

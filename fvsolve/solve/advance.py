@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from numbers import Real
-from typing import NamedTuple
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
+from fvsolve.model.inputs import HEAD, Input, inputs_of
 from fvsolve.model.model import flags_of
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import automatic, slots
@@ -60,18 +60,6 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     return State(loop.t, loop.now.copy(), np.append(loop.memory[[slots.STEP, slots.ERROR_OLD]], loop.armed))
 
 
-class Input(NamedTuple):
-    """A schedule that can be held: what kernels read is scale * value + offset, of the kind that is named."""
-
-    kind: str  # "opening" | "position" | "pressure" | "head" | "flow" | "force"
-    schedule: int
-    scale: float = 1.0
-    offset: float = 0.0
-    node: int = -1  # of a reservoir
-    other: int = -1  # of a spool, the schedule of its edges below zero
-    scalar: int = -1  # whose value flows in
-
-
 def hold(model: Model, inputs: dict[str, float]) -> Model:
     """The same model with schedules held at constant values."""
     if not inputs:
@@ -79,7 +67,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
     tables = model.tables
     schedules, pieces, nodes = tables.schedules.copy(), tables.pieces, tables.nodes.copy()
     scalars = tables.scalars.copy()
-    known = input_schedules(model)
+    known = inputs_of(model)
     linear = model.case.law.linear
     rows = []
     for name, value in inputs.items():
@@ -90,7 +78,7 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
         one = known[name]
         found = checked(name, value, one)
         if one.node >= 0 and not linear:  # what is linear in it is made one of pressure, else it stays a head
-            nodes["head_given"][one.node] = one.kind == "head"
+            nodes["head_given"][one.node] = one.sort is HEAD
         else:
             found = one.scale * found + one.offset
         parts = [(one.schedule, found)]
@@ -111,86 +99,14 @@ def checked(name: str, value: float, one: Input) -> float:
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is no number; wanted {WANTED[one.kind]}")
+        raise FvsolveError(f"{name} = {show(value)} is no number; wanted {one.sort.wanted}")
     found = float(value)
     if not math.isfinite(found):
-        raise FvsolveError(f"{name} = {found} is not finite; wanted {WANTED[one.kind]}")
-    if one.kind == "opening" and not 0.0 <= found <= 1.0:
-        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
-    if one.kind == "speed" and not found >= 0.0:
-        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
-    if one.kind == "position" and not -1.0 <= found <= 1.0:
-        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {WANTED[one.kind]}")
+        raise FvsolveError(f"{name} = {found} is not finite; wanted {one.sort.wanted}")
+    if not one.sort.least <= found <= one.sort.greatest:
+        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {one.sort.wanted}")
     pressure = one.scale * found + one.offset
     if one.node >= 0 and not pressure > 0.0:
-        said = f"{name} = {found:g}" + (f" is {pressure:.4g} Pa absolute" if one.kind == "head" else " is a vacuum")
-        raise FvsolveError(f"{said}; wanted {WANTED[one.kind]}")
-    return found
-
-
-def torques(model: Model, pump: str, row) -> dict[str, Input]:
-    """Torques given to the shaft of a pump."""
-    from fvsolve.parts.pump.law import OWN_NUMBERS
-
-    names = [name for name, link in model.case.links.items() if link.kind == "torque" and link.to == f"{pump}.shaft"]
-    schedules = model.tables.floats[row["data"] + OWN_NUMBERS :: 2]
-    return {f"{name}.torque": Input("torque", int(k)) for name, k in zip(names, schedules, strict=False)}
-
-
-WANTED = {
-    "opening": "a number from 0, shut, to 1, open",
-    "pressure": "an absolute pressure above 0 [Pa]",
-    "head": "a head whose pressure is above 0 Pa absolute [m]",
-    "flow": "a finite number [m3/s]",
-    "speed": "a relative speed of at least 0",
-    "set pressure": "an absolute pressure [Pa]",
-    "position": "a number from -1 to 1",
-    "value": "a finite number",
-    "force": "a finite number [N]",
-    "torque": "a finite number [N m]",
-}
-
-
-def input_schedules(model: Model) -> dict[str, Input]:
-    """Input name -> what it holds."""
-    rho, weight = model.case.properties.density, model.case.properties.density * model.case.gravity
-    found = {}
-    nodes = zip(model.node_names, model.case.places.values(), model.tables.nodes, strict=True)
-    for i, (name, node, row) in enumerate(nodes):
-        index = int(row["schedule"])
-        if node.kind == "reservoir":
-            ground = model.case.ambient_pressure - weight * float(row["elevation"])
-            found[f"{name}.pressure"] = Input("pressure", index, node=i)
-            found[f"{name}.head"] = Input("head", index, weight, ground, node=i)
-        elif node.kind == "junction":
-            found[f"{name}.demand"] = Input("flow", index, rho)
-        elif node.kind == "inflow":
-            found[f"{name}.flow"] = Input("flow", index, -rho)
-        if node.kind in ("reservoir", "inflow"):
-            for q, (scalar, one) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
-                place = int(model.tables.integers[one["places"] + i])
-                if place >= 0:
-                    found[f"{name}.{scalar}"] = Input("value", place, scalar=q)
-    for name, row in zip(model.valve_names, model.tables.valves, strict=True):
-        if row["schedule"] < 0:
-            continue
-        if model.case.conduits[name].kind != "spool-valve":
-            found[f"{name}.opening"] = Input("opening", int(row["schedule"]))
-        elif f"{name}.position" not in found:
-            found[f"{name}.position"] = Input("position", int(row["schedule"]))
-        elif found[f"{name}.position"].other < 0:
-            found[f"{name}.position"] = found[f"{name}.position"]._replace(other=int(row["schedule"]))
-    for (name, *_), row in zip(model.devices, model.tables.devices, strict=True):
-        link = model.case.conduits.get(name)
-        if link is not None and link.kind == "pump":
-            found[f"{name}.speed"] = Input("speed", int(row["schedule"]))
-            found |= torques(model, name, row)
-        elif row["schedule"] >= 0 and hasattr(link, "set_pressure"):
-            found[f"{name}.set_pressure"] = Input("set pressure", int(row["schedule"]))
-        elif row["schedule"] >= 0 and hasattr(link, "set_flow"):
-            found[f"{name}.set_flow"] = Input("flow", int(row["schedule"]), rho)
-    pushed = zip((name for name, link in model.case.links.items() if link.kind == "force"),
-                 (row for row in model.tables.braces if row["schedule"] >= 0), strict=True)  # fmt: skip
-    for name, row in pushed:
-        found[f"{name}.force"] = Input("force", int(row["schedule"]))
+        said = f"{name} = {found:g}" + (f" is {pressure:.4g} Pa absolute" if one.sort is HEAD else " is a vacuum")
+        raise FvsolveError(f"{said}; wanted {one.sort.wanted}")
     return found

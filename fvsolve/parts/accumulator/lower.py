@@ -20,6 +20,7 @@ class Accumulator(Device, kind="accumulator"):
     remedy = "give it a connection, whose loss brakes what comes and goes"
 
     def place(self, draft, name, node, row) -> None:
+        super().place(draft, name, node, row)
         row["y"] = draft.states([f"{name}.mass"], 0.1 * draft.fluid.density * node.volume)
 
     def numbers(self, draft, name, part) -> list[float]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.connection import Connection, Joined, joined
-from fvsolve.parts.junction import Junction
+from fvsolve.parts.connection.part import Connection, Joined, joined
+from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.table import at_least_one
 from fvsolve.parts.value import Number, Quantity, Range, Usual, positive

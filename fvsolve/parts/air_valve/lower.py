@@ -22,8 +22,12 @@ class AirValve(Device, kind="air-valve"):
     remedy = "give it another volume"
 
     def place(self, draft, name, node, row) -> None:
+        super().place(draft, name, node, row)
         row["density"] = draft.case.law.open_density
         row["y"] = draft.states([f"{name}.mass"], row["density"] * node.volume)
+
+    def pressure_at_start(self, start, i, node, row) -> float:
+        return start.case.ambient_pressure
 
     def gate(self, name: str) -> str:
         return name.removesuffix(".inside") + ".connection"

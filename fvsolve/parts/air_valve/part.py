@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.connection import Connection, behind
-from fvsolve.parts.junction import Junction
+from fvsolve.parts.connection.part import Connection, behind
+from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.value import Number, Quantity, Usual, between, positive
@@ -38,7 +38,6 @@ class AirValve(Node, kind="air-valve"):
     ] = 293.15
 
     initial_pressure: ClassVar[None] = None
-    at_ambient: ClassVar[bool] = True
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=WIDE * self.inlet, loss_in=1.0, loss_out=1.0)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from fvsolve.parts.disc.part import DROPS, Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import Quantity, nonnegative, positive
-from fvsolve.parts.valve import Sized
+from fvsolve.parts.valve.part import Sized
 
 
 class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):

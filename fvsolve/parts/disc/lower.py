@@ -87,7 +87,7 @@ class Lifting(Device, kind=""):
         valve, name = start.valves[k], start.draft.valve_names[k]
         lifts = k not in start.shut and start.modes[k] == LIFTING
         x = 0.0 if k in start.shut else opening_of(start, k) if lifts else 1.0
-        self.fill(start, row, x, x if lifts else self.felt(start, k) / part.overpressure)
+        self.put_lift(start, row, x, x if lifts else self.felt(start, k) / part.overpressure)
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
@@ -96,7 +96,7 @@ class Lifting(Device, kind=""):
         target = self.felt(start, k) / part.overpressure
         return [f"{name}: shut, though the pressure lifts it"] if start.rest and target > SMALL_LIFT else []
 
-    def fill(self, start, row, x: float, target: float) -> None:
+    def put_lift(self, start, row, x: float, target: float) -> None:
         """Its lift at the start, and where the pressures draw it."""
         start.draft.tables.floats[row["data"] : row["data"] + 2] = x, target
 

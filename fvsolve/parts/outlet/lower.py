@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
-from fvsolve.model.lowering import Lowering
+from fvsolve.kernels import records as rec
+from fvsolve.model.inputs import OPENING, Input
+from fvsolve.model.lowering import Lowering, Restriction
 from fvsolve.parts.outlet import law
+from fvsolve.parts.schedule import constant
 
 
-class Outlet(Lowering, kind="outlet"):
+class Outside(Lowering, kind="outside"):
+    """Ambient pressure."""
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"], row["schedule"] = rec.FIXED, draft.schedules.add(constant(draft.case.ambient_pressure))
+
+    def pressure_at_start(self, start, i, node, row) -> float:
+        return start.given(row["schedule"])
+
+    def moves(self, name, node, row, inflow, flow) -> str:
+        return ""
+
+
+class Outlet(Restriction, kind="outlet"):
     """Its flow a power of the drop."""
 
     law = law
@@ -26,3 +42,6 @@ class Outlet(Lowering, kind="outlet"):
     def span(self, draft, link) -> float:
         """From there to the drop at which it lets out its flow [Pa]."""
         return 1e5 if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
+
+    def inputs(self, model, name, part):
+        return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}

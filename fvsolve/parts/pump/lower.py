@@ -10,6 +10,7 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import value_until
 from fvsolve.model.device import Device
+from fvsolve.model.inputs import SPEED, Input
 from fvsolve.parts import Schedule
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
@@ -31,6 +32,9 @@ class Pump(Device, kind="pump"):
     quantities = ("head", "speed", "torque", "power")
     events = ("check valve shuts", "check valve opens")
     remedy = "give it a check-valve with a time_constant behind it, in place of its own"
+
+    def inputs(self, model, name, part):
+        return {"speed": Input(SPEED, int(self.row_of(model, name)["schedule"]))}
 
     def states_of(self, draft, name, part) -> tuple[str, ...]:
         return ("speed",) if part.trip is not None or torques_on(draft.case, name) else ()

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.model.device import Device, opening_of
+from fvsolve.model.inputs import FLOW, SET_PRESSURE, Input
 from fvsolve.parts.regulating import law
 from fvsolve.steady import Edge
 
@@ -65,6 +66,12 @@ class Regulator(Device, kind=""):
         if head > best:
             what = f"{least:.6g} Pa at {place} is a head of {head:.4g} m, above every source: {source} has {best:.4g} m"
             draft.fault(f"links.{name}.set_pressure", f"{what}; it would never {self.verb}, set it lower")
+
+    def inputs(self, model, name, part):
+        schedule = int(self.row_of(model, name)["schedule"])
+        if self.end:
+            return {self.key: Input(SET_PRESSURE, schedule)}
+        return {self.key: Input(FLOW, schedule, model.case.properties.density)}
 
     def scales(self, draft, name, part) -> list[float]:
         return [0.1]

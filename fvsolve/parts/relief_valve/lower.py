@@ -62,5 +62,5 @@ class Relief(ReliefDisc, kind="relief-valve"):
         draft.valve_table["data"][draft.valve_names.index(name)] = len(draft.floats)
         return [0.0, part.overpressure, 0.0]
 
-    def fill(self, start, row, x, target):
+    def put_lift(self, start, row, x, target):
         start.draft.tables.floats[row["data"]] = target

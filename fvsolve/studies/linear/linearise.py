@@ -11,16 +11,14 @@ from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.schedules import value_until
 from fvsolve.model.basins.units import unit_of
+from fvsolve.model.inputs import PRESSURE, Input, inputs_of
 from fvsolve.schemes import SCHEMES
-from fvsolve.solve.advance import Input, hold, input_schedules
+from fvsolve.solve.advance import hold
 from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter
 from fvsolve.studies.linear.matrices import output_matrix, responses, state_matrix
 from fvsolve.studies.linear.slopes import SMOOTH, central, kinks, one_sided, settled
 from fvsolve.units import DIMENSIONS
 
-UNITS = {"opening": "-", "position": "-", "pressure": "Pa", "head": "m", "flow": "m3/s", "force": "N", "speed": "-",
-         "torque": "N m", "set pressure": "Pa", "value": "-"}  # fmt: skip
-BOUNDS = {"opening": (0.0, 1.0), "speed": (0.0, np.inf), "position": (-1.0, 1.0)}
 STATE_UNITS = {
     "mass": "kg", "excess": "kg", "air": "kg", "forward": "kg/s", "backward": "kg/s", "memory": "kg/s", "flow": "kg/s",
     "position": "m", "velocity": "m/s", "speed": "-", "opening": "-",
@@ -113,7 +111,7 @@ def linearise(
 def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
     """The same about a frozen state, with the first of its probes as outputs."""
     model, inputs = at.model, tuple(dict.fromkeys(inputs))
-    known = input_schedules(model)
+    known = inputs_of(model)
     for name in inputs:
         if name not in known:
             near = did_you_mean(name, known) or f"; inputs are {listing(known)}"
@@ -129,7 +127,7 @@ def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
     probes = model.case.probes[:outputs]
     return Linear(
         at, a, both[:n].copy(), c, both[n:].copy(), inputs, tuple(one.text for one in probes),
-        tuple(UNITS[known[name].kind] for name in inputs),
+        tuple(known[name].sort.unit for name in inputs),
         tuple(one.unit or DIMENSIONS[one.dimension].si for one in probes),
         tuple(values), tuple(responses(at, at.y, outputs)[n:].tolist()), {"A": error_a, "C": error_c, "BD": error},
     )  # fmt: skip
@@ -157,7 +155,7 @@ def input_value(at: Frozen, name: str, one: Input) -> float:
         pressure = float(model.tables.nodes[one.node]["pressure"]
                          + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + one.node])  # fmt: skip
         place = model.node_names[one.node]
-        return pressure if one.kind == "pressure" else float(model.head(pressure, model.elevation[place]))
+        return pressure if one.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
     value = value_until(model.tables.schedules, model.tables.pieces, one.schedule, at.t, np.inf)
     if one.other >= 0:
         value -= value_until(model.tables.schedules, model.tables.pieces, one.other, at.t, np.inf)
@@ -166,20 +164,19 @@ def input_value(at: Frozen, name: str, one: Input) -> float:
 
 def input_width(at: Frozen, one: Input, value: float) -> float:
     """What counts as a small change of an input [SI]."""
-    weight = at.model.case.properties.density * at.model.case.gravity
-    usual = {"pressure": 1e5, "head": 1e5 / (weight or 1e4), "flow": 1e-3, "force": 1e3}.get(one.kind, 1.0)
-    return max(usual, abs(value)) if one.kind not in BOUNDS and one.kind != "pressure" else usual
+    usual = one.sort.small / (one.scale or 1e4) if one.node >= 0 else one.sort.small
+    return usual if one.sort.bounded or one.sort is PRESSURE else max(usual, abs(value))
 
 
 def input_column(at, name, one, value, size, outputs, steps) -> tuple[np.ndarray, float]:
     """(column of B over that of D, error) of one input; one-sided where it is at the end of its range."""
     model = at.model
     width = np.array([input_width(at, one, value)])
-    low, high = BOUNDS.get(one.kind, (-np.inf, np.inf))
+    low, high = one.sort.least, one.sort.greatest
     scheme = central
     if value <= low or value >= high:
         scheme, width = one_sided, width if value <= low else -width
-    elif one.kind in BOUNDS:
+    elif one.sort.bounded:
         width = np.minimum(width, min(value - low, high - value))
 
     def at_input(u: np.ndarray) -> np.ndarray:

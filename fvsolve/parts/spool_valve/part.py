@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from fvsolve.parts.link import Link, Ports
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import between
-from fvsolve.parts.valve import Sized
+from fvsolve.parts.valve.part import Sized
 
 EDGES = (("P", "A", 1), ("P", "B", -1), ("A", "T", -1), ("B", "T", 1))  # from, to, side of zero on which it opens
 

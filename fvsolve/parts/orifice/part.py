@@ -1,6 +1,6 @@
 """A fixed hole. Knows what a valve knows; the name says that nobody turns it."""
 
-from fvsolve.parts.valve import Valve
+from fvsolve.parts.valve.part import Valve
 
 
 class Orifice(Valve, kind="orifice"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.chamber import Chamber
+from fvsolve.parts.chamber.part import Chamber
 from fvsolve.parts.link import Link, Ports
 from fvsolve.parts.value import Quantity, Usual, nonnegative, positive
 

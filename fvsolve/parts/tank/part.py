@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.connection import Connection, Joined, joined
-from fvsolve.parts.junction import Junction
+from fvsolve.parts.connection.part import Connection, Joined, joined
+from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.table import keys_json, read_keys

@@ -1,0 +1,26 @@
+"""Closed volumes in the tables of a model: chambers, and those that the piston of a cylinder moves."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import Lowering
+
+
+class Chamber(Lowering, kind="chamber"):
+    """A place whose pressure is that of the fluid it holds."""
+
+    def place(self, draft, name, node, row) -> None:
+        moving, air = name in draft.owned, draft.fluid.air
+        row["kind"], row["volume"] = rec.MOVING if moving else rec.CHAMBER, node.volume
+        row["stiffness"] = draft.fluid.bulk_modulus / (draft.fluid.density * node.volume)
+        row["y"] = draft.states([f"{name}.{'excess' if moving else 'mass'}"], 1e5 / row["stiffness"])
+        if moving or (air is not None and air.fraction > 0.0):  # which softens it
+            row["row"] = draft.stiff()
+
+    def pressure_at_start(self, start, i, node, row) -> float | None:
+        if node.initial_pressure is not None:
+            return node.initial_pressure
+        return start.case.ambient_pressure if row["kind"] == rec.MOVING and not start.touched(i) else None
+
+    def moves(self, name, node, row, inflow, flow) -> str:
+        return f"chamber {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s"

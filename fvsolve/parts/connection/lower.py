@@ -1,0 +1,18 @@
+"""Connections of vessels in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.model.inputs import OPENING, Input
+from fvsolve.model.lowering import Restriction
+from fvsolve.parts.schedule import constant
+
+
+class Connection(Restriction, kind="connection"):
+    """A throat with a loss each way."""
+
+    def restriction(self, draft, name, link, row) -> None:
+        row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.back
+        super().restriction(draft, name, link, row)
+
+    def inputs(self, model, name, part):
+        return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}

@@ -1,0 +1,19 @@
+"""Cylinders in the tables of a model; their chambers are places of their own."""
+
+from __future__ import annotations
+
+from fvsolve.model.bodies import join
+from fvsolve.model.lowering import Lowering
+
+
+class Cylinder(Lowering, kind="cylinder"):
+    """A piston between two chambers and two bodies."""
+
+    table = "piston"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        row["position"], row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
+        row["area_a"], row["area_b"] = link.areas()
+        row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction

@@ -1,0 +1,17 @@
+"""Dampers in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.model.bodies import join
+from fvsolve.model.lowering import Lowering
+
+
+class Damper(Lowering, kind="damper"):
+    """A force by the speed between two bodies."""
+
+    table, rank = "brace", 1
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        _, row["speed"] = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        row["schedule"], row["damping"], row["force"] = -1, link.damping, -link.damping * row["speed"]

@@ -1,0 +1,26 @@
+"""End stops in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.model.bodies import join
+from fvsolve.model.lowering import Lowering
+
+FAR = 1e300  # room before a stop that is not there
+
+
+class EndStop(Lowering, kind="end-stop"):
+    """A spring and a damper that push where two bodies meet."""
+
+    table = "stop"
+
+    def fill(self, draft, name, link, rows) -> None:
+        from fvsolve.kernels.mechanics import contact  # models without bodies load none of it
+
+        (row,) = rows
+        x, speed = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        row["stiffness"], row["damping"] = link.stiffness, link.damping
+        row["below"] = FAR if link.least is None else x - link.least
+        row["above"] = FAR if link.greatest is None else link.greatest - x
+        for room, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
+            if room <= 0.0:
+                row["force"] += sign * contact(float(link.stiffness), float(link.damping), -room, float(-sign * speed))

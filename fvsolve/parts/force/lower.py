@@ -1,0 +1,22 @@
+"""Forces from outside in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.model.bodies import join
+from fvsolve.model.inputs import FORCE, Input
+from fvsolve.model.lowering import Lowering, rows_in
+
+
+class Force(Lowering, kind="force"):
+    """A force by a schedule."""
+
+    table, rank = "brace", 2
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        _, row["speed"] = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        row["schedule"] = draft.schedules.add(link.force)
+
+    def inputs(self, model, name, part):
+        place = [one for one, _, _ in rows_in(model.case, "brace")].index(name)
+        return {"force": Input(FORCE, int(model.tables.braces[place]["schedule"]))}

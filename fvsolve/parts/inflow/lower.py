@@ -1,0 +1,18 @@
+"""Given inflows in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.inputs import FLOW, Input, values_in
+from fvsolve.model.lowering import Lowering
+
+
+class Inflow(Lowering, kind="inflow"):
+    """A junction whose demand is negative."""
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.flow, -draft.fluid.density)
+
+    def inputs(self, model, name, part):
+        schedule = int(model.tables.nodes[model.node_names.index(name)]["schedule"])
+        return {"flow": Input(FLOW, schedule, -model.case.properties.density), **values_in(model, name)}

@@ -1,0 +1,18 @@
+"""Junctions in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.inputs import FLOW, Input
+from fvsolve.model.lowering import Lowering
+
+
+class Junction(Lowering, kind="junction"):
+    """A place whose flows sum to what is drawn there."""
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.demand, draft.fluid.density)
+
+    def inputs(self, model, name, part):
+        schedule = int(model.tables.nodes[model.node_names.index(name)]["schedule"])
+        return {"demand": Input(FLOW, schedule, model.case.properties.density)}

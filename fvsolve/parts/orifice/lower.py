@@ -1,0 +1,7 @@
+"""Orifices in the tables of a model."""
+
+from fvsolve.parts.valve.lower import Valve
+
+
+class Orifice(Valve, kind="orifice"):
+    """As a valve."""

@@ -1,0 +1,43 @@
+"""Pipes in the tables of a model."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.model.lowering import Lowering
+from fvsolve.model.model import PipeMesh
+from fvsolve.model.unsteady import reserve
+from fvsolve.schemes import quicker
+
+
+class Pipe(Lowering, kind="pipe"):
+    """Cells of two waves."""
+
+    table = "pipe"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,), n, area = rows, link.cells, math.pi / 4.0 * link.diameter**2
+        speed = draft.case.wave_speed(name)
+        draft.ends(link, row)
+        row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
+        row["quicker"] = quicker(draft.case.numerics.scheme, n)
+        row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
+        row["cell"], draft.cells = draft.cells, draft.cells + n
+        z = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
+        row["slope"] = (z[1] - z[0]) / link.length
+        row["noise"] = (1e-9 * draft.fluid.density * area * speed) ** 2
+        row["compliance"] = draft.hydraulics.compliance(name, speed, draft.fault)
+        draft.hydraulics.friction(name, link, row, draft.fault)
+        if link.friction.model == "unsteady":
+            reserve(draft, row)
+        names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
+        row["y"] = draft.states(names, 0.5e5 * row["admittance"])
+        x = (np.arange(n) + 0.5) * (link.length / n)
+        draft.meshes.append(
+            PipeMesh(
+                name, link.from_, link.to, link.length, link.diameter, n, speed, x,
+                np.linspace(0.0, link.length, n + 1), z[0] + row["slope"] * x,
+            )
+        )  # fmt: skip

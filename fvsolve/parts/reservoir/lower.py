@@ -1,0 +1,32 @@
+"""Places of given pressure or head in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.inputs import HEAD, PRESSURE, Input, values_in
+from fvsolve.model.lowering import Lowering
+
+
+class Reservoir(Lowering, kind="reservoir"):
+    """A place whose pressure is a schedule's."""
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"] = rec.FIXED
+        if node.head is not None:
+            row["schedule"] = draft.hydraulics.add_head(draft.schedules, node.head, row)
+        else:
+            row["schedule"] = draft.schedules.add(node.pressure)
+
+    def pressure_at_start(self, start, i, node, row) -> float:
+        value = start.given(row["schedule"])
+        return start.law.pressure_under(value - row["elevation"]) if row["head_given"] else value
+
+    def moves(self, name, node, row, inflow, flow) -> str:
+        return ""
+
+    def inputs(self, model, name, part):
+        i, weight = model.node_names.index(name), model.case.properties.density * model.case.gravity
+        row = model.tables.nodes[i]
+        index, ground = int(row["schedule"]), model.case.ambient_pressure - weight * float(row["elevation"])
+        found = {"pressure": Input(PRESSURE, index, node=i), "head": Input(HEAD, index, weight, ground, node=i)}
+        return found | values_in(model, name)

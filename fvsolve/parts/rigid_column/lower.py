@@ -1,0 +1,20 @@
+"""Rigid columns in the tables of a model."""
+
+from __future__ import annotations
+
+import math
+
+from fvsolve.model.lowering import Lowering
+
+
+class RigidColumn(Lowering, kind="rigid-column"):
+    """One flow."""
+
+    table = "column"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        draft.ends(link, row)
+        row["area"], row["length"] = math.pi / 4.0 * link.diameter**2, link.length
+        draft.hydraulics.friction(name, link, row, draft.fault)
+        row["y"] = draft.states([f"{name}.flow"], 0.1 * draft.fluid.density * row["area"])

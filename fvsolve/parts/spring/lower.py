@@ -1,0 +1,18 @@
+"""Springs in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.model.bodies import join
+from fvsolve.model.lowering import Lowering
+
+
+class Spring(Lowering, kind="spring"):
+    """A force by the distance of two bodies."""
+
+    table, rank = "brace", 0
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        x, row["speed"] = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        row["schedule"], row["stiffness"] = -1, link.stiffness
+        row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload

@@ -1,0 +1,52 @@
+"""Open tanks in the tables of a model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import Lowering
+
+
+class Tank(Lowering, kind="tank"):
+    """A place whose pressure is that under the level of what it holds."""
+
+    def place(self, draft, name, node, row) -> None:
+        rho = draft.case.law.open_density
+        row["kind"], row["level"], row["density"] = rec.TANK, node.level, rho
+        if hasattr(node.area, "area"):
+            level, area = node.area.level, node.area.area
+            volume = np.concatenate(([0.0], np.cumsum(np.diff(level) * 0.5 * (area[1:] + area[:-1]))))
+            row["shape"], row["shapes"] = len(draft.floats), len(level)
+            if len(level) == 1:
+                row["shape"] = -1
+            else:
+                draft.floats += [*level, *area, *volume]
+            row["area"] = area.min()
+            contents = lambda z: shaped_volume(level, area, volume, z)  # noqa: E731
+        else:
+            row["area"] = node.area
+            contents = lambda z: node.area * z  # noqa: E731
+        row["mass"] = rho * contents(node.level)
+        if node.height is not None:
+            row["full"] = rho * contents(node.height)
+        row["stiffness"] = draft.case.gravity / row["area"]
+        row["row"] = draft.tanks
+        draft.tanks += 1
+        row["y"] = draft.states([f"{name}.mass"], 0.1 * rho * row["area"])
+
+    def pressure_at_start(self, start, i, node, row) -> float:
+        return start.law.pressure_under(row["level"])
+
+    def moves(self, name, node, row, inflow, flow) -> str:
+        what = "rises" if flow > 0 else "falls"
+        return f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s"
+
+
+def shaped_volume(level, area, volume, z: float) -> float:
+    """Volume below level z [m3] of a tank whose areas are linear between levels and held above the last."""
+    if z >= level[-1]:
+        return float(volume[-1] + (z - level[-1]) * area[-1])
+    k = int(np.searchsorted(level, z, side="right")) - 1
+    s = z - level[k]
+    return float(volume[k] + s * (area[k] + 0.5 * s * (area[k + 1] - area[k]) / (level[k + 1] - level[k])))
