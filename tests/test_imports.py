@@ -15,7 +15,7 @@ import fvsolve
 FLOORS = {  # roles -> rooms that they may import
     "part": {"parts", "units", "errors", "names", "steppers"},
     "law": {"kernels", "jit"},
-    "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid"},
+    "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes"},
 }
 
 

@@ -10,19 +10,9 @@ from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
 from fvsolve.case.sections import CAVITY_SCHEMES, Numerics
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import (
-    KINDS,
-    Chamber,
-    Cylinder,
-    EndStop,
-    Junction,
-    Leak,
-    Reservoir,
-    Spring,
-    Torque,
-)
-from fvsolve.parts.accumulator.part import Accumulator
-from fvsolve.parts.pump.part import Pump
+from fvsolve.parts import KINDS, Chamber
+from fvsolve.parts.around import Around
+from fvsolve.parts.value import ROOT
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show
@@ -74,37 +64,19 @@ def network(table: dict[str, Any]) -> Found:
 def parts(
     nodes: dict[str, Any], links: dict[str, Any], ambient: float, gravity: float | None, fluid: Any, raw: Raw
 ) -> Found:
-    """Faults of elevations, pressures and bodies."""
+    """Faults of elevations, and what each part finds wrong beside the others."""
     yield from _elevations(nodes, links)
-    yield from _mechanics(nodes, links)
-    yield from _leaks(nodes, links)
-    yield from _shafts(links)
-    for name, link in links.items():
-        for place in chambers_of(link) if fluid is not None else ():
-            key = f"initial_pressure_{place}"
-            if getattr(link, key) is not None:
-                yield from _vacuum(("links", name, key), [getattr(link, key)], fluid, raw)
-    for name, node in nodes.items():
-        if isinstance(node, Junction):
-            yield from _wants(name, node, ambient)
-        level, height = getattr(node, "level", None), getattr(node, "height", None)
-        if height is not None and level > height:
-            yield ("nodes", name, "level"), f"{level:g} m is above its height of {height:g} m"
-        if isinstance(node, Accumulator) and (node.gas_volume or 0.0) > node.volume:
-            yield ("nodes", name, "gas_volume"), f"{node.gas_volume:g} m3 is more than its volume of {node.volume:g} m3"
-        if fluid is None:
-            continue
-        if isinstance(node, (Accumulator, Chamber)) and node.initial_pressure is not None:
-            yield from _vacuum(("nodes", name, "initial_pressure"), [node.initial_pressure], fluid, raw)
-        if isinstance(node, Reservoir) and node.pressure is not None:
-            yield from _vacuum(("nodes", name, "pressure"), node.pressure.value.tolist(), fluid, raw)
-        if isinstance(node, Reservoir) and node.head is not None and gravity is not None:
-            head = float(node.head.value.min())
-            pressure = ambient + fluid.density * gravity * (head - (node.elevation or 0.0))
-            boiling = fluid.vapor_pressure
-            if pressure <= boiling:
-                place = f"a head of {head:g} m at elevation {node.elevation or 0.0:g} m"
-                yield ("nodes", name, "head"), f"{place}: {units.vacuum(pressure, pressure, boiling)}"
+
+    def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
+        if fluid is not None:
+            for keys, text in _vacuum((group, name, key), pressures, fluid, raw):
+                yield (ROOT, *keys), text
+
+    around = Around(nodes, links, ambient, gravity, fluid, vacuum)
+    for group, found in (("links", links), ("nodes", nodes)):
+        for name, part in found.items():
+            for keys, text in part.faults(name, around):
+                yield keys[1:] if keys[:1] == (ROOT,) else (group, name, *keys), text
 
 
 def numerics(numerics: Numerics, has_cells: bool) -> Found:
@@ -243,7 +215,7 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = [name for (_, name), part in wet.items() if part.elevation is not None]
     for (group, name), part in wet.items():
-        by_head = isinstance(part, Reservoir) and part.head is not None
+        by_head = getattr(part, "head", None) is not None
         if stated and name not in stated and not by_head:
             yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
@@ -259,62 +231,6 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
                 ("links", name, "length"),
                 f"{length:g} m is too short: its ends lie {climb:g} m apart in height",
             )
-
-
-def _leaks(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
-    for name, link in links.items():
-        if isinstance(link, Leak) and isinstance(nodes.get(link.from_), Reservoir):
-            yield ("links", name, "from"), (f"{link.from_} is a reservoir, whose pressure no leak changes; "
-                                            "wanted a junction, a tank or another place")  # fmt: skip
-
-
-def _wants(name: str, node: Any, ambient: float) -> Found:
-    """Faults of a demand that follows the pressure."""
-    least = ambient if node.minimum_pressure is None else node.minimum_pressure
-    if node.required_pressure is None:
-        if node.minimum_pressure is not None:
-            yield ("nodes", name, "minimum_pressure"), "says nothing without required_pressure"
-        return
-    if node.required_pressure <= least:
-        yield ("nodes", name, "required_pressure"), (f"{node.required_pressure:g} Pa is not above the pressure of no "
-                                                     f"flow, {least:g} Pa")  # fmt: skip
-    if least < ambient:
-        yield ("nodes", name, "minimum_pressure"), f"{least:g} Pa is below ambient, where nothing runs out"
-    if not (node.demand.value.min() >= 0.0 and node.demand.value.max() > 0.0):
-        yield ("nodes", name, "demand"), "wanted a demand, none of it negative, beside required_pressure"
-
-
-def _mechanics(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
-    """Faults of pistons outside their stroke, of springs drawn backwards and of stops without room."""
-    at = {name: node.initial_position for name, node in nodes.items() if node.domain == "translational"}
-    for name, link in links.items():
-        ports = [port for port, domain in link.joins.items() if domain == "translational"]
-        places = [link.ports.get(port) for port in ports]
-        if not ports or any(place not in at for place in places):
-            continue
-        first, second = (at[place] for place in places)
-        if isinstance(link, Cylinder):
-            x = first - second
-            if not 0.0 <= x <= link.stroke:
-                yield ("links", name, "stroke"), (f"the piston starts at {x:g} m, {places[0]} less {places[1]}; wanted "
-                                                  f"0 to {link.stroke:g} m")  # fmt: skip
-            if min(link.areas()) <= 0.0:
-                yield ("links", name, "rod_diameter"), "leaves no area at B; wanted one below piston_diameter"
-        if isinstance(link, Spring) and second < first and (link.free_length or link.preload):
-            yield ("links", name, "to"), f"{link.to} lies behind {link.from_} at the start; exchange from and to"
-        if isinstance(link, EndStop) and None not in (link.least, link.greatest) and link.least >= link.greatest:
-            yield ("links", name, "greatest"), f"{link.greatest:g} m is not above least, {link.least:g} m"
-
-
-def _shafts(links: dict[str, Any]) -> Found:
-    """Faults of torques on shafts whose inertia is not known, or that a motor holds until it trips."""
-    for name, link in links.items():
-        pump = links.get(str(link.to).removesuffix(".shaft")) if isinstance(link, Torque) else None
-        if isinstance(pump, Pump) and pump.inertia is None:
-            yield ("links", name, "to"), f"{link.to} has no inertia, so no torque can turn it; give the pump inertia"
-        if isinstance(pump, Pump) and pump.trip is not None:
-            yield ("links", name, "to"), (f"{link.to} is held by its motor until it trips; leave trip out, and let the "
-                                          "torque fall to 0 in its place")  # fmt: skip
 
 
 def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Found:

@@ -9,20 +9,19 @@ from typing import Any
 from fvsolve.case.size import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, named
-from fvsolve.parts import KINDS, Basin, Chamber, Inflow, Pipe, Reservoir, Tank
+from fvsolve.parts import KINDS, Basin
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
 
-HOLDERS = {
-    "cylinder": "its chambers carry no scalars yet",
-    "rigid-column": "it has no cells to carry scalars; use a pipe",
-}
-HOLDERS |= dict.fromkeys(("accumulator", "air-valve"), "its contents carry no scalars yet")
 TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure", "depth", "bed",
          "surface"}  # fmt: skip
-TAKEN |= {name for kinds in KINDS.values() for kind in kinds.values() for name in kind.quantities}
-TAKEN |= set(Pipe.along)
+
+
+def taken() -> set[str]:
+    """Names with a meaning of their own: what is written, and quantities of parts."""
+    kinds = [kind for group in KINDS.values() for kind in group.values()]
+    return TAKEN | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
 def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
@@ -32,7 +31,7 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
             yield ("scalars", name), f"has {len(name)} letters; wanted {LONGEST_NAME} at most"
         if not re.fullmatch(r"[\w-]+", name):
             yield ("scalars", name), f"{show(name)} is no name; a name has letters, digits, _ and -"
-        elif name in TAKEN:
+        elif name in taken():
             yield ("scalars", name), f"{show(name)} has a meaning of its own; wanted another name"
     for group, parts in (("nodes", nodes), ("links", links)):
         for name, part in parts.items():
@@ -48,9 +47,9 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
                         yield place, _unknown(scalar, scalars)
                     elif part.physics != "transport" and one.boundary != "open":
                         yield place, 'comes with what links bring; it goes with a given velocity or boundary = "open"'
-            if scalars and part.kind in HOLDERS:
+            if scalars and part.no_scalars:
                 article = "an" if part.kind[0] in "aeiou" else "a"
-                yield (group, name), f"is {article} {part.kind}; {HOLDERS[part.kind]}"
+                yield (group, name), f"is {article} {part.kind}; {part.no_scalars}"
     if not scalars:
         return
     if fluid is not None and not LAWS[fluid.law].scalars:
@@ -63,9 +62,9 @@ def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str |
         return _unknown(scalar, scalars)
     if isinstance(part, Basin):
         return None
-    if isinstance(part, (Tank, Chamber)) and not value.constant:
+    if part.own_scalars == "start" and not value.constant:
         return "is what it holds at the start; wanted a number, no schedule"
-    if not isinstance(part, (Pipe, Tank, Chamber, Reservoir, Inflow)):
+    if not part.own_scalars:
         return f"a {part.kind} has none of its own; wanted an inflow, a reservoir, a tank, a chamber or a pipe"
     return None
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from fvsolve.model.lowering import lowering_of
+
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
 
@@ -49,15 +51,13 @@ class Input(NamedTuple):
 
 def inputs_of(model: Model) -> dict[str, Input]:
     """Input name, PART.KEY -> what it holds: what every part has to drive it by, see `Lowering.inputs`."""
-    from fvsolve.model.lowering import lowering_of
-
     case = model.case
     parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
     parts |= {name: link for name, link in case.links.items() if name not in parts}
     found: dict[str, Input] = {}
     for name, part in parts.items():
-        if (lowering := lowering_of(type(part))) is not None:
-            found |= {f"{name}.{key}": one for key, one in lowering.of(part).inputs(model, name, part).items()}
+        own = lowering_of(type(part)).of(part).inputs(model, name, part)
+        found |= {f"{name}.{key}": one for key, one in own.items()}
     return found
 
 

@@ -7,12 +7,14 @@ import math
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from fvsolve.kernels import calls
 from fvsolve.kernels.restrictions import step_at
-from fvsolve.model.inputs import Input
 from fvsolve.steady import Edge
+
+if TYPE_CHECKING:
+    from fvsolve.model.inputs import Input
 
 SCALE = 1e5  # a typical drop [Pa]
 

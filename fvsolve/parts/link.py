@@ -26,6 +26,8 @@ class Link(Table):
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> domain of the place it wants
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
+    no_scalars: ClassVar[str] = ""  # why a case with scalars cannot have it yet
+    own_scalars: ClassVar[str] = ""  # which values of scalars it states: "along" its length; none if empty
     owns: ClassVar[dict[str, str]] = {}  # place of its own, `LINK.PLACE` to others -> domain
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:

@@ -25,6 +25,8 @@ class Node(Table):
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
     }  # fmt: skip
     fixes_pressure: ClassVar[bool] = False
+    no_scalars: ClassVar[str] = ""  # why a case with scalars cannot have it yet
+    own_scalars: ClassVar[str] = ""  # which values of scalars it states: "start" | "inflow"; none if empty
     domain: ClassVar[str] = "hydraulic"  # | "translational"
 
     elevation: Annotated[

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.value import NEEDED, Misfit, Setting, Value, setting_of
 from fvsolve.units import show
 
@@ -92,6 +93,10 @@ class Table(BaseModel):
     def wanted(cls, given: Any) -> str:
         """What a value should have been that is no table."""
         return f"keys of {listing(cls.keys())}"
+
+    def faults(self, name: str, around: Around) -> Faults:
+        """What is wrong with it beside the rest of its case: (keys, text)."""
+        yield from ()
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         """What is odd of its keys beside one another: (keys, value, limit, text)."""

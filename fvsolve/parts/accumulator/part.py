@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, Joined, joined
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
@@ -26,6 +27,7 @@ class Accumulator(Node, kind="accumulator"):
     feels the pressure. An air vessel that runs empty lets its air into the place it is joined to.
     """
 
+    no_scalars: ClassVar[str] = "its contents carry no scalars yet"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("precharge", "gas_volume"),)
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
@@ -48,3 +50,9 @@ class Accumulator(Node, kind="accumulator"):
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         return joined(name, self, Junction.model_construct(elevation=self.elevation))
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if (self.gas_volume or 0.0) > self.volume:
+            yield ("gas_volume",), f"{self.gas_volume:g} m3 is more than its volume of {self.volume:g} m3"
+        if self.initial_pressure is not None:
+            yield from around.vacuum("nodes", name, "initial_pressure", [self.initial_pressure])

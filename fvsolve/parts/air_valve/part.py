@@ -25,6 +25,7 @@ class AirValve(Node, kind="air-valve"):
     + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W].
     """
 
+    no_scalars: ClassVar[str] = "its contents carry no scalars yet"
     quantities: ClassVar[dict[str, str]] = {
         **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",
     }  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.node import Node
 from fvsolve.parts.value import Quantity, Usual, positive
 
@@ -15,9 +16,14 @@ class Chamber(Node, kind="chamber"):
     V (beta (exp(p/beta) - 1) - p) under the log law. Dissipated energy: none.
     """
 
+    own_scalars: ClassVar[str] = "start"
     fixes_pressure: ClassVar[bool] = True
 
     volume: Annotated[float, Quantity("volume", positive, "fluid held [m3]", Usual(1e-10, 1e5, "cylinders to caverns"))]
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium if left out")
     ] = None
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if self.initial_pressure is not None:
+            yield from around.vacuum("nodes", name, "initial_pressure", [self.initial_pressure])

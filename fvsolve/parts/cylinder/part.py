@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.chamber.part import Chamber
 from fvsolve.parts.link import Link, Ports
 from fvsolve.parts.value import Quantity, Usual, nonnegative, positive
@@ -21,6 +22,7 @@ class Cylinder(Link, kind="cylinder"):
     of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
     """
 
+    no_scalars: ClassVar[str] = "its chambers carry no scalars yet"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
     joins: ClassVar[dict[str, str]] = {"rod": "translational", "case": "translational"}
     owns: ClassVar[dict[str, str]] = {"A": "hydraulic", "B": "hydraulic"}
@@ -58,6 +60,19 @@ class Cylinder(Link, kind="cylinder"):
         if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
             faults.append((("rod_diameter",), "goes with piston_diameter; give area_B beside area_A"))
         return faults
+
+    def faults(self, name: str, around: Around) -> Faults:
+        for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
+            if pressure is not None:
+                yield from around.vacuum("links", name, f"initial_pressure_{place}", [pressure])
+        if (at := around.starts(self)) is None:
+            return
+        x, (rod, case) = at[0] - at[1], (self.ports["rod"], self.ports["case"])
+        if not 0.0 <= x <= self.stroke:
+            text = f"the piston starts at {x:g} m, {rod} less {case}; wanted 0 to {self.stroke:g} m"
+            yield ("stroke",), text
+        if min(self.areas()) <= 0.0:
+            yield ("rod_diameter",), "leaves no area at B; wanted one below piston_diameter"
 
     def areas(self) -> tuple[float, float]:
         """Areas of the piston at A and at B [m2]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import Coupling
 from fvsolve.parts.table import at_least_one
 from fvsolve.parts.value import Quantity, nonnegative, positive
@@ -24,3 +25,7 @@ class EndStop(Coupling, kind="end-stop"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         return super().key_faults(given) + at_least_one(given, ("least", "greatest"))
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if around.starts(self) is not None and None not in (self.least, self.greatest) and self.least >= self.greatest:
+            yield ("greatest",), f"{self.greatest:g} m is not above least, {self.least:g} m"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
@@ -13,5 +13,7 @@ class Inflow(Node, kind="inflow"):
 
     Ports: any number. Stored energy: none. Dissipated energy: none; it brings p times flow [W].
     """
+
+    own_scalars: ClassVar[str] = "inflow"
 
     flow: Annotated[Schedule, Scheduled("flow", about="positive into the network [m3/s]")]

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.node import Node
 from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
@@ -37,3 +38,17 @@ class Junction(Node, kind="junction"):
         law |= {"least": self.minimum_pressure, "upper": self.required_pressure}
         places, links = out_of(f"{name}.demand", name, **law)
         return {name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}), **places}, links
+
+    def faults(self, name: str, around: Around) -> Faults:
+        least = around.ambient if self.minimum_pressure is None else self.minimum_pressure
+        if self.required_pressure is None:
+            if self.minimum_pressure is not None:
+                yield ("minimum_pressure",), "says nothing without required_pressure"
+            return
+        if self.required_pressure <= least:
+            text = f"{self.required_pressure:g} Pa is not above the pressure of no flow, {least:g} Pa"
+            yield ("required_pressure",), text
+        if least < around.ambient:
+            yield ("minimum_pressure",), f"{least:g} Pa is below ambient, where nothing runs out"
+        if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
+            yield ("demand",), "wanted a demand, none of it negative, beside required_pressure"

@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import Link
 from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
@@ -38,3 +39,8 @@ class Leak(Link, kind="leak"):
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         law = {"flow": self.coefficient * 1e5**self.exponent, "exponent": self.exponent, "opening": self.opening}
         return out_of(name, self.from_, **law)
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
+            text = "is a reservoir, whose pressure no leak changes; wanted a junction, a tank or another place"
+            yield ("from",), f"{self.from_} {text}"

@@ -55,6 +55,7 @@ class Pipe(Conduit, kind="pipe"):
     drop times flow [W].
     """
 
+    own_scalars: ClassVar[str] = "along"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.alternatives, ("wave_speed", "wall"))
     along: ClassVar[dict[str, str]] = {
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head", "velocity": "velocity",

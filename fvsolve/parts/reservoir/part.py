@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
+from fvsolve import units
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table import at_least_one
@@ -16,6 +18,7 @@ class Reservoir(Node, kind="reservoir"):
     its ports enters the ledger as work done on the network. Dissipated energy: none.
     """
 
+    own_scalars: ClassVar[str] = "inflow"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
     fixes_pressure: ClassVar[bool] = True
 
@@ -25,3 +28,14 @@ class Reservoir(Node, kind="reservoir"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         return super().key_faults(given) + at_least_one(given, ("pressure", "head"))
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if self.pressure is not None:
+            yield from around.vacuum("nodes", name, "pressure", self.pressure.value.tolist())
+        if self.head is None or around.gravity is None or around.fluid is None:
+            return
+        head, boiling, height = float(self.head.value.min()), around.fluid.vapor_pressure, self.elevation or 0.0
+        pressure = around.ambient + around.fluid.density * around.gravity * (head - height)
+        if pressure <= boiling:
+            place = f"a head of {head:g} m at elevation {height:g} m"
+            yield ("head",), f"{place}: {units.vacuum(pressure, pressure, boiling)}"

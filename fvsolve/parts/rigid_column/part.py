@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from fvsolve.parts.conduit import Conduit
 
@@ -13,6 +13,8 @@ class RigidColumn(Conduit, kind="rigid-column"):
     Ports: from, to. Stored energy: rho length q^2 / (2 A) [J]. Dissipated power: friction and minor loss,
     pressure drop times flow [W].
     """
+
+    no_scalars: ClassVar[str] = "it has no cells to carry scalars; use a pipe"
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import Coupling
 from fvsolve.parts.value import Quantity, nonnegative, positive
 
@@ -23,3 +24,8 @@ class Spring(Coupling, kind="spring"):
     def model_post_init(self, _: Any) -> None:
         if self.free_length is self.preload is None:
             object.__setattr__(self, "free_length", 0.0)
+
+    def faults(self, name: str, around: Around) -> Faults:
+        at = around.starts(self)
+        if at is not None and at[1] < at[0] and (self.free_length or self.preload):
+            yield ("to",), f"{self.to} lies behind {self.from_} at the start; exchange from and to"

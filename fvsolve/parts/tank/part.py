@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, Joined, joined
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
@@ -89,6 +90,7 @@ class Tank(Node, kind="tank"):
     `height` leaves with its potential energy.
     """
 
+    own_scalars: ClassVar[str] = "start"
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "level": "level"}
     fixes_pressure: ClassVar[bool] = True
 
@@ -99,3 +101,7 @@ class Tank(Node, kind="tank"):
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         return joined(name, self, Junction.model_construct(elevation=self.elevation, demand=constant(0.0)))
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if self.height is not None and self.level > self.height:
+            yield ("level",), f"{self.level:g} m is above its height of {self.height:g} m"

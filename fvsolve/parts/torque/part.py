@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import Link
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Text
@@ -25,3 +26,13 @@ class Torque(Link, kind="torque"):
     def ports(self) -> dict[str, str]:
         """Port name -> place."""
         return {"to": self.to}
+
+    def faults(self, name: str, around: Around) -> Faults:
+        pump = around.links.get(self.to.removesuffix(".shaft"))
+        if getattr(pump, "kind", "") != "pump":
+            return
+        if pump.inertia is None:
+            yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the pump inertia"
+        if pump.trip is not None:
+            text = "is held by its motor until it trips; leave trip out, and let the torque fall to 0 in its place"
+            yield ("to",), f"{self.to} {text}"
