@@ -7,7 +7,7 @@ import pytest
 from truth.scenes import WATER, junction, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.model.probes import around
+from fvsolve.model.reading import around
 from fvsolve.schemes import SCHEMES
 
 CELLS = 10

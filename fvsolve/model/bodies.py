@@ -7,11 +7,26 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.lowering import rows_in
+from fvsolve.model.lowering import Lowering, rows_in
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
 SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of bodies that no chamber holds, of bodies that nothing holds
 SNAP = 1e-12  # share of the forces on a body below which their sum is rounding
+
+
+class Push(Lowering):
+    """Links between bodies, whose force is their quantity."""
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["kind"], row["index"] = rec.FORCE, draft.push_names.index(name)
+
+
+class Body(Lowering):
+    """What moves along an axis, or stands still there."""
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
+        row["index"] = draft.body_index[name]
 
 
 def lower_bodies(draft) -> None:

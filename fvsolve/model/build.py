@@ -110,6 +110,10 @@ class Draft:
         self.laws += [] if law in self.laws else [law]
         return self.laws.index(law)
 
+    def inside(self, name: str) -> str:
+        """What lies behind the connection of a part, or the part itself."""
+        return f"{name}.inside" if f"{name}.inside" in self.node_index else name
+
     @property
     def device_names(self) -> list[str]:
         """Parts that are devices, as their table has them."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
-from fvsolve.model.lowering import Restriction, lowering_of
+from fvsolve.model.lowering import Lowering, Restriction, lowering_of
 
 
 class Device(Restriction):
@@ -48,6 +48,16 @@ class Device(Restriction):
     def row_of(self, model, name: str):
         """The DEVICE row of one."""
         return model.tables.devices[[one for one, _, _ in model.devices].index(name)]
+
+    def probe(self, draft, name: str, probe: Any, row) -> None:
+        """As of `Lowering`."""
+        if probe.quantity in self.quantities:
+            row["index"] = draft.device_names.index(draft.inside(name))
+            row["kind"], row["side"] = rec.DEVICE_VALUE, self.quantities.index(probe.quantity)
+        elif self.vessel:
+            Lowering.probe(self, draft, name, probe, row)
+        else:
+            super().probe(draft, name, probe, row)
 
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
         """Names of what one holds."""

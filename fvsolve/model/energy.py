@@ -10,6 +10,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.energy import weights as basin_weights
+from fvsolve.model.lowering import rows_in
 from fvsolve.model.scalars import bounds
 from fvsolve.model.unsteady import memory_shares
 
@@ -195,12 +196,10 @@ def typical(model, q: int) -> float:
 
 def held(model, y: np.ndarray):
     """(name, row of L) of springs and of stops in touch."""
-    tables, links = model.tables, model.case.links
-    springs = [name for name, link in links.items() if link.kind == "spring"]
-    for name, row in zip(springs, tables.braces, strict=False):
-        yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
-    stops = [name for name, link in links.items() if link.kind == "end-stop"]
-    for name, row in zip(stops, tables.stops, strict=True):
+    for (name, *_), row in zip(rows_in(model.case, "brace"), model.tables.braces, strict=True):
+        if row["stiffness"] > 0.0:
+            yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
+    for (name, *_), row in zip(rows_in(model.case, "stop"), model.tables.stops, strict=True):
         x = distance(model, y, row["from_body"], row["to_body"])
         if row["below"] + x < 0.0 or x > row["above"]:
             yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))

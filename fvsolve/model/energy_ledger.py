@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import lowering_of, rows_in
 from fvsolve.model.slate import Slate
 
 
@@ -39,9 +41,8 @@ class Accounts:
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
         self.powers = self.stores = 0
         nodes = model.tables.nodes
-        kinds = [place.kind for place in case.places.values()]
-        for i, name in enumerate(model.node_names):
-            self.node(name, kinds[i], int(nodes[i]["kind"]))
+        for row, (name, place) in zip(nodes, case.places.items(), strict=True):
+            self.node(name, place, int(row["kind"]))
         for pipe in model.pipes:
             at = self.take(4)
             self.add("dissipated", pipe.name, "friction", at + 1)
@@ -77,31 +78,23 @@ class Accounts:
             self.held.append(Account("stored", place, kind, tuple(range(at, at + rows)), (1.0,) * rows))
             self.add("rate", place, kind, rate)
 
-    def node(self, name: str, kind: str, code: int) -> None:
+    def node(self, name: str, place: Any, code: int) -> None:
         at = self.take(2)
-        if code in (rec.FIXED, rec.JUNCTION):
-            self.add("supplied", name, "demand" if kind == "junction" else kind, at)
-        elif code == rec.TANK:
-            self.add("supplied", name, "over the rim", at)
-        elif code == rec.PATCH:
-            self.add("supplied", name, "dry patch", at)
+        if books := lowering_of(type(place)).books:
+            self.add("supplied", name, books, at)
         stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # a vessel's is its device's
-        self.hold(name, kind, at + 1 if stores else None)
+        self.hold(name, place.kind, at + 1 if stores else None)
 
     def valves(self) -> None:
-        seen: dict[str, int] = {}
         self.taken: dict[str, tuple[int, bool]] = {}  # row of a device's restriction, and whether it dissipates
         resists = {name: device.resists(part) for name, part, device in self.model.devices}
-        for name in self.model.valve_names:
-            at = self.take(1)
-            link = self.model.case.conduits[name]
-            if link.kind == "spool-valve":
-                edge = seen[name] = seen.get(name, -1) + 1
-                name = f"{name}.{edge_name(edge)}"
-            if name in resists:
-                self.taken[name] = at, resists[name]
-            else:
-                self.add("dissipated", name, "valve", at)
+        for link, _, lowering in rows_in(self.model.case, "valve"):
+            for name in lowering.row_names(link):
+                at = self.take(1)
+                if name in resists:
+                    self.taken[name] = at, resists[name]
+                else:
+                    self.add("dissipated", name, "valve", at)
 
     def mechanics(self) -> None:
         model, tables = self.model, self.model.tables
@@ -109,19 +102,16 @@ class Accounts:
         for name, row in zip(names, tables.bodies, strict=True):
             at = self.take(1)
             self.hold(name, "mass", at if row["y"] >= 0 else None)
-        of = {kind: [name for name, link in model.case.links.items() if link.kind == kind]
-              for kind in ("spring", "damper", "force", "end-stop")}  # fmt: skip
-        for kind in ("spring", "damper", "force"):
-            for name in of[kind]:
-                at = self.take(1)
-                self.hold(name, kind, at if kind == "spring" else None)
-                if kind != "spring":
-                    self.add("supplied" if kind == "force" else "dissipated", name, kind, at)
-        for name in of["end-stop"]:
+        for name, link, lowering in rows_in(model.case, "brace"):
+            at, stores = self.take(1), lowering.books == "stored"
+            self.hold(name, link.kind, at if stores else None)
+            if not stores:
+                self.add(lowering.books, name, link.kind, at)
+        for name, link, _ in rows_in(model.case, "stop"):
             at = self.take(2)
             self.stops.append((len(self.accounts), len(self.accounts) + 1))
-            self.hold(name, "end-stop", at)
-            self.add("dissipated", name, "end-stop", at + 1)
+            self.hold(name, link.kind, at)
+            self.add("dissipated", name, link.kind, at + 1)
         for name in model.piston_names:
             at = self.take(3)
             self.add("dissipated", name, "leak", at)
@@ -172,14 +162,6 @@ class Accounts:
         self.model.functions.rhs(t, y, np.zeros(0), out, self.slate.handle)
         self.stored(t, y, np.zeros(0), out, self.slate.handle, rows)
         return self.holding @ rows
-
-
-def edge_name(edge: int) -> str:
-    """Which edge of a spool, as `parts.EDGES` orders them."""
-    from fvsolve.parts import EDGES as edges
-
-    start, end, _ = edges[edge]
-    return f"{start}-{end}"
 
 
 def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.energy import above as basin_above
+from fvsolve.model.lowering import rows_in
 from fvsolve.model.model import Model
 from fvsolve.model.unsteady import memory_shares
 
@@ -42,11 +43,10 @@ def available(model: Model) -> dict[str, float]:
             found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:
         found[basin.name] = basin_above(basin, basin.of(model.start), datum)
-    springs = [name for name, link in model.case.links.items() if link.kind == "spring"]
-    for name, row in zip(springs, tables.braces, strict=False):
-        found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
-    stops = [name for name, link in model.case.links.items() if link.kind == "end-stop"]
-    for name, row in zip(stops, tables.stops, strict=True):
+    for (name, *_), row in zip(rows_in(model.case, "brace"), tables.braces, strict=True):
+        if row["stiffness"] > 0.0:
+            found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
+    for (name, *_), row in zip(rows_in(model.case, "stop"), tables.stops, strict=True):
         found[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
     return {name: float(value) for name, value in found.items()}
 

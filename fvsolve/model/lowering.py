@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from fvsolve.kernels import calls
+from fvsolve.kernels import records as rec
 from fvsolve.kernels.restrictions import step_at
 from fvsolve.steady import Edge
 
@@ -22,12 +23,13 @@ SCALE = 1e5  # a typical drop [Pa]
 class Lowering:
     """Parts of one kind: their rows, their numbers, how they start, what of them can be held.
 
-    table : of links, where their rows are: "pipe", "column", "valve", "brace", "stop" or "piston"; none for places
+    table : of links, where their rows are: "pipe", "column", "valve", "brace", "stop" or "piston"; of places none
     rows : how many each has there; rank : kinds of a greater one stand behind those of a lesser
     law : module of its compiled law, whose functions are named as `kernels.calls.HOOKS`; with a `step` it says what its
     restriction lets through, in place of the root
     events : what it means that each event function falls to zero, "" where that is nothing to a reader
     acts : whether it is a device as well, see `model.device`
+    books : name of its line in the ledger of energy: of a place, what it supplies, "" for none; else what a row is
     """
 
     kinds: ClassVar[dict[str, Lowering]] = {}
@@ -37,6 +39,7 @@ class Lowering:
     law: ClassVar[ModuleType | None] = None
     events: ClassVar[tuple[str, ...]] = ()
     acts: ClassVar[bool] = False
+    books: ClassVar[str] = ""
 
     def __init_subclass__(cls, kind: str = "") -> None:
         if kind:
@@ -53,6 +56,10 @@ class Lowering:
     def inputs(self, model, name: str, part: Any) -> dict[str, Input]:
         """Key -> what of it can be held at a value."""
         return {}
+
+    def probe(self, draft, name: str, probe: Any, row) -> None:
+        """Fill the PROBE row of one of its quantities."""
+        row["kind"], row["index"] = rec.PRESSURE, draft.node_index[name]
 
     # places ---------------------------------------------------------------------------------------------------
 
@@ -71,6 +78,10 @@ class Lowering:
 
     def fill(self, draft, name: str, link: Any, rows) -> None:
         """Fill the rows of a link."""
+
+    def row_names(self, name: str) -> list[str]:
+        """What the ledger of energy calls each of them."""
+        return [name]
 
     def resists(self, part: Any) -> bool:
         """Whether its restriction dissipates drop times flow; else that is energy supplied."""
@@ -94,6 +105,9 @@ class Restriction(Lowering):
         if not self.acts:
             row["data"], row["event"] = len(draft.floats), draft.flags(name, self.events)
             draft.floats += self.numbers(draft, name, link)
+
+    def probe(self, draft, name: str, probe: Any, row) -> None:
+        row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(name)
 
     def restriction(self, draft, name: str, link: Any, row) -> None:
         """Fill its VALVE row with what its law does not say."""

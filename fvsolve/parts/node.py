@@ -27,6 +27,7 @@ class Node(Table):
     fixes_pressure: ClassVar[bool] = False
     no_scalars: ClassVar[str] = ""  # why a case with scalars cannot have it yet
     own_scalars: ClassVar[str] = ""  # which values of scalars it states: "start" | "inflow"; none if empty
+    driven: ClassVar[tuple[str, float] | None] = None  # a port's key, and its sign as flow into links; 0 of a pressure
     domain: ClassVar[str] = "hydraulic"  # | "translational"
 
     elevation: Annotated[

@@ -9,6 +9,8 @@ from fvsolve.model.lowering import Lowering
 class Patch(Lowering, kind="patch"):
     """A place whose pressure the cells behind it set."""
 
+    books = "dry patch"
+
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["row"] = rec.PATCH, draft.stiff()
 
@@ -19,3 +21,10 @@ class Patch(Lowering, kind="patch"):
 
     def moves(self, name, node, row, inflow, flow) -> str:
         return f"basin {name}: {flow:.4g} m3/s flow in"
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity != "flow":
+            return super().probe(draft, name, probe, row)
+        row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
+        if draft.case.nodes[draft.case.places[name].basin].physics == "transport":
+            row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

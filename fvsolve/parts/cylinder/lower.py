@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import join
-from fvsolve.model.lowering import Lowering
+from fvsolve.kernels import records as rec
+from fvsolve.model.bodies import Push, join
 
 
-class Cylinder(Lowering, kind="cylinder"):
+class Cylinder(Push, kind="cylinder"):
     """A piston between two chambers and two bodies."""
 
     table = "piston"
@@ -17,3 +17,9 @@ class Cylinder(Lowering, kind="cylinder"):
         row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
         row["area_a"], row["area_b"] = link.areas()
         row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity == "force":
+            return super().probe(draft, name, probe, row)
+        row["index"] = draft.piston_names.index(name)
+        row["kind"] = rec.PISTON_POSITION if probe.quantity == "position" else rec.PISTON_VELOCITY

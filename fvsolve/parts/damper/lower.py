@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import join
-from fvsolve.model.lowering import Lowering
+from fvsolve.model.bodies import Push, join
 
 
-class Damper(Lowering, kind="damper"):
+class Damper(Push, kind="damper"):
     """A force by the speed between two bodies."""
 
+    books = "dissipated"
     table, rank = "brace", 1
 
     def fill(self, draft, name, link, rows) -> None:

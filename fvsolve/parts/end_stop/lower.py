@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import join
-from fvsolve.model.lowering import Lowering
+from fvsolve.model.bodies import Push, join
 
 FAR = 1e300  # room before a stop that is not there
 
 
-class EndStop(Lowering, kind="end-stop"):
+class EndStop(Push, kind="end-stop"):
     """A spring and a damper that push where two bodies meet."""
 
     table = "stop"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import join
+from fvsolve.model.bodies import Push, join
 from fvsolve.model.inputs import FORCE, Input
-from fvsolve.model.lowering import Lowering, rows_in
+from fvsolve.model.lowering import rows_in
 
 
-class Force(Lowering, kind="force"):
+class Force(Push, kind="force"):
     """A force by a schedule."""
 
+    books = "supplied"
     table, rank = "brace", 2
 
     def fill(self, draft, name, link, rows) -> None:

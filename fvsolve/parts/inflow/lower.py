@@ -10,6 +10,8 @@ from fvsolve.model.lowering import Lowering
 class Inflow(Lowering, kind="inflow"):
     """A junction whose demand is negative."""
 
+    books = "inflow"
+
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.flow, -draft.fluid.density)
 

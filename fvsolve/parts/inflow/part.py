@@ -14,6 +14,7 @@ class Inflow(Node, kind="inflow"):
     Ports: any number. Stored energy: none. Dissipated energy: none; it brings p times flow [W].
     """
 
+    driven: ClassVar[tuple[str, float]] = "flow", 1.0
     own_scalars: ClassVar[str] = "inflow"
 
     flow: Annotated[Schedule, Scheduled("flow", about="positive into the network [m3/s]")]

@@ -10,6 +10,8 @@ from fvsolve.model.lowering import Lowering
 class Junction(Lowering, kind="junction"):
     """A place whose flows sum to what is drawn there."""
 
+    books = "demand"
+
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.demand, draft.fluid.density)
 

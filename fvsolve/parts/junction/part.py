@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
@@ -22,6 +22,8 @@ class Junction(Node, kind="junction"):
     from none at `minimum_pressure` to all at `required_pressure` and above (Wagner, Shamir and Marks 1988); what it
     gets runs out to ambient, and (p - ambient) q is dissipated [W].
     """
+
+    driven: ClassVar[tuple[str, float]] = "demand", -1.0
 
     demand: Annotated[Schedule, Scheduled("flow", about="positive outward [m3/s]")] = Field(
         default_factory=lambda: constant(0.0)

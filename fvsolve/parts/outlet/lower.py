@@ -12,6 +12,8 @@ from fvsolve.parts.schedule import constant
 class Outside(Lowering, kind="outside"):
     """Ambient pressure."""
 
+    books = "outside"
+
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["schedule"] = rec.FIXED, draft.schedules.add(constant(draft.case.ambient_pressure))
 

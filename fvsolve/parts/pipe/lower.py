@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
+from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.model import PipeMesh
+from fvsolve.model.reading import along
 from fvsolve.model.unsteady import reserve
 from fvsolve.schemes import quicker
 
@@ -41,3 +43,8 @@ class Pipe(Lowering, kind="pipe"):
                 np.linspace(0.0, link.length, n + 1), z[0] + row["slope"] * x,
             )
         )  # fmt: skip
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["index"] = draft.pipe_names.index(name)
+        row["kind"] = rec.PIPE_FLOW if probe.quantity in ("flow", "velocity") else rec.PIPE_PRESSURE
+        along(draft, row, probe.fraction)

@@ -10,6 +10,8 @@ from fvsolve.model.lowering import Lowering
 class Reservoir(Lowering, kind="reservoir"):
     """A place whose pressure is a schedule's."""
 
+    books = "reservoir"
+
     def place(self, draft, name, node, row) -> None:
         row["kind"] = rec.FIXED
         if node.head is not None:

@@ -18,6 +18,7 @@ class Reservoir(Node, kind="reservoir"):
     its ports enters the ledger as work done on the network. Dissipated energy: none.
     """
 
+    driven: ClassVar[tuple[str, float]] = "pressure", 0.0
     own_scalars: ClassVar[str] = "inflow"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
     fixes_pressure: ClassVar[bool] = True

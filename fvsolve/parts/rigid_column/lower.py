@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 
 
@@ -18,3 +19,6 @@ class RigidColumn(Lowering, kind="rigid-column"):
         row["area"], row["length"] = math.pi / 4.0 * link.diameter**2, link.length
         draft.hydraulics.friction(name, link, row, draft.fault)
         row["y"] = draft.states([f"{name}.flow"], 0.1 * draft.fluid.density * row["area"])
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["kind"], row["index"] = rec.COLUMN_FLOW, draft.column_names.index(name)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from fvsolve.kernels import records as rec
 from fvsolve.model.inputs import POSITION, Input
 from fvsolve.model.lowering import Restriction
 from fvsolve.parts.spool_valve.part import EDGES
+
+FLOWS = {  # flow into the link at a port: weights of its four edges
+    f"flow_{port}": [float((port == start) - (port == end)) for start, end, _ in EDGES] for port in "PTAB"
+}
 
 
 class SpoolValve(Restriction, kind="spool-valve"):
@@ -18,6 +23,14 @@ class SpoolValve(Restriction, kind="spool-valve"):
             row["from_node"], row["to_node"] = (draft.node_index[link.ports[port]] for port in (start, end))
             row["schedule"] = parts[side]
             self.restriction(draft, name, link, row)
+
+    def row_names(self, name) -> list[str]:
+        return [f"{name}.{start}-{end}" for start, end, _ in EDGES]
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["index"], row["kind"] = draft.valve_names.index(name), rec.SPOOL_FLOW
+        row["weights"] = len(draft.floats)
+        draft.floats += FLOWS[probe.quantity]
 
     def inputs(self, model, name, part):
         first = model.valve_names.index(name)

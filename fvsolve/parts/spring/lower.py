@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import join
-from fvsolve.model.lowering import Lowering
+from fvsolve.model.bodies import Push, join
 
 
-class Spring(Lowering, kind="spring"):
+class Spring(Push, kind="spring"):
     """A force by the distance of two bodies."""
 
+    books = "stored"
     table, rank = "brace", 0
 
     def fill(self, draft, name, link, rows) -> None:

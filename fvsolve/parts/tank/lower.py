@@ -11,6 +11,8 @@ from fvsolve.model.lowering import Lowering
 class Tank(Lowering, kind="tank"):
     """A place whose pressure is that under the level of what it holds."""
 
+    books = "over the rim"
+
     def place(self, draft, name, node, row) -> None:
         rho = draft.case.law.open_density
         row["kind"], row["level"], row["density"] = rec.TANK, node.level, rho
@@ -41,6 +43,11 @@ class Tank(Lowering, kind="tank"):
     def moves(self, name, node, row, inflow, flow) -> str:
         what = "rises" if flow > 0 else "falls"
         return f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s"
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity != "level":
+            return super().probe(draft, name, probe, row)
+        row["kind"], row["index"] = rec.LEVEL, draft.node_index[draft.inside(name)]
 
 
 def shaped_volume(level, area, volume, z: float) -> float:

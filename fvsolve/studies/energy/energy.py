@@ -200,14 +200,11 @@ def by_name(accounts: list[Account], what: str, columns: np.ndarray) -> dict[str
 
 def check_port(case, port: str | None) -> None:
     """FvsolveError where a node of a case is no port."""
-    known = [name for name, node in case.places.items() if node.kind in PORTS]
+    known = [name for name, node in case.places.items() if node.driven is not None]
     if port is not None and port not in known:
         hint = did_you_mean(port, known) or f"; these are {', '.join(known)}"
         hint = hint if known else ", and this case has none"
         raise FvsolveError(f'no port named "{port}": wanted a reservoir, an inflow or a junction{hint}')
-
-
-PORTS = ("reservoir", "inflow", "junction")
 
 
 def judged(run: EnergyRun, port: str) -> Port:

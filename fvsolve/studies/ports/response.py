@@ -13,7 +13,6 @@ from fvsolve.studies.ports.state_space import TOLERANCE, StateVerdict, Transfer,
 
 LARGEST = 800  # states whose Hamiltonian matrix, twice as large, is still taken
 DECADE = 200  # frequencies a decade in the table
-OWN = {"reservoir": "admittance", "junction": "impedance", "inflow": "impedance"}  # others store: impedance
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +94,8 @@ def response(
     transfer = _transfer(flows.at, a, b, c, d, error)
     verdict = state_positive_real(transfer, max(TOLERANCE, 10.0 * error))
     w = _table(verdict, transfer) if frequencies is None else np.asarray(frequencies, float)
-    kind = OWN.get(case.places[port].kind, "impedance")
+    driven = case.places[port].driven
+    kind = "admittance" if driven is not None and driven[1] == 0.0 else "impedance"
     return Response(
         case.name, flows.at.when, port, kind, found.case.numerics.scheme if found.cells else None,
         tuple(flows.states), tuple(flows.state_units), a, b, c, d, error, transfer, w, transfer(1j * w), verdict,
@@ -107,17 +107,17 @@ def _linear(case, port: str, at, before, scheme):
     """((A, b, c, d), the Linear they are from)."""
     from fvsolve.studies.linear.linearise import linearise
 
-    kind = case.places[port].kind
+    driven = case.places[port].driven
     asked: Callable = lambda inputs, outputs: linearise(case, inputs, outputs, at, before, scheme)  # noqa: E731
-    if kind == "reservoir":
+    if driven is not None and driven[1] == 0.0:
         signs = port_flows(case, port)
-        found = asked([f"{port}.pressure"], list(signs))
+        found = asked([f"{port}.{driven[0]}"], list(signs))
         weights = np.array(list(signs.values()))
         return (_dense(found.a), found.b[:, 0], weights @ found.c, float(weights @ found.d[:, 0])), found
     pressure = f"nodes.{port}.pressure" if port in case.nodes else f"{port}.pressure"
-    if kind in ("junction", "inflow"):
-        name, sign = (f"{port}.demand", -1.0) if kind == "junction" else (f"{port}.flow", 1.0)
-        found = asked([name], [pressure])
+    if driven is not None:
+        key, sign = driven
+        found = asked([f"{port}.{key}"], [pressure])
         return (_dense(found.a), sign * found.b[:, 0], found.c[0], sign * float(found.d[0, 0])), found
     found = asked([], [pressure])
     row = found.at.model.tables.nodes[found.at.model.node_names.index(port)]

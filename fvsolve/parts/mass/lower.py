@@ -1,0 +1,7 @@
+"""Masses in the tables of a model."""
+
+from fvsolve.model.bodies import Body
+
+
+class Mass(Body, kind="mass"):
+    """A body that forces move."""
