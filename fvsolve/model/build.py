@@ -149,7 +149,7 @@ class Draft:
         names = [name for name, _, lowering in parts for _ in range(lowering.rows)]
         rows, at = np.zeros(len(names), record), 0
         if table == "valve":
-            rows["device"] = rows["hooks"] = -1
+            rows["device"] = rows["hooks"] = rows["data"] = rows["event"] = -1
             rows["back"] = 1.0
         for name, link, lowering in parts:
             lowering.fill(self, name, link, rows[at : at + lowering.rows])

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fvsolve.kernels import calls
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 from fvsolve.model.lowering import Lowering, Restriction, lowering_of
@@ -67,13 +68,6 @@ class Device(Restriction):
         """What counts as a small deviation of each of its states."""
         return []
 
-    def edge(self, start, k: int):
-        """As of `Restriction`; None unless it has one of its own."""
-        return None
-
-    def follow(self, start, k: int) -> None:
-        """Nothing: `begin` sees to it."""
-
     def revise(self, start, part: Any, row) -> bool:
         """Whether a steady solution asks for another state of it, which is then set."""
         return False
@@ -111,22 +105,27 @@ def lower_devices(draft) -> None:
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
-        row["sudden"], row["event"] = device.sudden, draft.flags(name, device.events)
+        row["data"], row["sudden"], row["event"] = len(draft.floats), device.sudden, draft.flags(name, device.events)
         row["leads"] = row["event"] + device.leads if device.leads >= 0 else -1
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
-            draft.valve_table["device"][row["valve"]], draft.valve_table["event"][row["valve"]] = k, row["event"]
+            sets_up(draft.valve_table[row["valve"]], device, k, row)
         elif name in draft.node_index:
             row["node"] = draft.node_index[name]
             row["row"] = draft.node_table[row["node"]]["row"]
         if (gate := device.gate(name)) is not None:
             row["valve"] = draft.valve_names.index(gate)
             draft.valve_table["device"][row["valve"]] = k
-        row["data"] = len(draft.floats)
         draft.floats += device.numbers(draft, name, part)
         for state, scale in zip(states, device.scales(draft, name, part), strict=True):
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
+
+
+def sets_up(valve, device: Device, k: int, row) -> None:
+    """Let a VALVE row know its device: which opens it if its law has a `set`, and where its flags and numbers stand."""
+    valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
+    valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
 
 
 def opening_of(start, k: int) -> float:

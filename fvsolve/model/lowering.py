@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from fvsolve.kernels import calls
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.restrictions import step_at
+from fvsolve.parts.schedule import constant
 from fvsolve.steady import Edge
 
 if TYPE_CHECKING:
@@ -98,10 +99,12 @@ class Restriction(Lowering):
         draft.ends(link, row)
         row["schedule"] = -1
         self.restriction(draft, name, link, row)
+        if self.steps:
+            row["hooks"] = draft.hooks(self)
+        if row["schedule"] < 0 and (self.law is None or calls.hook_of(self.law, "set") is None):
+            row["schedule"] = draft.schedules.add(constant(1.0))
         if self.law is None:
             return
-        if calls.hook_of(self.law, "step") is not None:
-            row["hooks"] = draft.hooks(self)
         if not self.acts:
             row["data"], row["event"] = len(draft.floats), draft.flags(name, self.events)
             draft.floats += self.numbers(draft, name, link)
@@ -109,13 +112,18 @@ class Restriction(Lowering):
     def probe(self, draft, name: str, probe: Any, row) -> None:
         row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(name)
 
+    @property
+    def steps(self) -> bool:
+        """Whether a law of its own says what it lets through."""
+        return self.law is not None and calls.hook_of(self.law, "step") is not None
+
     def restriction(self, draft, name: str, link: Any, row) -> None:
         """Fill its VALVE row with what its law does not say."""
         draft.restriction(name, link, row)
 
     def edge(self, start, k: int) -> Edge | None:
         """Its edge in the steady problem, k its VALVE row; None for that of a root, open as `start.shut` has it."""
-        if self.law is None:
+        if not self.steps:
             return None
         row, (denser, wider) = start.valves[k], start.dense_of.get(k, (1.0, 1.0))
         row["open"] = g = start.conductance(k)

@@ -215,7 +215,8 @@ class Start:
         """What says how valve k stands, if not its schedule alone."""
         if self.valves[k]["device"] >= 0:
             return self.draft.devices[self.valves[k]["device"]][2]
-        return lowering_of(type(self.case.conduits[self.draft.valve_names[k]]))
+        link = self.case.conduits[self.draft.valve_names[k]]
+        return lowering_of(type(link)).of(link)
 
     def conductance(self, k: int) -> float:
         """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""

@@ -55,6 +55,9 @@ class Lifting(Device, kind=""):
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
         return Edge(i, j, self.row(start, k), 0.0, senses=i)
 
+    def follow(self, start, k) -> None:
+        """Nothing: `begin` sees to it."""
+
     def flow_at(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
         """(flow, its slope over the drop at this lift, its slope over the lift)."""
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)

@@ -109,6 +109,9 @@ class Pump(Device, kind="pump"):
         first = rho * floats[at + curves.SCALE] * speed
         return Edge(i, j, newton, float(first), drives=True)
 
+    def follow(self, start, k) -> None:
+        """Nothing: `begin` sees to it."""
+
     def lift(self, start, row, flow: float) -> float:
         """What a pump adds at a mass flow [Pa]."""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))

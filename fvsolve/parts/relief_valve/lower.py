@@ -59,7 +59,6 @@ class Relief(ReliefDisc, kind="relief-valve"):
         return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
 
     def numbers(self, draft, name, part) -> list[float]:
-        draft.valve_table["data"][draft.valve_names.index(name)] = len(draft.floats)
         return [0.0, part.overpressure, 0.0]
 
     def put_lift(self, start, row, x, target):

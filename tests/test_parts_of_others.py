@@ -1,0 +1,141 @@
+"""The worked example of docs/a-part-from-nothing.md, run as it stands there from a package that is not ours."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import fvsolve
+
+PAGE = (Path(fvsolve.__file__).parents[1] / "docs" / "a-part-from-nothing.md").read_text(encoding="utf-8")
+BLOCKS = dict(re.findall(r"`([\w./]+\.\w+)`[^`]*?:\n\n```\w+\n(.*?)```", PAGE, re.DOTALL))
+BLOCKS |= dict(re.findall(r"`(test_runner\.py)`.*?```python\n(.*?)```", PAGE, re.DOTALL))
+RESISTANCE, LOSS, AREA, LEVEL = 2e6, 4e8, 2.0, 20.0
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory) -> Path:
+    """A folder with the scene and an installed package `mill`, which offers the runner."""
+    top = tmp_path_factory.mktemp("mill")
+    package = top / "mill" / "runner"
+    package.mkdir(parents=True)
+    for name in ("part.py", "lower.py", "law.py"):
+        (package / name).write_text(BLOCKS[f"runner/{name}"], encoding="utf-8")
+    for folder in (package, package.parent):
+        (folder / "__init__.py").touch()
+    (top / "mill.toml").write_text(BLOCKS["mill.toml"], encoding="utf-8")
+    (top / "test_runner.py").write_text(BLOCKS["test_runner.py"], encoding="utf-8")
+    offered = tomllib.loads(re.search(r"```toml\n(\[project\.entry.*?)```", PAGE, re.DOTALL)[1])
+    facts = top / "mill-1.0.dist-info"
+    facts.mkdir()
+    (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: mill\nVersion: 1.0\n", encoding="utf-8")
+    rows = [f"{name} = {place}" for name, place in offered["project"]["entry-points"]["fvsolve.parts"].items()]
+    (facts / "entry_points.txt").write_text("\n".join(["[fvsolve.parts]", *rows, ""]), encoding="utf-8")
+    return top
+
+
+def python(home: Path, *arguments: str, **environment: str) -> str:
+    """What a process prints that has the package; it must succeed."""
+    paths = [str(home), str(Path(fvsolve.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    known = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "MPLBACKEND": "Agg"} | environment
+    done = subprocess.run([sys.executable, *arguments], cwd=home, env=known, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def command(home: Path, *words: str, **environment: str) -> str:
+    return python(home, "-m", "fvsolve", *words, **environment)
+
+
+def flow(level: float, weight: float) -> float:
+    """The root of resistance q + loss q^2 = rho g level."""
+    return (-RESISTANCE + np.sqrt(RESISTANCE**2 + 4.0 * LOSS * weight * level)) / (2.0 * LOSS)
+
+
+def test_its_own_test_passes(home):
+    assert "1 passed" in python(home, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_runner.py")
+
+
+def test_commands_know_it_like_any_other(home):
+    assert "share of its blades that the shaft gets" in command(home, "schema")
+    command(home, "check", "mill.toml")
+    with pytest.raises(AssertionError, match="links.wheel.efficiency"):
+        command(home, "check", "mill.toml", "--set", "links.wheel.efficiency=2")
+    with pytest.raises(AssertionError, match="links.wheel.loss"):
+        command(home, "check", "mill.toml", "--set", 'links.wheel.loss="3 m"')
+
+
+def test_its_pole_is_that_of_its_law(home):
+    """rho A dz/dt = -rho q(z): the pole is -q'(z) / A."""
+    command(home, "linearise", "mill.toml", "--out", "linear")
+    case = fvsolve.load({**tomllib.loads(BLOCKS["mill.toml"]), "links": {"wheel": VALVE}})
+    weight = case.properties.density * case.gravity
+    (pole,) = np.linalg.eigvals(np.load(home / "linear" / "linear.npz")["A"])
+    assert pole == pytest.approx(-weight / np.sqrt(RESISTANCE**2 + 4.0 * LOSS * weight * LEVEL) / AREA, rel=1e-6)
+
+
+VALVE = {"type": "valve", "from": "upper", "to": "lower", "discharge_coefficient": 1.0, "area": 1e-3}
+
+
+def test_its_shaft_takes_its_share(home):
+    """efficiency loss |q|^3 over the run, against SciPy's quadrature of the falling level."""
+    found = json.loads(command(home, "energy", "mill.toml", "--json"))
+    weight = fvsolve.load({**tomllib.loads(BLOCKS["mill.toml"]), "links": {"wheel": VALVE}})
+    weight = weight.properties.density * weight.gravity
+    rates = lambda t, y: [-flow(y[0], weight) / AREA, 0.8 * LOSS * flow(y[0], weight) ** 3]  # noqa: E731
+    exact = solve_ivp(rates, (0.0, 600.0), [LEVEL, 0.0], rtol=1e-11, atol=1e-9).y[1, -1]
+    assert found["supplied"]["wheel"] == pytest.approx(-exact, rel=1e-7)
+    assert found["relative"] < 1e-10 and found["ok"]
+
+
+def test_its_order_is_that_of_methods(home):
+    told = json.loads(command(home, "order", "mill.toml", "--json", "--levels", "4", "--method", "euler,improved-euler"))
+    orders = [one["fits"]["upper.level"]["L2"]["order"] for one in told["studies"]]
+    assert orders == pytest.approx([1.0, 2.0], abs=0.05)
+
+
+def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
+    def least() -> float:
+        told = json.loads(command(home, "run", "mill.toml", "--json", "--force"))
+        return told["extremes"]["upper.level"]["least"]
+
+    def compiled() -> int:
+        told = command(home, "run", "mill.toml", "--force", NUMBA_DEBUG_CACHE="1")
+        assert told.count("index loaded") > 5
+        return told.count("saved to")
+
+    first, law = least(), home / "mill" / "runner" / "law.py"
+    assert compiled() == 0
+    text = law.read_text(encoding="utf-8")
+    law.write_text(text.replace("return copysign(0.5 *", "return copysign(0.25 *"), encoding="utf-8")
+    assert compiled() > 0
+    assert least() > first + 1.0  # half the flow
+    assert compiled() == 0
+    law.write_text(text, encoding="utf-8")
+    assert least() == first and compiled() == 0
+
+
+def test_a_folder_can_be_named(home):
+    """By a variable of the environment, and in Python."""
+    bare = home / "alone"
+    bare.mkdir()
+    (bare / "mill.toml").write_text(BLOCKS["mill.toml"], encoding="utf-8")
+    folder = bare / "runner"
+    shutil.copytree(home / "mill" / "runner", folder)
+    named = 'import fvsolve; fvsolve.register("runner"); print(fvsolve.run("mill.toml").ok)'
+    paths = {"PYTHONPATH": str(Path(fvsolve.__file__).parents[1])}
+    for words, more in ((["-c", named], {}), (["-m", "fvsolve", "check", "mill.toml"], {"FVSOLVE_PARTS": str(folder)})):
+        done = subprocess.run(
+            [sys.executable, *words], cwd=bare, env=os.environ | paths | more, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
