@@ -99,7 +99,9 @@ def test_its_shaft_takes_its_share(home):
 
 
 def test_its_order_is_that_of_methods(home):
-    told = json.loads(command(home, "order", "mill.toml", "--json", "--levels", "4", "--method", "euler,improved-euler"))
+    told = json.loads(
+        command(home, "order", "mill.toml", "--json", "--levels", "4", "--method", "euler,improved-euler")
+    )
     orders = [one["fits"]["upper.level"]["L2"]["order"] for one in told["studies"]]
     assert orders == pytest.approx([1.0, 2.0], abs=0.05)
 
