@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins.place import Patch  # noqa: F401  (to be found among the kinds of places)
+from fvsolve.model.basins.place import PatchRows  # noqa: F401  (to be found among the kinds of places)
 
 
 def lower_basins(draft) -> None:

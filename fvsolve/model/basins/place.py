@@ -6,7 +6,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 
 
-class Patch(Lowering, kind="patch"):
+class PatchRows(Lowering, kind="patch"):
     """A place whose pressure the cells behind it set."""
 
     books = "dry patch"

@@ -10,7 +10,7 @@ ROUNDED = 1e-5  # share of the mass that it gave which errors in its neck are me
 NECK = 0.01  # share of its volume that is fluid in the neck of a bladder accumulator
 
 
-class Accumulator(Device, kind="accumulator"):
+class AccumulatorRows(Device, kind="accumulator"):
     """A vessel whose pressure is that of its gas."""
 
     law = law

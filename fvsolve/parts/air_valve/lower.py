@@ -11,7 +11,7 @@ from fvsolve.parts.air_valve import law
 GAS_CONSTANT = 287.05  # of air [J/kg/K]
 
 
-class AirValve(Device, kind="air-valve"):
+class AirValveRows(Device, kind="air-valve"):
     """The chamber of one; it is shut at the start."""
 
     law = law

@@ -6,7 +6,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 
 
-class Chamber(Lowering, kind="chamber"):
+class ChamberRows(Lowering, kind="chamber"):
     """A place whose pressure is that of the fluid it holds."""
 
     def place(self, draft, name, node, row) -> None:

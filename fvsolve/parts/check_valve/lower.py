@@ -59,7 +59,7 @@ class CheckLag(CheckDisc, kind=""):
     states = ("opening",)
 
 
-class CheckValve(Device, kind="check-valve"):
+class CheckValveRows(Device, kind="check-valve"):
     """Open or shut; its steady state is that in which no open one flows back and no shut one is pushed open."""
 
     law, sudden = law, True

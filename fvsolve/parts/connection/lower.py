@@ -7,7 +7,7 @@ from fvsolve.model.lowering import Restriction
 from fvsolve.parts.schedule import constant
 
 
-class Connection(Restriction, kind="connection"):
+class ConnectionRows(Restriction, kind="connection"):
     """A throat with a loss each way."""
 
     def restriction(self, draft, name, link, row) -> None:

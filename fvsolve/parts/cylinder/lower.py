@@ -6,7 +6,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.bodies import Push, join
 
 
-class Cylinder(Push, kind="cylinder"):
+class CylinderRows(Push, kind="cylinder"):
     """A piston between two chambers and two bodies."""
 
     table = "piston"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fvsolve.model.bodies import Push, join
 
 
-class Damper(Push, kind="damper"):
+class DamperRows(Push, kind="damper"):
     """A force by the speed between two bodies."""
 
     books = "dissipated"

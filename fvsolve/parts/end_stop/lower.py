@@ -7,7 +7,7 @@ from fvsolve.model.bodies import Push, join
 FAR = 1e300  # room before a stop that is not there
 
 
-class EndStop(Push, kind="end-stop"):
+class EndStopRows(Push, kind="end-stop"):
     """A spring and a damper that push where two bodies meet."""
 
     table = "stop"

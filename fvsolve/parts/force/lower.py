@@ -7,7 +7,7 @@ from fvsolve.model.inputs import FORCE, Input
 from fvsolve.model.lowering import rows_in
 
 
-class Force(Push, kind="force"):
+class ForceRows(Push, kind="force"):
     """A force by a schedule."""
 
     books = "supplied"

@@ -3,5 +3,5 @@
 from fvsolve.model.bodies import Body
 
 
-class Frame(Body, kind="frame"):
+class FrameRows(Body, kind="frame"):
     """A body that stands still."""

@@ -7,7 +7,7 @@ from fvsolve.model.inputs import FLOW, Input, values_in
 from fvsolve.model.lowering import Lowering
 
 
-class Inflow(Lowering, kind="inflow"):
+class InflowRows(Lowering, kind="inflow"):
     """A junction whose demand is negative."""
 
     books = "inflow"

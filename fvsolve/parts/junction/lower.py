@@ -7,7 +7,7 @@ from fvsolve.model.inputs import FLOW, Input
 from fvsolve.model.lowering import Lowering
 
 
-class Junction(Lowering, kind="junction"):
+class JunctionRows(Lowering, kind="junction"):
     """A place whose flows sum to what is drawn there."""
 
     books = "demand"

@@ -3,5 +3,5 @@
 from fvsolve.model.bodies import Body
 
 
-class Mass(Body, kind="mass"):
+class MassRows(Body, kind="mass"):
     """A body that forces move."""

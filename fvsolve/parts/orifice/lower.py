@@ -1,7 +1,7 @@
 """Orifices in the tables of a model."""
 
-from fvsolve.parts.valve.lower import Valve
+from fvsolve.parts.valve.lower import ValveRows
 
 
-class Orifice(Valve, kind="orifice"):
+class OrificeRows(ValveRows, kind="orifice"):
     """As a valve."""

@@ -9,7 +9,7 @@ from fvsolve.parts.outlet import law
 from fvsolve.parts.schedule import constant
 
 
-class Outside(Lowering, kind="outside"):
+class OutsideRows(Lowering, kind="outside"):
     """Ambient pressure."""
 
     books = "outside"
@@ -24,7 +24,7 @@ class Outside(Lowering, kind="outside"):
         return ""
 
 
-class Outlet(Restriction, kind="outlet"):
+class OutletRows(Restriction, kind="outlet"):
     """Its flow a power of the drop."""
 
     law = law

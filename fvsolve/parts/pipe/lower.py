@@ -14,7 +14,7 @@ from fvsolve.model.unsteady import reserve
 from fvsolve.schemes import quicker
 
 
-class Pipe(Lowering, kind="pipe"):
+class PipeRows(Lowering, kind="pipe"):
     """Cells of two waves."""
 
     table = "pipe"

@@ -25,7 +25,7 @@ UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
 SNAP = 1e-12  # share of the torques on a shaft below which their sum is rounding
 
 
-class Pump(Device, kind="pump"):
+class PumpRows(Device, kind="pump"):
     """A restriction that follows its curve; its steady state is that in which no flow passes its check valve back."""
 
     law = law

@@ -157,7 +157,7 @@ class Regulator(Device, kind=""):
                           'and leaves it nothing to set; change the demand, or use initial = "rest"')  # fmt: skip
 
 
-class PressureReducing(Regulator, kind="pressure-reducing"):
+class PressureReducingRows(Regulator, kind="pressure-reducing"):
     """Keeps the pressure at `to` down: open where even full opening leaves less, shut where others bring more."""
 
     mode, end, verb = law.REDUCING, "to", "reduce"
@@ -173,7 +173,7 @@ class PressureReducing(Regulator, kind="pressure-reducing"):
         return ACTIVE if now == OPEN and here.p_to > high else now
 
 
-class PressureSustaining(Regulator, kind="pressure-sustaining"):
+class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
     """Keeps the pressure at `from` up: open where even full opening leaves more, shut where there is less."""
 
     mode, end, verb = law.SUSTAINING, "from", "open"
@@ -189,7 +189,7 @@ class PressureSustaining(Regulator, kind="pressure-sustaining"):
         return ACTIVE if now == OPEN and here.p_from < low else now
 
 
-class FlowControl(Regulator, kind="flow-control"):
+class FlowControlRows(Regulator, kind="flow-control"):
     """Keeps the flow down: open where even full opening lets less pass."""
 
     mode, key = law.FLOW_CONTROL, "set_flow"

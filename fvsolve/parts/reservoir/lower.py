@@ -7,7 +7,7 @@ from fvsolve.model.inputs import HEAD, PRESSURE, Input, values_in
 from fvsolve.model.lowering import Lowering
 
 
-class Reservoir(Lowering, kind="reservoir"):
+class ReservoirRows(Lowering, kind="reservoir"):
     """A place whose pressure is a schedule's."""
 
     books = "reservoir"

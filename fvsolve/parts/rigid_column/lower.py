@@ -8,7 +8,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 
 
-class RigidColumn(Lowering, kind="rigid-column"):
+class RigidColumnRows(Lowering, kind="rigid-column"):
     """One flow."""
 
     table = "column"

@@ -12,7 +12,7 @@ FLOWS = {  # flow into the link at a port: weights of its four edges
 }
 
 
-class SpoolValve(Restriction, kind="spool-valve"):
+class SpoolValveRows(Restriction, kind="spool-valve"):
     """Four valves; those of one side of zero share a schedule of their opening."""
 
     rows, rank = len(EDGES), 1

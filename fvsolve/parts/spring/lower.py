@@ -5,7 +5,7 @@ from __future__ import annotations
 from fvsolve.model.bodies import Push, join
 
 
-class Spring(Push, kind="spring"):
+class SpringRows(Push, kind="spring"):
     """A force by the distance of two bodies."""
 
     books = "stored"

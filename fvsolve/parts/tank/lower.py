@@ -8,7 +8,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 
 
-class Tank(Lowering, kind="tank"):
+class TankRows(Lowering, kind="tank"):
     """A place whose pressure is that under the level of what it holds."""
 
     books = "over the rim"

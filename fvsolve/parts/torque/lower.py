@@ -8,7 +8,7 @@ from fvsolve.parts.pump.law import OWN_NUMBERS
 from fvsolve.parts.pump.lower import torques_on
 
 
-class Torque(Lowering, kind="torque"):
+class TorqueRows(Lowering, kind="torque"):
     """What its pump adds up."""
 
     def inputs(self, model, name, part):

@@ -6,7 +6,7 @@ from fvsolve.model.inputs import OPENING, Input
 from fvsolve.model.lowering import Restriction
 
 
-class Valve(Restriction, kind="valve"):
+class ValveRows(Restriction, kind="valve"):
     """A root whose conductance follows a schedule."""
 
     def restriction(self, draft, name, link, row) -> None:
