@@ -1,0 +1,61 @@
+"""A piece of the right-hand side may be given a band of rows: a handle whose tables are slices."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fvsolve
+from fvsolve.kernels.handle import make_handle
+from fvsolve.kernels.phases import PHASES
+from fvsolve.model import Slate
+
+BANDED = ("answer", "rates")  # phases in which pipes write nothing that another reads
+ENDS = 4  # numbers that a pipe offers
+
+
+def handles(slate: Slate, cuts: list[int]) -> list[np.ndarray]:
+    """A handle for each band of pipes between cuts, with scratch of its own."""
+    tables, functions = slate.model.tables, slate.model.functions
+    found = []
+    for first, last in zip(cuts, cuts[1:], strict=False):
+        layout = tables.layout.copy()
+        layout["ends"] += ENDS * first
+        own = tables._replace(pipes=tables.pipes[first:last], layout=layout)
+        written = slate.written._replace(scratch=slate.written.scratch.copy())
+        made = (*own, *written, functions.calls, functions.hooks)
+        found.append((make_handle(made), made))  # what a handle opens must live as long
+    return found
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("cuts", [[0, 4, 9], [0, 1, 2, 9]])
+def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
+    """In turn, backwards and in threads."""
+    path = Path(fvsolve.__file__).parents[1] / "cases" / "streeter-nine-pipes.toml"
+    model = fvsolve.build(fvsolve.load(path, {"fluid.law": law}))
+    y = model.start + 0.1 * model.scale * np.random.default_rng(3).normal(size=model.y_size)
+    dydt, out = model.evaluate(0.3, y)
+    slate = Slate(model)
+    bands, whole = handles(slate, cuts), slate.handle
+
+    def found(each) -> tuple[np.ndarray, np.ndarray]:
+        rates, beside = np.zeros(model.y_size), model.new_out()
+        for phase in PHASES:
+            for piece in model.functions.cast.functions(phase):
+                if phase in BANDED:
+                    each(lambda one, piece=piece: piece(0.3, y, rates, beside, one[0]))
+                else:
+                    piece(0.3, y, rates, beside, whole)
+        return rates, beside
+
+    with ThreadPoolExecutor(len(bands)) as pool:
+        ways = (lambda do: [do(one) for one in bands], lambda do: [do(one) for one in bands[::-1]],
+                lambda do: list(pool.map(do, bands)))  # fmt: skip
+        for each in ways:
+            rates, beside = found(each)
+            assert np.array_equal(rates, dydt) and np.array_equal(beside, out)
+
