@@ -58,4 +58,3 @@ def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
         for each in ways:
             rates, beside = found(each)
             assert np.array_equal(rates, dydt) and np.array_equal(beside, out)
-

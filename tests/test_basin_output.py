@@ -21,7 +21,7 @@ from fvsolve.draw.view import LABELS, digits, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.kernels.plane.observe import observe_basins, observe_dense_flows
 from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.points import Points
+from fvsolve.mesh.points import MeshPoints
 from fvsolve.model import Slate
 from fvsolve.output.fields import parted, shape, write_frame
 
@@ -62,7 +62,7 @@ def meshes(folder):
 def test_points_read_linear_fields_exactly_inside_and_no_value_beyond_those_of_the_cells(tmp_path):
     rng = np.random.default_rng(4)
     for mesh in meshes(tmp_path):
-        points, hull, many = Points(mesh), Delaunay(mesh.centre), 0
+        points, hull, many = MeshPoints(mesh), Delaunay(mesh.centre), 0
         outer = np.unique(mesh.ends[mesh.inner :])
         linear = 1.0 + 2.0 * mesh.centre[:, 0] - 3.0 * mesh.centre[:, 1]
         low, high = mesh.points.min(0), mesh.points.max(0)
@@ -83,7 +83,7 @@ def test_points_read_linear_fields_exactly_inside_and_no_value_beyond_those_of_t
 
 
 def test_the_nearest_point_inside_is_nearest_and_inside():
-    points = Points(rectangle((4.0, 4.0), (16, 16), holes=[(1.0, 1.0, 2.0, 2.5)]))
+    points = MeshPoints(rectangle((4.0, 4.0), (16, 16), holes=[(1.0, 1.0, 2.0, 2.5)]))
     for outside, inside in (((-1.0, 2.0), (0.0, 2.0)), ((1.2, 1.6), (1.0, 1.6)), ((9.0, 9.0), (4.0, 4.0))):
         assert points.cell(*outside) == -1
         near = points.nearest(*outside)
@@ -281,13 +281,13 @@ def test_a_line_that_lies_in_no_basin_is_refused():
 
 
 def test_a_line_across_a_hole_has_nothing_there(tmp_path):
-    from fvsolve.output.lines import Line
+    from fvsolve.output.lines import LineReading
 
     case = fvsolve.load(liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]]) | {
         "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}
     })  # fmt: skip
     model = fvsolve.build(case)
-    line = Line(case.output.lines["cut"], model.basins[0], case)
+    line = LineReading(case.output.lines["cut"], model.basins[0], case)
     rows = line.text(model.fields(model.start, model.new_out())["block"]).splitlines()
     found = [float(row.split(",")[3]) for row in rows[1:]]  # the hole has its ends, 1 m and 2 m, as its outline
     assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)

@@ -13,7 +13,7 @@ from fvsolve.steppers import method_named, stability_function
 from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.linear.linearise import linearised
 from fvsolve.studies.stability.bounds import numerical_abscissa
-from fvsolve.studies.stability.growth import Dense
+from fvsolve.studies.stability.growth import DenseGrowth
 from fvsolve.studies.stability.stability import stability
 from fvsolve.studies.stability.system import predicted
 
@@ -52,7 +52,7 @@ def by_hand(stiffness, method, steps=1000):
 def system_of(case, method, at=None, steps=1000):
     """The linear system of a case in its energy norm."""
     state = frozen(case, at=at)
-    return Dense(method_named(method), energy_form(state.model, state.y).seen(linearised(state).a), steps)
+    return DenseGrowth(method_named(method), energy_form(state.model, state.y).seen(linearised(state).a), steps)
 
 
 @pytest.mark.parametrize("stiffness, hold", [(1e6, 0.0), (1e7, 0.1)])
@@ -105,7 +105,7 @@ def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
 def test_the_greatest_growth_is_found_at_every_power_of_a_small_system():
     """An oscillator in a norm that is not its own: growth of Euler's steps swings as it rises."""
     e, steps = np.array([[0.0, 1.0], [-40.0, 0.0]]), 300
-    found = predicted(Dense(method_named("euler"), e, steps)).step
+    found = predicted(DenseGrowth(method_named("euler"), e, steps)).step
 
     def most(h):
         power, size = np.eye(2), 0.0

@@ -13,14 +13,14 @@ from scipy.integrate import quad
 
 from fvsolve.case.sections import FluidSpec
 from fvsolve.fluid import LAWS, properties
-from fvsolve.fluid.laws import Dense, Linear
+from fvsolve.fluid.laws import DenseLaw, LinearLaw
 from fvsolve.kernels import density as kernels
 from fvsolve.kernels import records as rec
 
 AMBIENT, GRAVITY, REFERENCE = 98000.0, 9.81, 2e5
 GIVEN = {"mixture": {"air_fraction": 0.004}}  # what a law needs beside its name
 PRESSURES = [3e4, 1e5, 2e5, 7e5, 4e6, 3e7]
-DENSE = [name for name, law in LAWS.items() if issubclass(law, Dense)]
+DENSE = [name for name, law in LAWS.items() if issubclass(law, DenseLaw)]
 QUESTIONS = {name: one for name, one in vars(kernels).items()
              if getattr(one, "__module__", "") == kernels.__name__ and name != "by_law"}  # fmt: skip
 
@@ -58,7 +58,7 @@ def public(cls) -> set[str]:
 
 def test_each_answers_the_same_questions():
     for name, one in LAWS.items():
-        assert public(Linear) <= public(one), name
+        assert public(LinearLaw) <= public(one), name
     for name in set(DENSE):
         module = getattr(kernels, name)
         for question, asked in QUESTIONS.items():

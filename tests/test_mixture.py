@@ -14,7 +14,7 @@ from truth.scenes import chamber, junction, pipe, ramp, reservoir, scene, valve
 import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.fluid import properties
-from fvsolve.fluid.laws import Mixture
+from fvsolve.fluid.laws import MixtureLaw
 from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
 from fvsolve.studies.energy.energy import energy
@@ -34,7 +34,7 @@ def settings(**keys):
     """The record that kernels read, of oil with what `keys` mix into it."""
     fluid = properties(**{**OIL, "temperature": 293.15, "pressure": ATM, "law": "mixture", **keys})
     made = np.zeros(1, rec.SETTINGS)
-    Mixture.lower(fluid, made[0], [])
+    MixtureLaw.lower(fluid, made[0], [])
     return made[0]
 
 

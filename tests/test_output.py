@@ -14,7 +14,7 @@ from truth.scenes import AMBIENT, scene
 
 import fvsolve
 from fvsolve.output import layout
-from fvsolve.output.column import Column
+from fvsolve.output.column import UnitColumn
 from fvsolve.output.fields import FieldSeries, read_series
 from fvsolve.output.history import HistoryFile, read_headers, read_table
 
@@ -147,8 +147,8 @@ def test_no_frames_where_none_are_asked_for(tmp_path):
 
 
 def test_rows_are_not_kept_in_memory(tmp_path):
-    columns = [Column(f"n{i}.pressure", "pressure", "Pa") for i in range(4)]
-    history = HistoryFile(tmp_path / "history.csv", Column("t", "time", "s"), columns)
+    columns = [UnitColumn(f"n{i}.pressure", "pressure", "Pa") for i in range(4)]
+    history = HistoryFile(tmp_path / "history.csv", UnitColumn("t", "time", "s"), columns)
     history.start()
     block = np.random.default_rng(1).random((1000, 4))
     history.write(block[:, 0], block)

@@ -20,7 +20,7 @@ from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.linear.linearise import linearise, linearised
 from fvsolve.studies.stability.bounds import field_of_values, region_limit
 from fvsolve.studies.stability.carried import Sparse, stepping
-from fvsolve.studies.stability.growth import Dense, growth, powers, step_matrix
+from fvsolve.studies.stability.growth import DenseGrowth, growth, powers, step_matrix
 from fvsolve.studies.stability.measured import Runs
 from fvsolve.studies.stability.stability import stability
 from fvsolve.studies.stability.system import predicted
@@ -120,11 +120,11 @@ def one_step_error(case, name, h):
 
 @pytest.mark.parametrize("steps", [100, 1000])
 def test_limits_of_one_mode_are_those_of_its_powers(steps):
-    decay = predicted(Dense(method_named("euler"), np.array([[-5.0]]), steps))
+    decay = predicted(DenseGrowth(method_named("euler"), np.array([[-5.0]]), steps))
     assert decay.step == pytest.approx((1 + 1000 ** (1 / steps)) / 5.0, rel=2e-4)
-    swing = predicted(Dense(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
+    swing = predicted(DenseGrowth(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
     assert swing.step == pytest.approx(math.sqrt(1000 ** (2 / steps) - 1) / 3.0, rel=2e-4)
-    assert predicted(Dense(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step == math.inf
+    assert predicted(DenseGrowth(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step == math.inf
 
 
 def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
@@ -145,7 +145,7 @@ def test_an_inflow_pipe_grows_at_courant_numbers_far_below_what_its_eigenvalues_
     for cells in (30, 100):
         e = 10.0 * cells * (np.eye(cells, k=-1) - np.eye(cells))
         euler = method_named("euler")
-        found = predicted(Dense(euler, e, 400)).step * 10.0 * cells
+        found = predicted(DenseGrowth(euler, e, 400)).step * 10.0 * cells
         assert found == pytest.approx(by_hand(cells, 400), rel=1e-3)
         assert found < 1.15
         assert region_limit(euler, np.diag(e)) * 10.0 * cells == pytest.approx(2.0, rel=1e-6)
@@ -173,7 +173,9 @@ def test_vectors_carried_along_find_the_limit_of_squaring():
 
     for case, name in ((through(20, "upwind"), "euler"), (shut(20, "upwind5"), "rk4")):
         e, method = matrix(case), method_named(name)
-        exact, found = (predicted(kind(method, part, 300)).step for kind, part in ((Dense, e), (Sparse, csr_array(e))))
+        exact, found = (
+            predicted(kind(method, part, 300)).step for kind, part in ((DenseGrowth, e), (Sparse, csr_array(e)))
+        )
         assert found == pytest.approx(exact, rel=5e-3)
 
 

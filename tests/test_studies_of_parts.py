@@ -17,7 +17,7 @@ from fvsolve.studies.accuracy.fit import fit
 from fvsolve.studies.accuracy.judge import plausible
 from fvsolve.studies.accuracy.models import change_time
 from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings, work
-from fvsolve.studies.accuracy.rungs import Misfit, restated
+from fvsolve.studies.accuracy.rungs import Unsayable, restated
 from fvsolve.studies.accuracy.timing import GIVEN_UP
 from fvsolve.studies.failure import watched as watched_runs
 from fvsolve.studies.failure.eigen_limit import spectrum
@@ -172,9 +172,9 @@ def test_what_acts_on_a_pump_that_trips_is_its_run_down():
 
 
 def test_a_vessel_is_not_said_by_a_volume():
-    with pytest.raises(Misfit, match="top would take the place of the air-valve"):
+    with pytest.raises(Unsayable, match="top would take the place of the air-valve"):
         restated(case("air-valve"), "lumped volume")
-    with pytest.raises(Misfit, match="all ends hold their pressure"):
+    with pytest.raises(Unsayable, match="all ends hold their pressure"):
         restated(case("pump-trip-air-vessel"), "column and volume")
 
 

@@ -24,7 +24,7 @@ from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
-    from fvsolve.mesh.points import Points
+    from fvsolve.mesh.points import MeshPoints
 
 Found = Iterator[tuple[tuple, str]]
 # Three Gauss points along either side of a rectangle, of sqrt(3 / 5) of half of it: centre, corners, sides.
@@ -61,11 +61,11 @@ class Pool:
         return x, y
 
     @cached_property
-    def points(self) -> Points:
+    def points(self) -> MeshPoints:
         """Finds points of the mesh."""
-        from fvsolve.mesh.points import Points
+        from fvsolve.mesh.points import MeshPoints
 
-        return Points(self.mesh)
+        return MeshPoints(self.mesh)
 
 
 def mesh_of(basin: Basin, setting: Setting) -> Mesh:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 
-class Names:
+class FreeNames:
     """Names of one group of parts, each once; a name that a case cannot hold becomes a near one."""
 
     def __init__(self) -> None:

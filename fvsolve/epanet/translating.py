@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from fvsolve.epanet import words
-from fvsolve.epanet.names import Names
+from fvsolve.epanet.names import FreeNames
 from fvsolve.epanet.reading import SHUT, Hour
 
 STALLED = 1e-7  # flow below which EPANET's pumps of constant power have stuck [m3/s]
@@ -30,7 +30,7 @@ class Translation:
         self.links: dict[str, words.Part] = {}
         self.marks: dict[str, str] = {}
         self.noted: dict[str, list[str]] = {}
-        self.node_names, self.link_names = Names(), Names()
+        self.node_names, self.link_names = FreeNames(), FreeNames()
         hydraulic = network.options.hydraulic
         self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
         self.gravity = hydraulic.specific_gravity  # a pressure in metres is one of water, a head one of the fluid

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib import import_module
 
-from fvsolve.exact.solution import Solution, Start, kinds_only, law_holds
+from fvsolve.exact.solution import ExactStart, Solution, kinds_only, law_holds
 
 __all__ = ["NAMES", "Solution", "Start", "misfits", "solution"]
 
@@ -29,7 +29,7 @@ def misfits(case) -> Iterator[tuple[tuple, str]]:
     yield from list(kinds_only(case, room.NODES, room.LINKS)) or room.misfits(case)
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """The exact solution that a case names, from the flows and pressures it starts with."""
     return _module(case.exact.name).solution(case, start)
 

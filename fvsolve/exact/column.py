@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from fvsolve.exact.schedule import constant_from, value
-from fvsolve.exact.solution import Solution, Start, only_one, reservoirs
+from fvsolve.exact.solution import ExactStart, Solution, only_one, reservoirs
 
 NODES, LINKS = ("reservoir", "junction"), ("rigid-column", "valve", "orifice")
 
@@ -53,7 +53,7 @@ def parts(case) -> tuple[list, list]:
     return columns, [one for one in case.links.items() if one[1].kind in ("valve", "orifice")]
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """Flow and node pressures of a case that `misfits` finds nothing in."""
     [(name, column)], valves = parts(case)
     rho, t0 = case.properties.density, case.numerics.start

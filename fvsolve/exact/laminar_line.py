@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from fvsolve.exact.schedule import value
-from fvsolve.exact.solution import Solution, Start, only_one, reservoirs
+from fvsolve.exact.solution import ExactStart, Solution, only_one, reservoirs
 
 NODES, LINKS = ("reservoir", "junction"), ("pipe",)
 LAMINAR = 2000.0  # greatest Reynolds number that is laminar for sure
@@ -55,10 +55,10 @@ def reynolds(case, pipe) -> float:
     return 4.0 * flow * case.properties.density / (math.pi * pipe.diameter * case.properties.viscosity)
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """Pressures and flows along the line of a case that `misfits` finds nothing in."""
     [(name, pipe)] = case.links.items()
-    line = Line(case, pipe)
+    line = LineDeviation(case, pipe)
     drop = start.pressure[pipe.to] - start.pressure[pipe.from_]
     flow = start.flow[name]
 
@@ -73,7 +73,7 @@ def solution(case, start: Start) -> Solution:
     return Solution(case, pressure=pressures, pipe=along, kinks=lambda _, t: line.fronts(t))
 
 
-class Line:
+class LineDeviation:
     """Deviations from the start along a pipe, x counted from the reservoir."""
 
     def __init__(self, case, pipe) -> None:

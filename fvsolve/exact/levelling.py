@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.exact.schedule import constant_from, value
-from fvsolve.exact.solution import Solution, Start, levels_hold, only_one, reservoirs
+from fvsolve.exact.solution import ExactStart, Solution, levels_hold, only_one, reservoirs
 
 NODES, LINKS = ("reservoir", "tank", "chamber"), ("valve", "orifice")
 
@@ -19,7 +19,7 @@ def misfits(case):
     found = list(_misfits(case))
     yield from found
     if not found:
-        yield from levels_hold(solution(case, Start({}, {})))
+        yield from levels_hold(solution(case, ExactStart({}, {})))
 
 
 def _misfits(case):
@@ -44,7 +44,7 @@ def _misfits(case):
             yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" knows the turbulent law alone'
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """Pressures, levels and the flow of a case that `misfits` finds nothing in."""
     (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
     ends, weight = (part.from_, part.to), rho * case.gravity

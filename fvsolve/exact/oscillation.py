@@ -11,7 +11,7 @@ import numpy as np
 
 from fvsolve.exact.levelling import first_pressure
 from fvsolve.exact.schedule import constant_from
-from fvsolve.exact.solution import Solution, Start, levels_hold, only_one
+from fvsolve.exact.solution import ExactStart, Solution, levels_hold, only_one
 
 NODES, LINKS = ("reservoir", "tank"), ("rigid-column",)
 
@@ -22,7 +22,7 @@ def misfits(case):
     yield from found
     if not found:
         yield from levels_hold(
-            solution(case, Start({}, {name: link.initial_flow or 0.0 for name, link in case.links.items()}))
+            solution(case, ExactStart({}, {name: link.initial_flow or 0.0 for name, link in case.links.items()}))
         )
 
 
@@ -44,7 +44,7 @@ def _misfits(case):
             yield ("links", link, "friction"), f'the exact solution "{name}" holds without friction and losses'
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """Levels, pressures and the flow of a case that `misfits` finds nothing in."""
     name, column = next(iter(case.links.items()))
     rho, g, t0 = case.properties.density, case.gravity, case.numerics.start

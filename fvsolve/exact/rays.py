@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.exact.schedule import kinks, value
-from fvsolve.exact.solution import Solution, Start, reservoirs
+from fvsolve.exact.solution import ExactStart, Solution, reservoirs
 
 NODES, LINKS = ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice")
 MOST_PATHS = 20000
@@ -44,7 +44,7 @@ def misfits(case):
             yield ("nodes", node), 'the exact solution "rays" wants a pipe at every junction'
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """Pressures, flows and fields of a case that `misfits` finds nothing in."""
     rays = Rays(case, start)
     nodes = {name: (lambda t, n=name: rays.pressure(n, t)) for name in case.nodes}
@@ -55,7 +55,7 @@ def solution(case, start: Start) -> Solution:
 class Rays:
     """The pipes of a case with what their nodes do to waves; nodes that a valve joins are one group."""
 
-    def __init__(self, case, start: Start) -> None:
+    def __init__(self, case, start: ExactStart) -> None:
         self.case, self.rho, self.t0 = case, case.properties.density, case.numerics.start
         self.weight = self.rho * case.gravity
         self.z = {name: case.elevation(name) for name in case.nodes}

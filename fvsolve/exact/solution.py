@@ -14,7 +14,7 @@ GAUSS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True)
-class Start:
+class ExactStart:
     """What a case starts from: pressures of nodes [Pa] and volume flows of links [m3/s], by name."""
 
     pressure: dict[str, float]

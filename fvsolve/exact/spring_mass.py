@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from fvsolve.exact.schedule import constant_from
-from fvsolve.exact.solution import Solution, Start, only_one
+from fvsolve.exact.solution import ExactStart, Solution, only_one
 
 NODES, LINKS = ("mass", "frame", "reservoir"), ("spring", "damper", "force")
 
@@ -28,7 +28,7 @@ def misfits(case):
             yield ("links", name, "force"), f'the exact solution "{case.exact.name}" wants a constant force'
 
 
-def solution(case, start: Start) -> Solution:
+def solution(case, start: ExactStart) -> Solution:
     """Position and velocity of the mass of a case that `misfits` finds nothing in."""
     name, mass = next(one for one in case.nodes.items() if one[1].kind == "mass")
     at = {body: part.initial_position for body, part in case.nodes.items() if part.domain == "translational"}

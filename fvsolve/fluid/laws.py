@@ -105,7 +105,7 @@ class Law:
         return float(row["speed"])
 
 
-class Linear(Law, name="linear"):
+class LinearLaw(Law, name="linear"):
     """One density, but that mass and pressure of what is squeezed are linear in each other."""
 
     code, linear, scalars, basins = rec.LAW_LINEAR, True, True, ("free-surface", "liquid", "transport")
@@ -152,7 +152,7 @@ class Linear(Law, name="linear"):
         return float(np.sum(self.rho * row["area"] * row["dx"] * (1 + strain)))
 
 
-class Dense(Law):
+class DenseLaw(Law):
     """Laws whose kernels hold masses: their questions are those of `kernels.density`."""
 
     @cached_property
@@ -207,13 +207,13 @@ class Dense(Law):
         return float(np.sum(profile[row["center"] + np.arange(len(start))])) * row["dx"]
 
 
-class Log(Dense, name="log"):
+class LogLaw(DenseLaw, name="log"):
     """p = p_ref + beta ln(rho / rho_ref): one bulk modulus."""
 
     code, basins = rec.LAW_LOG, ("liquid", "transport")
 
 
-class Table(Dense, name="table"):
+class TableLaw(DenseLaw, name="table"):
     """CoolProp's own density along the isentrope through the reference state."""
 
     code, tabulated, basins = rec.LAW_TABLE, True, ("liquid", "transport")
@@ -237,7 +237,7 @@ class Table(Dense, name="table"):
         floats += fluid.table.numbers(fluid.density, fluid.pressure)
 
 
-class Mixture(Dense, name="mixture"):
+class MixtureLaw(DenseLaw, name="mixture"):
     """Liquid with free gas, and vapour where cavities are asked for; with nothing mixed in it is `log`."""
 
     code, keys = rec.LAW_MIXTURE, AIR_KEYS
@@ -250,7 +250,7 @@ class Mixture(Dense, name="mixture"):
     def lower(cls, fluid, s, floats: list[float]) -> None:
         super().lower(fluid, s, floats)
         if fluid.air is None or fluid.air.fraction == 0.0:
-            s["law"] = Log.code
+            s["law"] = LogLaw.code
             return
         s["floor"] = fluid.vapor_pressure if fluid.air.cavitation else 0.0
         s["gas_power"], s["saturation"] = 1.0 / fluid.air.exponent, fluid.air.saturation_pressure - s["floor"]

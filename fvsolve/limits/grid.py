@@ -39,7 +39,7 @@ EVERY, LONGEST, SHORTEST, BETWEEN, GROWS = "all", "longest", "shortest", "betwee
 
 
 @dataclass(frozen=True)
-class Edge:
+class RangeEnd:
     """An end of a stable range: its Courant number and the wave that sets it, by t = sin^2(theta / 2) and in words."""
 
     courant: float
@@ -52,7 +52,7 @@ class Edge:
         return 2 * math.asin(math.sqrt(self.t))
 
 
-EVERYTHING = [(Edge(0.0), Edge(math.inf))]
+EVERYTHING = [(RangeEnd(0.0), RangeEnd(math.inf))]
 
 
 @dataclass(frozen=True)
@@ -348,12 +348,12 @@ def _candidates(g, rays: list[Fraction]):
 def _sharpened(g, rays, low: float, high: float):
     """The same range with its ends as edges; None where it closes."""
     inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
-    start = _edge(g, rays, inside, -1) if low > 0 else Edge(0.0)
-    end = _edge(g, rays, inside, 1) if math.isfinite(high) else Edge(math.inf)
+    start = _edge(g, rays, inside, -1) if low > 0 else RangeEnd(0.0)
+    end = _edge(g, rays, inside, 1) if math.isfinite(high) else RangeEnd(math.inf)
     return (start, end) if start.courant < end.courant else None
 
 
-def _edge(g, rays: list[Fraction], inside: float, side: int) -> Edge:
+def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
     """The end of the stable range around `inside`: the nearest change of sign over all t, by zooming in."""
 
     def reach(t: Fraction) -> float:
@@ -377,11 +377,11 @@ def _edge(g, rays: list[Fraction], inside: float, side: int) -> Edge:
         low, high = _dyadic(low, 60), _dyadic(high, 60)
     close = [abs(one - best) <= 1e-11 * abs(best) for one in (*ends, *all_of)]
     if all(close):
-        return Edge(abs(best), Fraction(1), EVERY)
+        return RangeEnd(abs(best), Fraction(1), EVERY)
     for is_close, t, wave in ((close[0], Fraction(0), LONGEST), (close[1], Fraction(1), SHORTEST)):
         if is_close:
-            return Edge(abs(best), t, wave)
-    return Edge(abs(best), where, BETWEEN)
+            return RangeEnd(abs(best), t, wave)
+    return RangeEnd(abs(best), where, BETWEEN)
 
 
 def _dyadic(x, bits: int) -> Fraction:

@@ -14,7 +14,7 @@ SUM_FIRST = 1e4  # how much more the sum of the weights counts than their point,
 INWARD = 1e-3  # of the way from the outline to the centre of its cell
 
 
-class Points:
+class MeshPoints:
     """Finds points in a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:

@@ -10,7 +10,7 @@ from fvsolve import units
 
 
 @dataclass(frozen=True)
-class Column:
+class UnitColumn:
     """A named quantity in the unit that the reader asked for; gauge pressures count from `ambient` [Pa]."""
 
     name: str
@@ -48,21 +48,21 @@ class Column:
         return self.dimension == "number" or self.unit == units.DIMENSIONS[self.dimension].si
 
 
-def column(name: str, dimension: str, case, label: str = "") -> Column:
+def column(name: str, dimension: str, case, label: str = "") -> UnitColumn:
     """The column of a quantity in the unit that `case.output.units` asks for, SI where it is silent; or a number's."""
     known = units.DIMENSIONS[dimension]
     asked = case.output.units
-    return Column(
+    return UnitColumn(
         name, dimension, label or asked.get(dimension) or asked.get(known.base) or known.si, case.ambient_pressure
     )
 
 
-def time_column(case) -> Column:
+def time_column(case) -> UnitColumn:
     """The first column of history.csv."""
     return column("t", "time", case)
 
 
-def probe_columns(model) -> list[Column]:
+def probe_columns(model) -> list[UnitColumn]:
     """One column per probe of a model, in its order."""
     return [column(probe.text, probe.dimension, model.case, probe.unit) for probe in model.probes]
 
@@ -73,7 +73,7 @@ def split_header(header: str) -> tuple[str, str]:
     return (name.strip(), unit.removesuffix("]").strip()) if bracket else (header.strip(), "")
 
 
-def converted(columns: list[Column], values: np.ndarray) -> np.ndarray:
+def converted(columns: list[UnitColumn], values: np.ndarray) -> np.ndarray:
     """`values : float64[k, n]` from SI into the columns' units; the same array where all are SI."""
     if all(one.plain for one in columns):
         return values

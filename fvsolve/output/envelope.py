@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError
-from fvsolve.output.column import Column, column, split_header
+from fvsolve.output.column import UnitColumn, column, split_header
 
 QUANTITIES = {
     "distance": "length",
@@ -23,7 +23,7 @@ QUANTITIES = {
 }
 
 
-def envelope_columns(case) -> list[Column]:
+def envelope_columns(case) -> list[UnitColumn]:
     """The columns of envelope.csv after `pipe`, in the units that the case asks for."""
     return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError
-from fvsolve.output.column import Column, converted, split_header
+from fvsolve.output.column import UnitColumn, converted, split_header
 
 
 class HistoryFile:
     """Appends rows to a CSV file whose numbers read back to the last bit."""
 
-    def __init__(self, path: Path, time: Column, columns: list[Column]):
+    def __init__(self, path: Path, time: UnitColumn, columns: list[UnitColumn]):
         self.path = path
         self.time = time
         self.columns = columns

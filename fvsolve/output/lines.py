@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError
-from fvsolve.output.column import Column, column, converted
+from fvsolve.output.column import UnitColumn, column, converted
 from fvsolve.output.history import quoted
 
 AXES = {"u": 0, "v": 1}  # of velocities
@@ -21,7 +21,7 @@ class LineSeries:
     def __init__(self, folder: Path, model):
         self.folder = folder / "lines"
         basins = {basin.name: basin for basin in model.basins}
-        self.lines = {name: Line(line, basins[line.basin], model.case)
+        self.lines = {name: LineReading(line, basins[line.basin], model.case)
                       for name, line in model.case.output.lines.items()}  # fmt: skip
 
     def start(self) -> None:
@@ -46,7 +46,7 @@ class LineSeries:
         return self.folder / f"{name}-{number:06d}.csv"
 
 
-class Line:
+class LineReading:
     """Points on a line, and which cells are read there; nothing is in holes."""
 
     def __init__(self, said, basin, case) -> None:
@@ -60,7 +60,7 @@ class Line:
         self.cells, self.weights = (np.concatenate([one[k] for one in read]) for k in (0, 1))
         self.row = np.repeat(np.arange(said.points), [one[0].size for one in read])
         self.lost = np.array([one[0].size == 0 for one in read])
-        self.columns = [Column(name, "length", "m") for name in ("distance", "x", "y")]
+        self.columns = [UnitColumn(name, "length", "m") for name in ("distance", "x", "y")]
         self.columns += [column(name, dimension, case) for name, dimension in fields.items()]
         labels = {name: scalar.unit for name, scalar in case.scalars.items()} if basin.scalars else {}
         self.columns += [column(name, "number", case, label) for name, label in labels.items()]

@@ -32,7 +32,7 @@ class Misread(ValueError):
 
 
 @dataclass(frozen=True)
-class Rows:
+class CsvRows:
     """header : names with their units; lines : the line of every row; cells : of every row, as many as the header."""
 
     file: str
@@ -102,7 +102,7 @@ def number(text: str) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def read_rows(path: Path) -> Rows:
+def read_rows(path: Path) -> CsvRows:
     """The header and the rows of a file; ValueError where they are not plain."""
     lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
     if len(lines) < 2:
@@ -120,7 +120,7 @@ def read_rows(path: Path) -> Rows:
         nameless = next((cell for cell, name in zip(row, header, strict=True) if cell and not name), None)
         if nameless is not None:
             raise Misread(path.name, f"{show(nameless)} stands under no header{COMMAS}", line)
-    return Rows(path.name, header, [line for line, _ in lines[1:]], rows)
+    return CsvRows(path.name, header, [line for line, _ in lines[1:]], rows)
 
 
 def is_even(rows: list[list[str]]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.output.column import Column, probe_columns
+from fvsolve.output.column import UnitColumn, probe_columns
 from fvsolve.run.comparison import comparison, interpolated
 
 
@@ -21,7 +21,7 @@ def claims(model, extremes: dict, result) -> dict:
     }
 
 
-def expectation(text: str, expect, column: Column, extremes: dict, result) -> dict:
+def expectation(text: str, expect, column: UnitColumn, extremes: dict, result) -> dict:
     """One line of `[expect]`: claimed, found, tolerance in the unit of the probe, and whether it holds.
 
     `max` and `min` are over all steps and rows, `mean` is over time (trapezoids), `at` is between rows.

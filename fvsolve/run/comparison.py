@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.output.column import Column
+from fvsolve.output.column import UnitColumn
 
 FOUND = (
     "rms",
@@ -17,7 +17,7 @@ FOUND = (
 )
 
 
-def comparison(compare, column: Column, result) -> dict:
+def comparison(compare, column: UnitColumn, result) -> dict:
     """One line of `[compare]`: differences at the measured times within the run, and the two peaks.
 
     Differences (computed less measured) and peaks in the unit of the probe, times in s; all None where no

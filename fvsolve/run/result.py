@@ -11,13 +11,13 @@ import numpy as np
 
 from fvsolve.doors import AMOUNT, NUMBER, PATH, TEXT, door
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
-from fvsolve.output.column import Column
+from fvsolve.output.column import UnitColumn
 from fvsolve.output.fields import read_series
 from fvsolve.shown import Shown, kept
 from fvsolve.units import show
 
 
-class Mark(NamedTuple):
+class ResultMark(NamedTuple):
     """First place and time [s] of what the model cannot follow: do not trust results from there on."""
 
     what: str
@@ -95,9 +95,9 @@ class Result(Shown):
         return self.summary["ok"]
 
     @property
-    def marks(self) -> list[Mark]:
+    def marks(self) -> list[ResultMark]:
         """First place and time from which results are not to be trusted, one per cause."""
-        return [Mark(**one) for one in self.summary["marks"]]
+        return [ResultMark(**one) for one in self.summary["marks"]]
 
     @property
     def warnings(self) -> list[Notice]:
@@ -166,8 +166,8 @@ class Result(Shown):
         return self._time.to_si(self.t)
 
     @property
-    def _time(self) -> Column:
-        return Column("t", "time", self.summary["time_unit"])
+    def _time(self) -> UnitColumn:
+        return UnitColumn("t", "time", self.summary["time_unit"])
 
     def __getitem__(self, probe: str) -> np.ndarray:
         return self._table[:, 1 + self.probes.index(self._known(probe))]
@@ -265,9 +265,9 @@ class Result(Shown):
             for one in compared.values()
         }
 
-    def column(self, probe: str) -> Column:
+    def column(self, probe: str) -> UnitColumn:
         """Name, dimension and unit of a probe, with the way to and from SI."""
-        return Column(self._known(probe), **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
+        return UnitColumn(self._known(probe), **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
 
     def si(self, probe: str) -> np.ndarray:
         """One probe in SI, pressures absolute: float64[rows]."""

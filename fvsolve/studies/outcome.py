@@ -52,7 +52,7 @@ class Outcome:
         return self.counts.get("rhs", 0) * max(1, cells or self.model.y_size)
 
 
-class Rows:
+class RowSink:
     """The sink of a study's run: its rows in SI, nothing else."""
 
     def __init__(self) -> None:
@@ -109,7 +109,7 @@ def _once(model, y, run) -> Outcome:
     from fvsolve.solve import initial_state
     from fvsolve.solve.solve import Run
 
-    state, sink = initial_state(model), Rows()
+    state, sink = initial_state(model), RowSink()
     if y is not None:
         state.y[:] = y
     made = (run or Run)(model, state, sink, None)

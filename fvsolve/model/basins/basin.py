@@ -21,7 +21,7 @@ from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
 
 if TYPE_CHECKING:
-    from fvsolve.mesh.points import Points
+    from fvsolve.mesh.points import MeshPoints
 
 ROUNDING = 1e-12  # of rates
 MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
@@ -109,11 +109,11 @@ class Basin:
     # ----------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def points(self) -> Points:
+    def points(self) -> MeshPoints:
         """Finds points of its mesh, and the cells that are read there."""
-        from fvsolve.mesh.points import Points
+        from fvsolve.mesh.points import MeshPoints
 
-        return Points(self.mesh)
+        return MeshPoints(self.mesh)
 
     def formula(self, shape) -> np.ndarray:
         """Means of a formula over cells, on grids by nine Gauss points, elsewhere at centres : float64[n]."""

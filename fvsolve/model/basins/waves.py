@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from fvsolve.fluid.laws import Table
+from fvsolve.fluid.laws import TableLaw
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane.waves import HEAD
 
@@ -28,7 +28,7 @@ class Waves:
 
     def __init__(self, fluid, pressure: float, wave_speed: float | None = None) -> None:
         settings, floats = np.zeros(1, rec.SETTINGS), []
-        Table.lower(fluid, settings[0], floats)
+        TableLaw.lower(fluid, settings[0], floats)
         n, start, step = (settings[0][key] for key in ("table_size", "table_start", "table_step"))
         knots, value, slope = start + step * np.arange(n), np.array(floats[:n]), np.array(floats[n : 2 * n])
         far, self.rest, self.many = knots[-1] - knots[0], pressure, 3 * int(n - 1)

@@ -29,7 +29,7 @@ ROUNDING = 1e-6  # share of the greatest value by which the ends of a table of S
 
 
 @dataclass(frozen=True)
-class Points:
+class CurvePoints:
     """What a pump does at flows [m3/s]; the file's words for both are the names of the fields.
 
     flow, value : points; word : what the values are; coefficients : of a polynomial in their place
@@ -49,7 +49,7 @@ class Points:
 
 def points(
     given: dict[str, Any], word: str, dimension: str, setting: Setting, range=nonnegative, faults_of=lambda *_: []
-) -> Points:
+) -> CurvePoints:
     """Points of a table { flow, WORD }; Misfit where flows do not rise, the lists differ in length, or `faults_of`."""
     found = read_keys(given, keys_of(word, dimension, range), setting)
     flow, value = found["flow"], found[word]
@@ -62,7 +62,7 @@ def points(
         faults.append((("flow",), str(error)))
     if faults:
         raise Misfit(faults)
-    return Points(flow, value, word)
+    return CurvePoints(flow, value, word)
 
 
 def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Value, Any]]:
@@ -75,15 +75,15 @@ class HeadCurve(Value):
     about = "head over flow at relative speed 1"
     polynomial = {"coefficients": (Rows("number"), NEEDED)}
 
-    def read(self, given: Any, setting: Setting) -> Points:
-        if isinstance(given, Points):
+    def read(self, given: Any, setting: Setting) -> CurvePoints:
+        if isinstance(given, CurvePoints):
             return given
         if not isinstance(given, dict):
             raise ValueError(f'{show(given)} is no table; wanted one such as {{ flow = ["50 l/s"], head = ["40 m"] }}')
         if "coefficients" in given:
             found = read_keys(given, self.polynomial, setting)["coefficients"]
             self.check_polynomial(found)
-            return Points(coefficients=found)
+            return CurvePoints(coefficients=found)
         return points(given, "head", "head", setting, nonnegative, self.faults_of)
 
     def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]) -> list:
@@ -127,8 +127,8 @@ class Efficiency(Value):
     about = "hydraulic power over power at the shaft: at the rated point, or over flow [-]"
     number = Number(between(0, 1, open=True))
 
-    def read(self, given: Any, setting: Setting) -> float | Points:
-        if isinstance(given, Points):
+    def read(self, given: Any, setting: Setting) -> float | CurvePoints:
+        if isinstance(given, CurvePoints):
             return given
         if isinstance(given, dict):
             found = points(given, "efficiency", "number", setting, between(0, 1))
@@ -146,8 +146,8 @@ class ShaftPower(Value):
 
     about = "power at the shaft over flow, at relative speed 1 [W]"
 
-    def read(self, given: Any, setting: Setting) -> Points:
-        if isinstance(given, Points):
+    def read(self, given: Any, setting: Setting) -> CurvePoints:
+        if isinstance(given, CurvePoints):
             return given
         if not isinstance(given, dict):
             raise ValueError(f'{show(given)} is no table; wanted one such as {{ flow = [0, "50 l/s"], power = [...] }}')

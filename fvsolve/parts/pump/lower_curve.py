@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.parts.pump import law_curve as curves
-from fvsolve.parts.pump.head_curve import Points, first_root
+from fvsolve.parts.pump.head_curve import CurvePoints, first_root
 from fvsolve.parts.pump.part import EFFICIENCY
 
 LEAST_FLOW = 1e-5  # share of the last flow below which a curve that is flat there is a straight line
@@ -56,7 +56,7 @@ def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
     return curves.POWER, 3, 0.0 if c == 1.0 else LEAST_FLOW * last, last, [a, b, c]
 
 
-def power_law(curve: Points) -> tuple[float, float, float] | None:
+def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
     """a, b, c of H = a - b q^c through one point (4/3 of its head at no flow, 0 at twice its flow) or three from q = 0.
 
     None of other curves, which are straight lines between their points. As EPANET has it (Rossman 2020).
@@ -92,7 +92,7 @@ def rated_point(part, weight: float) -> tuple[float, float]:
 def shaft_points(part, weight: float) -> list[float]:
     """[how many, flows, powers at the shaft [W]] at relative speed 1; of a Suter table [rated torque, WB]."""
     flow, head = rated_point(part, weight)
-    best = EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, Points) else part.efficiency
+    best = EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, CurvePoints) else part.efficiency
     rated = weight * flow * head / best
     if part.suter is not None:
         return [rated / (part.rated_speed or 1.0), *part.suter.torque]
@@ -100,7 +100,7 @@ def shaft_points(part, weight: float) -> list[float]:
         return [2, 0.0, flow, part.power / best, part.power / best]
     if part.shaft_power is not None:
         flows, powers = part.shaft_power.flow, part.shaft_power.value
-    elif isinstance(part.efficiency, Points):
+    elif isinstance(part.efficiency, CurvePoints):
         flows, powers = by_efficiency(part, weight)
     else:
         flows, powers = (0.0, flow, 4.0 * flow), (2.0 / 3.0 * rated, rated, 2.0 * rated)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.parts.link import TwoPort
-from fvsolve.parts.pump.head_curve import Efficiency, HeadCurve, Points, ShaftPower, Suter, SuterTable
+from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.table import at_least_one
 from fvsolve.parts.value import Flag, Quantity, Usual, nonnegative, positive
@@ -33,7 +33,7 @@ class Pump(TwoPort, kind="pump"):
         "flow": "flow", "head": "head", "speed": "number", "torque": "torque", "power": "power"
     }  # fmt: skip
 
-    curve: Annotated[Points | None, HeadCurve()] = None
+    curve: Annotated[CurvePoints | None, HeadCurve()] = None
     power: Annotated[float | None, Quantity("power", positive, "given to the fluid whatever its flow [W]")] = None
     suter: Annotated[SuterTable | None, Suter()] = None
     speed: Annotated[
@@ -47,7 +47,7 @@ class Pump(TwoPort, kind="pump"):
     ] = None
     trip: Annotated[float | None, Quantity("time", about="when its motor lets the shaft run down [s]")] = None
     efficiency: Annotated[Any, Efficiency()] = None
-    shaft_power: Annotated[Points | None, ShaftPower()] = None
+    shaft_power: Annotated[CurvePoints | None, ShaftPower()] = None
     check_valve: Annotated[bool, Flag("lets nothing pass from `to` to `from`, without loss")] = False
 
     @classmethod

@@ -21,7 +21,7 @@ def value_of(text: str, names: Mapping | None = None):
     tokens = TOKEN.findall(text)
     if "".join(tokens) != re.sub(r"\s", "", text):
         raise ValueError(f'"{text}" is not a number')
-    reader = _Reader(text, tokens, names or {})
+    reader = _Parser(text, tokens, names or {})
     found = reader.sum()
     if reader.rest:
         raise ValueError(f'"{text}": "{reader.rest[-1]}" does not fit')
@@ -42,7 +42,7 @@ def digits(text: str) -> int:
     return max((len(one.replace(".", "").lstrip("0")) for one in found), default=0)
 
 
-class _Reader:
+class _Parser:
     """Recursive descent: sum, product, power, atom."""
 
     def __init__(self, text: str, tokens: list[str], names: Mapping):

@@ -15,10 +15,10 @@ from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import from_files
-from fvsolve.studies.accuracy.front import Point, Row, cheapest, coarser, curves, errors_of, row, setting_between
+from fvsolve.studies.accuracy.front import FrontRow, Point, cheapest, coarser, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
 from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, left_out, settings
-from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest
+from fvsolve.studies.accuracy.setting import MethodSetting, adaptive, cell_keys, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.distance import Distance, distance, moving
 from fvsolve.studies.outcome import Progress, names, prepared, refusal
@@ -62,7 +62,7 @@ class Chart(Shown):
     floor: dict
     default: str
     compile_seconds: float
-    front: list[Row]
+    front: list[FrontRow]
     reused: int = 0
     aim: Aim | None = None
     told: tuple[str, ...] = field(default=())
@@ -213,7 +213,7 @@ class _Study:
         self.done += 1
         return found
 
-    def point(self, setting: Setting) -> Point:
+    def point(self, setting: MethodSetting) -> Point:
         """A setting run and measured, or as it was found before; none that costs more than one that was given up."""
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
         extra, dearer = {"study": "chart", "keys": setting.keys, "judged by": self.finest}, self.given_up
@@ -243,14 +243,14 @@ class _Study:
             found += wider
         return found
 
-    def compile(self, setting: Setting) -> float:
+    def compile(self, setting: MethodSetting) -> float:
         """Seconds that the first run of a curve takes beyond its second; none for what is refused."""
         try:
             return compile_seconds(prepared(self.case, setting.keys))
         except CaseError:
             return 0.0
 
-    def measure(self, setting: Setting) -> dict:
+    def measure(self, setting: MethodSetting) -> dict:
         """What a point stores: errors and cost of a run, or why there are none."""
         try:
             model = prepared(self.case, setting.keys)
@@ -294,7 +294,7 @@ def nothing(reason: str) -> dict:
     return {"ok": False, "reason": reason, **asdict(Distance()), **cost}
 
 
-def grows(setting: Setting) -> bool:
+def grows(setting: MethodSetting) -> bool:
     """Whether the finer settings of a curve cost more: an implicit method may gain by a smaller tolerance."""
     if setting.cells is not None or not adaptive(setting.method):
         return True

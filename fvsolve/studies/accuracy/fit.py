@@ -73,14 +73,14 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
         raise FvsolveError("sizes must be positive and fall from row to row")
     if np.any(e < 0.0):
         raise FvsolveError("errors must not be negative; give their absolute values")
-    rows = Rows(h, e, floor)
+    rows = FitRows(h, e, floor)
     if rows.good.size < LEAST_ROWS:
         return rows.none(rows.too_few())
     found = rows.whole() or rows.without_one() or rows.whole(strict=False) or rows.none(rows.why())
     return rows.none(rows.drifting()) if found.spread >= found.order else found
 
 
-class Rows:
+class FitRows:
     """The rows of one fit."""
 
     def __init__(self, h: np.ndarray, e: np.ndarray, floor: float) -> None:

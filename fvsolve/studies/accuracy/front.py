@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from fvsolve.case.case import Case
 from fvsolve.studies.accuracy.pareto import Crossing, between, crossing
-from fvsolve.studies.accuracy.setting import Setting, with_cells, without_cells
+from fvsolve.studies.accuracy.setting import MethodSetting, with_cells, without_cells
 
 COARSEST_RTOL = 0.1  # a tolerance beyond says nothing
 
@@ -21,7 +21,7 @@ class Point:
     seconds : CPU time of the steps, the best of several [s]; updates : calls of the rates times cells (states)
     """
 
-    setting: Setting
+    setting: MethodSetting
     ok: bool
     reason: str
     trajectory: float
@@ -36,7 +36,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Row:
+class FrontRow:
     """One line of the front: the cheapest curve for a target and the program's default beside it.
 
     name, by_updates : the cheapest by CPU time and by cell updates; what is None is not reached
@@ -61,12 +61,12 @@ def curves(points: Sequence[Point]) -> dict[str, list[Point]]:
     return found
 
 
-def row(points: Sequence[Point], target: float, floor: float, default: str) -> Row:
+def row(points: Sequence[Point], target: float, floor: float, default: str) -> FrontRow:
     """The line of a target; default : name of the default's curve."""
     by_time, by_work = (cheapest(points, target, floor, cost) for cost in ("seconds", "updates"))
     name, where = by_time or (None, None)
     own, work = (crossings(points, target, floor, cost).get(default) for cost in ("seconds", "updates"))
-    return Row(
+    return FrontRow(
         target, name, fineness(points, name, where), where and where.cost, by_work and by_work[0],
         by_work and by_work[1].cost, fineness(points, default, own), own and own.cost, work and work.cost,
     )  # fmt: skip
@@ -93,14 +93,14 @@ def cheapest(points: Sequence[Point], target: float, floor: float, cost: str) ->
     return min(crossings(points, target, floor, cost).items(), key=lambda one: one[1].cost, default=None)
 
 
-def setting_between(case: Case, coarse: Setting, fine: Setting, share: float) -> Setting:
+def setting_between(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
     """The setting at a share of the way between two of a curve."""
     if coarse.cells is not None:
         return with_cells(case, coarse.scheme, coarse.method, math.ceil(between(coarse.cells, fine.cells, share)))
     return without_cells(coarse.method, float(f"{between(coarse.size, fine.size, share):.2g}"))
 
 
-def coarser(case: Case, setting: Setting) -> Setting | None:
+def coarser(case: Case, setting: MethodSetting) -> MethodSetting | None:
     """The next coarser setting of a curve: half the cells, ten times the tolerance, twice the step; None at its end."""
     if setting.cells is not None:
         return with_cells(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None

@@ -14,7 +14,7 @@ from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, order_
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.plane import unit_of
 from fvsolve.studies.accuracy.refine import Level, Plan
-from fvsolve.studies.accuracy.rows import Order, Row
+from fvsolve.studies.accuracy.rows import Order, OrderRow
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.distance import NORMS, differences, recorded, size_of
 from fvsolve.studies.outcome import Outcome, Progress, outcome, prepared
@@ -117,7 +117,7 @@ class Judge:
                 return {name: size_of(run, name) for name in differences(run, self.truth, self.own)}
         raise FvsolveError(f"no row could be run: {run.reason}")
 
-    def row(self, level: Level) -> Row:
+    def row(self, level: Level) -> OrderRow:
         """A run with its errors."""
         run = self.run(level)
         errors = differences(run, self.truth, self.own) if run.ok else {}
@@ -268,12 +268,12 @@ def sure(found: Fit, ratio: float) -> bool:
     return found.order > 0.0 and np.log(ratio) * found.spread <= SURE_FACTOR * (ratio**found.order - 1.0)
 
 
-def extrapolated(rows, fits) -> tuple[Row, ...]:
+def extrapolated(rows, fits) -> tuple[OrderRow, ...]:
     """Rows whose differences d to the next are errors where an order p is sure: d and the error of the next.
 
     The last difference leaves d / (ratio^p - 1).
     """
-    found: list[Row] = []
+    found: list[OrderRow] = []
     for k in range(len(rows) - 1, -1, -1):
         errors, after = {}, found[-1].errors if found else {}
         for name, norms in rows[k].errors.items():
@@ -298,18 +298,18 @@ def differences_only(rows, fits) -> list[str]:
             "to the next row; errors are larger"]  # fmt: skip
 
 
-def measured(level: Level, run: Outcome, errors: dict) -> Row:
+def measured(level: Level, run: Outcome, errors: dict) -> OrderRow:
     """A row of the table from its run."""
     counts = run.counts
     updates = run.cell_updates if run.model is not None else 0
-    return Row(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
+    return OrderRow(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
                "" if run.ok else run.reason)  # fmt: skip
 
 
-def row_of(level: Level, found: Mapping) -> Row:
+def row_of(level: Level, found: Mapping) -> OrderRow:
     """A row from plain data."""
     seconds = np.nan if found["seconds"] is None else found["seconds"]
-    return Row(level, plain_numbers(found["errors"]), seconds, found["rhs"], found["cell_updates"], found["steps"],
+    return OrderRow(level, plain_numbers(found["errors"]), seconds, found["rhs"], found["cell_updates"], found["steps"],
                found["reason"])  # fmt: skip
 
 

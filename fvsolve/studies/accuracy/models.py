@@ -17,7 +17,7 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
 from fvsolve.kernels.schedules import value_until
 from fvsolve.model.checks import velocities
-from fvsolve.studies.accuracy.rungs import Misfit, finer, restated, structures
+from fvsolve.studies.accuracy.rungs import Unsayable, finer, restated, structures
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
 from fvsolve.studies.distance import Gap, moving
 from fvsolve.studies.outcome import Outcome, outcome, without_basins
@@ -236,7 +236,7 @@ def laws(case) -> list[str]:
 def _run(case, rung: str, law: str) -> Outcome:
     try:
         return outcome(case, {**restated(case, rung), "fluid.law": law}, best_of=BEST_OF, run=patient, budget=BRIEF)
-    except (CaseError, Misfit) as error:
+    except (CaseError, Unsayable) as error:
         return Outcome(f"skipped: {error}", refused=True)
 
 

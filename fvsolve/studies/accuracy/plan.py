@@ -13,7 +13,15 @@ from fvsolve.model.checks import rhs_seconds
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import counts, greatest_rate, total
-from fvsolve.studies.accuracy.setting import Setting, adaptive, cell_keys, longest, own_cells, with_cells, without_cells
+from fvsolve.studies.accuracy.setting import (
+    MethodSetting,
+    adaptive,
+    cell_keys,
+    longest,
+    own_cells,
+    with_cells,
+    without_cells,
+)
 from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
 from fvsolve.studies.outcome import prepared
 
@@ -115,7 +123,7 @@ def left_out(case: Case, schemes: Sequence[str] | None) -> list[str]:
     return [] if schemes or not longest(case) else [name for name in CHART_SCHEMES if name not in case.schemes]
 
 
-def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, step) -> list[Setting]:
+def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     """All settings, curve by curve from coarse to fine; the default's curve is always there.
 
     found : the coarse run of a case with pipes, None of one without. Raises FvsolveError for what the case has not.
@@ -128,7 +136,7 @@ def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, st
     return [with_cells(case, *pair, level) for pair in pairs for level in levels]
 
 
-def _lumped(case: Case, schemes, methods, cells, rtol, step) -> list[Setting]:
+def _lumped(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
     if schemes or cells:
         asked = "scheme" if schemes else "cells"
         raise FvsolveError(f"{case.name} has no pipe, so no {asked} to choose; its resolution is rtol or step")

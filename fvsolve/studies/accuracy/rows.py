@@ -11,7 +11,7 @@ from fvsolve.studies.accuracy.refine import Level, Plan
 
 
 @dataclass(frozen=True)
-class Row:
+class OrderRow:
     """One row: its level, its errors by variable and norm, and what it cost; a failed run has its reason."""
 
     level: Level
@@ -44,7 +44,7 @@ class Order(Shown):
     plan: Plan
     kind: str
     words: str
-    rows: tuple[Row, ...]
+    rows: tuple[OrderRow, ...]
     fits: dict[str, dict[str, Fit]]
     own: dict[str, dict[str, float]]
     notes: tuple[str, ...] = ()

@@ -14,7 +14,7 @@ from fvsolve.studies.outcome import prepared
 WITHOUT_CELLS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
 
 
-class Misfit(Exception):
+class Unsayable(Exception):
     """Why a case cannot be said by a rung."""
 
 
@@ -36,7 +36,7 @@ def finer(case, doublings: int) -> list[str]:
 
 
 def restated(case, rung: str) -> dict[str, Any]:
-    """The keys that say a case by a rung; raises Misfit where it cannot be."""
+    """The keys that say a case by a rung; raises Unsayable where it cannot be."""
     if rung in ("full line", "as it is"):
         return {}
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
@@ -80,10 +80,10 @@ def resistance(case, model, name: str) -> dict[str, Any]:
     law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
     flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * row["dx"] * row["cells"]
     if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
-        raise Misfit(f"{name} is at rest at the start, so what its friction takes is not known")
+        raise Unsayable(f"{name} is at rest at the start, so what its friction takes is not known")
     zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
     if not zeta > 0.0:
-        raise Misfit(f"{name} has no friction, so nothing is left of it between two volumes")
+        raise Unsayable(f"{name} has no friction, so nothing is left of it between two volumes")
     said = case.raw["links"][name]
     return {"type": "orifice", "from": said["from"], "to": said["to"], "diameter": said["diameter"],
             "loss_coefficient": zeta}  # fmt: skip
@@ -104,15 +104,15 @@ def volumes(case, pipes: dict) -> dict[str, Any]:
         if node.kind in ("reservoir", "tank", "accumulator"):
             continue
         if node.kind not in ("junction", "inflow", "chamber"):
-            raise Misfit(f"a volume at {name} would take the place of the {node.kind}")
+            raise Unsayable(f"a volume at {name} would take the place of the {node.kind}")
         if name not in case.nodes:
-            raise Misfit(f"{name} belongs to a cylinder and holds no more than its own volume")
+            raise Unsayable(f"{name} belongs to a cylinder and holds no more than its own volume")
         said = case.raw["nodes"][name]
         if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
-            raise Misfit(f"flow enters or leaves at {name}, which a volume does not do by itself")
+            raise Unsayable(f"flow enters or leaves at {name}, which a volume does not do by itself")
         keys = {key: said[key] for key in ("elevation", "position", "initial_pressure") if key in said}
         own = node.volume if node.kind == "chamber" else 0.0
         found[f"nodes.{name}"] = {"type": "chamber", "volume": own + volume, **keys}
     if not found:
-        raise Misfit("all ends hold their pressure, so there is no volume between them")
+        raise Unsayable("all ends hold their pressure, so there is no volume between them")
     return found

@@ -13,7 +13,7 @@ TOLERANCE = 1e-4  # of implicit methods where there are cells: their steps follo
 
 
 @dataclass(frozen=True)
-class Setting:
+class MethodSetting:
     """Scheme (None without cells), method, step control and its size; cells of the part that counts.
 
     keys : dotted keys of the case -> values
@@ -77,19 +77,19 @@ def cell_keys(case: Case, cells: int) -> dict:
     return found
 
 
-def with_cells(case: Case, scheme: str, method: str, cells: int) -> Setting:
+def with_cells(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
     """A setting on pipes: Courant 0.9, 1 for upwind with Euler; a tolerance for adaptive implicit methods."""
     by_error = steps_by_error(method)
     control = "rtol" if by_error else "courant"
     size = TOLERANCE if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
     keys = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
-    return Setting(scheme, method, control, size, cells, keys | cell_keys(case, cells))
+    return MethodSetting(scheme, method, control, size, cells, keys | cell_keys(case, cells))
 
 
-def without_cells(method: str, size: float) -> Setting:
+def without_cells(method: str, size: float) -> MethodSetting:
     """A setting of ordinary differential equations: by tolerance, or by step where a method estimates no error."""
     control = "rtol" if adaptive(method) else "step"
-    return Setting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
+    return MethodSetting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
 
 
 def adaptive(method: str) -> bool:

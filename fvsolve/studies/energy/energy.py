@@ -13,7 +13,7 @@ from fvsolve.model.energy_ledger import Account
 from fvsolve.model.energy_start import available, datum_of
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.booking import EnergyRun
-from fvsolve.studies.outcome import Rows, prepared
+from fvsolve.studies.outcome import RowSink, prepared
 
 ROUNDING = 1e-12  # share of what passed below which a remainder is rounding
 SHORT = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds that a line need not name
@@ -156,7 +156,7 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     settings = model.tables.settings.copy()
     settings["datum"] = datum_of(model, port)
     model = replace(model, tables=model.tables._replace(settings=settings))
-    run = EnergyRun(model, initial_state(model), Rows(), progress)
+    run = EnergyRun(model, initial_state(model), RowSink(), progress)
     summary = run.go()
     if run.times[-1] < run.loop.t:
         run.keep()

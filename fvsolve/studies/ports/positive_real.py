@@ -30,7 +30,7 @@ FATES = {  # of a pole that the numerator cancels
 
 
 @dataclass(frozen=True)
-class Mode:
+class RootSaid:
     """A root in words: near : an estimate in floats [1/s]; side : right, axis or left, decided."""
 
     near: complex
@@ -76,11 +76,11 @@ class Verdict(Plain):
     strictly: bool
     lossless: bool
     reasons: tuple[str, ...]
-    poles: tuple[Mode, ...]
+    poles: tuple[RootSaid, ...]
     axis_poles: tuple[AxisPole, ...]
     bands: tuple[Band, ...]
     zeros: tuple[float, ...]
-    hidden: tuple[Mode, ...]
+    hidden: tuple[RootSaid, ...]
     numerator: tuple[Fraction, ...]
     denominator: tuple[Fraction, ...]
 
@@ -132,10 +132,10 @@ def positive_real(numerator, denominator) -> Verdict:
 # poles ----------------------------------------------------------------------------------------------------------
 
 
-def _modes(p: Polynomial, where: Places) -> tuple[Mode, ...]:
+def _modes(p: Polynomial, where: Places) -> tuple[RootSaid, ...]:
     names = ["right"] * where.right + ["axis"] * where.axis + ["left"] * where.left
     found = zip(estimates(p), names, strict=True)
-    return tuple(Mode(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in found)
+    return tuple(RootSaid(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in found)
 
 
 def _infinity(n: Polynomial, d: Polynomial) -> list[AxisPole]:
@@ -256,7 +256,7 @@ def _strictly(n: Polynomial, d: Polynomial, where: Places, even: Polynomial, zer
 # words ----------------------------------------------------------------------------------------------------------
 
 
-def _right(poles: tuple[Mode, ...]) -> list[str]:
+def _right(poles: tuple[RootSaid, ...]) -> list[str]:
     found = [mode.near for mode in poles if mode.side == "right"]
     if not found:
         return []
@@ -288,7 +288,7 @@ def _praise(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynom
     return found
 
 
-def _cancelled(hidden: tuple[Mode, ...]) -> list[str]:
+def _cancelled(hidden: tuple[RootSaid, ...]) -> list[str]:
     found = []
     for side, where in FATES.items():
         near = [mode.near for mode in hidden if mode.side == side]

@@ -129,7 +129,7 @@ def growth(m: np.ndarray, steps: int = STEPS) -> Growth:
     return Growth(size, at, starts[0], ends[:, 0])
 
 
-class Dense:
+class DenseGrowth:
     """Steps of one method on a small system; `e` is J in the energy norm."""
 
     def __init__(self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Row:
+class StabilityRow:
     """One scheme with one method. Steps in s; inf: no failing step was found, nan: not known (`left_out` says why).
 
     predicted : greatest step with growth <= threshold in `steps` steps; growth, after : of a step just beyond, the
@@ -68,12 +68,12 @@ def said(x: float):
     return None if np.isnan(x) else "none" if np.isinf(x) else x
 
 
-def read(found: dict) -> Row:
+def read(found: dict) -> StabilityRow:
     """A row from what `Row.plain` said."""
     heard = {"none": np.inf, None: np.nan}
-    kept = {name: found[name] for name in Row.__dataclass_fields__}
+    kept = {name: found[name] for name in StabilityRow.__dataclass_fields__}
     for name, value in kept.items():
         if value is None or value == "none":
             kept[name] = heard[value]
     kept["frozen"] = {name: heard.get(step, step) for name, step in kept["frozen"].items()}
-    return Row(**kept | {"notes": tuple(kept["notes"])})
+    return StabilityRow(**kept | {"notes": tuple(kept["notes"])})

@@ -31,7 +31,7 @@ from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD
 from fvsolve.studies.stability.measured import LONGEST as RUNNING
 from fvsolve.studies.stability.measured import Runs
 from fvsolve.studies.stability.misled import notes
-from fvsolve.studies.stability.row import Row, read
+from fvsolve.studies.stability.row import StabilityRow, read
 from fvsolve.studies.stability.system import predicted, system
 
 AUTOMATIC = (
@@ -48,7 +48,7 @@ class Stability:
     """Rows of a study, what is to be said of it; sides : scheme -> what makes its linear system, on first use."""
 
     case: str
-    rows: tuple[Row, ...]
+    rows: tuple[StabilityRow, ...]
     said: tuple[str, ...]
     sides: dict[str, Callable[[str], Side]] = field(repr=False)
 
@@ -168,7 +168,7 @@ class Maker:
                 self.sides[name] = Side(reweighted(wide, tuple(map(float, weights)), degree))
             yield name, self.sides[name]
 
-    def row(self, name: str) -> Row:
+    def row(self, name: str) -> StabilityRow:
         """The row of a method."""
         method = method_named(name)
         if has_limiter(self.at(self.scheme).model):
@@ -184,8 +184,8 @@ class Maker:
             where, share = place(side.form, grown.end)
             row |= {"growth": grown.size, "after": grown.steps, "where": where, "share": share}
         row |= measure(runs, limit.step, one.size, row["left_out"])
-        found = Row(**row)
-        return Row(**row | {"notes": tuple(notes(found, side, one))})
+        found = StabilityRow(**row)
+        return StabilityRow(**row | {"notes": tuple(notes(found, side, one))})
 
     def bounded(self, side: Side, method) -> dict:
         """What is known without a power: names, sizes, bounds."""
@@ -209,7 +209,7 @@ class Maker:
             left_out["squaring"] = f"{model.y_size} states: predicted by {VECTORS} vectors carried along"
         return row | {"left_out": left_out}
 
-    def limited(self, method) -> Row:
+    def limited(self, method) -> StabilityRow:
         """The row of a limited scheme: limits with its weights frozen, and the measured one."""
         at = self.at(self.scheme)
         found, starts, left_out, latest = {}, {}, {}, time.monotonic() + LONGEST
@@ -234,7 +234,7 @@ class Maker:
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
             longer = Runs(at, method.name, side.form, starts.get(guess), LONGER * self.steps, self.threshold, VISIBLE)
             row["longer"] = measure(longer, row["measured"], 0.0, row["left_out"], "longer").get("measured", np.nan)
-        return Row(**row | {"notes": tuple(notes(Row(**row), side, None))})
+        return StabilityRow(**row | {"notes": tuple(notes(StabilityRow(**row), side, None))})
 
 
 def on_a_long_pipe(scheme: str, method) -> float:

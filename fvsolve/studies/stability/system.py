@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.steppers.tableau import Method
 from fvsolve.studies.stability.bracket import Limit
-from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD, Dense
+from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD, DenseGrowth
 
 
 def system(
@@ -16,7 +16,7 @@ def system(
 ) -> Any:
     """The kind that fits the size; a large one answers until `latest` on the monotonic clock."""
     if e.shape[0] <= DENSE:
-        return Dense(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
+        return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
     from scipy.sparse import csr_array
 
     from fvsolve.studies.stability.carried import Sparse
