@@ -64,7 +64,7 @@ def linearise(
     if as_json:
         print_json(said)
     else:
-        show(found, values, poles, folder)
+        say(found, values, poles, folder)
 
 
 def write_matrices(folder: Path, found) -> None:
@@ -97,7 +97,7 @@ def labelled(names, matrix):
     return ([name, *row] for name, row in zip(names, matrix.tolist(), strict=True))
 
 
-def show(found, values, poles: list[dict], folder: Path) -> None:
+def say(found, values, poles: list[dict], folder: Path) -> None:
     """What a person reads: where, how well, and the slowest poles."""
     from fvsolve.cli import terminal
     from fvsolve.studies.linear.spectrum import POLES

@@ -58,7 +58,7 @@ def order(
                     "reused": points.reused})  # fmt: skip
         return
     for one in found:
-        show(one)
+        say(one)
     terminal.line(terminal.console(), f"files: {', '.join(str(file) for file in files)}")
 
 
@@ -87,7 +87,7 @@ def lines(found) -> Iterator[dict]:
                     }  # fmt: skip
 
 
-def show(one) -> None:
+def say(one) -> None:
     """What a person reads."""
     console = terminal.console()
     terminal.line(console, f"{one.case}: {title(one)}", "bold")

@@ -43,7 +43,7 @@ def response(
     if as_json:
         print_json(found.plain() | {"directory": str(folder)})
     else:
-        show(found, folder, name)
+        say(found, folder, name)
 
 
 def unit_of(found) -> str:
@@ -65,7 +65,7 @@ def draw(found, path: Path) -> None:
         figure.savefig(path.with_name(f"{path.name}.{ending}"))
 
 
-def show(found, folder: Path, name: str) -> None:
+def say(found, folder: Path, name: str) -> None:
     """What a person reads: what was asked, the verdict with its reasons, and the files."""
     from fvsolve.cli import terminal
 

@@ -67,7 +67,7 @@ def stability(
     if as_json:
         print_json(found.plain() | {"directory": str(folder), "files": files})
     else:
-        show(found, folder, files)
+        say(found, folder, files)
 
 
 def refuse(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
@@ -102,7 +102,7 @@ def pictures(found, folder: Path) -> list[str]:
     return names
 
 
-def show(found, folder: Path, files: list[str]) -> None:
+def say(found, folder: Path, files: list[str]) -> None:
     """The table, and below it where a bound misleads."""
     from fvsolve.cli import terminal
 

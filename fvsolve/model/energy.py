@@ -93,7 +93,7 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     names = [name.rsplit(".", 1)[0] for name in model.state_names]
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
     stored |= {e: (names[e], row) for e, row in swept(model, y)}
-    found = [*stored.values(), *held(model, y), *of_devices(model, y)]
+    found = [*stored.values(), *stretched(model, y), *of_devices(model, y)]
     entries = [(k, i, value) for k, (_, row) in enumerate(found) for i, value in row.items()]
     row, column, value = (np.array(one) for one in zip(*entries, strict=True))
     matrix = csr_array((value, (row, column)), shape=(len(found), model.y_size))
@@ -194,7 +194,7 @@ def typical(model, q: int) -> float:
     return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
 
 
-def held(model, y: np.ndarray):
+def stretched(model, y: np.ndarray):
     """(name, row of L) of springs and of stops in touch."""
     for (name, *_), row in zip(rows_in(model.case, "brace"), model.tables.braces, strict=True):
         if row["stiffness"] > 0.0:
