@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.folders import CASES
 from truth.scenes import WATER, chamber, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
@@ -95,7 +96,7 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     wet = {**WATER, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
     assert found & ALL == CAVITIES | {"reconstruction", "limiters"}
-    cylinder = fvsolve.build(fvsolve.load(Path(__file__).parent.parent / "cases" / "closed-cylinder.toml"))  # law: log
+    cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
     assert files(cylinder) & (PIPES | BODIES) == BODIES
 
 

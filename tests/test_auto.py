@@ -6,14 +6,13 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from truth.folders import CASES
 from truth.scenes import chamber, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
 
-CASES = Path(__file__).parent.parent / "cases"
 IMPLICIT = ("newton", "ros", "dirk", "irk", "differences", "linear_dense", "linear_banded", "linear_sparse")
 PROBE = f"""
 import json, sys, fvsolve

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx
 from test_sparsity import stray
+from truth.folders import CASES
 from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
@@ -421,4 +421,4 @@ def test_a_chart_of_a_slosh_lays_error_against_cost():
 
 def test_a_chart_says_that_cells_of_a_file_are_not_refined():
     with pytest.raises(FvsolveError, match="those of plain are a file's"):
-        chart(Path(__file__).parents[1] / "cases" / "flooding.toml")
+        chart(CASES / "flooding.toml")

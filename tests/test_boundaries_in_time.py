@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.folders import CASES
 from truth.scenes import AMBIENT, RHO, chamber, reservoir, scene, valve
 
 import fvsolve
 
-CASES = Path(__file__).parent.parent / "cases"
 WAYS = [{"method": name, "step": 2e-4} for name in ("rk4", "trapezoid", "rodas-5p", "radau-iia-5", "implicit-euler")]
 WAYS += [{"method": name, "rtol": 1e-8} for name in ("dormand-prince", "rodas-5p", "radau-iia-5", "auto")]
 ROUNDINGS = (-5, -2, -1, 0, 1, 2, 5)

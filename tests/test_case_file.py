@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest import approx
+from truth import folders
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.case import sections as defaults
@@ -407,7 +408,7 @@ def test_a_parts_key_is_documented_with_its_unit():
 
 
 def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
-    page = (Path(__file__).parents[1] / "docs" / "case-file.md").read_text(encoding="utf-8")
+    page = folders.page("case-file")
     models = [*KINDS["nodes"].values(), *KINDS["links"].values(), FluidSpec, Numerics, Output, Friction, Wall]
     keys = {key for model in models for key in model.keys()} | set(KINDS["nodes"]) | set(KINDS["links"])
     assert [key for key in sorted(keys) if not re.search(rf"\b{re.escape(key)}\b", page)] == []
@@ -422,7 +423,7 @@ def headings(page: str) -> dict[str, str]:
 
 
 def test_the_page_of_the_parts_names_every_kind_and_key_in_its_section():
-    found = headings((Path(__file__).parents[1] / "docs" / "parts.md").read_text(encoding="utf-8"))
+    found = headings(folders.page("parts"))
     found["orifice"] += found["valve"]
     found |= {name: text + found["valve"] for name, text in found.items() if "as of a [valve](#valve)" in text}
     every = {"nodes": found["Every node"], "links": found["Every link"]}
@@ -436,7 +437,7 @@ def test_the_page_of_the_parts_names_every_kind_and_key_in_its_section():
 
 
 def test_the_page_of_the_parts_has_the_defaults():
-    page = (Path(__file__).parents[1] / "docs" / "parts.md").read_text(encoding="utf-8")
+    page = folders.page("parts")
     said = {
         name: dict(re.findall(r"^\| `(\w+)` \|.*\| (.*) \|$", one, re.MULTILINE))
         for name, one in headings(page).items()
@@ -458,7 +459,7 @@ def test_the_page_of_the_parts_has_the_defaults():
 
 
 def test_shipped_cases_point_editors_to_the_schema():
-    folder = Path(__file__).parents[1] / "cases"
+    folder = folders.CASES
     assert json.loads((folder / "schema.json").read_text()) == schema()  # else: fvsolve schema > cases/schema.json
     for path in folder.glob("*.toml"):
         assert path.read_text(encoding="utf-8").startswith("#:schema schema.json\n"), path.name

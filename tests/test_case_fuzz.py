@@ -2,19 +2,19 @@
 
 import copy
 import tomllib
-from pathlib import Path
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_case_file import SCENE, two_tanks
 from test_faults import CHAMBER, TANK
+from truth import folders
 
 from fvsolve.case import Case, load
 from fvsolve.case.lines import key_lines
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError
 
-CASES = sorted((Path(__file__).parents[1] / "cases").glob("*.toml"))
+CASES = sorted(folders.CASES.glob("*.toml"))
 SEEDS = [tomllib.loads(SCENE), two_tanks(), tomllib.loads(SCENE + TANK), tomllib.loads(SCENE + CHAMBER)]
 SEEDS += [tomllib.loads(path.read_text(encoding="utf-8")) for path in CASES]
 SEEDS = [{**seed, "fluid": SEEDS[0]["fluid"]} for seed in SEEDS]  # CoolProp is not what is tried here

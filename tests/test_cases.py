@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 
 import pytest
+from truth import folders
 
 import fvsolve
 
-CASES = sorted((Path(__file__).parent.parent / "cases").glob("*.toml"))
+CASES = sorted(folders.CASES.glob("*.toml"))
 
 
 def test_the_promised_cases_are_there():

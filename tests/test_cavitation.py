@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx
 from truth import scenes
 from truth.column_separation import cavity
+from truth.folders import CASES
 from truth.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
@@ -18,7 +18,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.dependence import sparsity
 from fvsolve.studies.energy.energy import energy
 
-CASE = Path(__file__).parent.parent / "cases" / "adelaide.toml"
+CASE = CASES / "adelaide.toml"
 WATER = {**scenes.WATER, "law": "mixture", "air_fraction": 1e-7, "cavitation": True}
 PLAIN = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.5}
 LENGTH, SPEED, START = 100.0, 1000.0, 4e5

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truth import discs
+from truth.folders import CASES
 from truth.scenes import (
     GRAVITY,
     RHO,
@@ -32,7 +32,6 @@ import fvsolve
 from fvsolve.studies.energy.energy import energy
 
 FRICTION = {"model": "steady", "factor": 0.02}
-CASES = Path(__file__).parent.parent / "cases"
 
 
 def check(start, end, flow_area=0.02, **more):

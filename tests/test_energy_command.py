@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+from truth import folders
 
 from fvsolve.cli import main
 
@@ -99,7 +100,7 @@ def test_its_json_has_the_documented_keys_and_nothing_beside_it(told, case):
     code, out, err = told(case, "--json", "--port", "gate")
     said = json.loads(out)
     assert (code, err) == (0, "")
-    page = open("/".join([*__file__.split("/")[:-2], "docs", "energy.md"]), encoding="utf-8").read()
+    page = folders.page("energy")
     for key in [*said, *said["port"]]:
         assert f"`{key}`" in page, key
     total = sum(said["supplied"].values()) - sum(said["stored"].values()) - sum(said["dissipated"].values())

@@ -6,12 +6,12 @@ import json
 import math
 import sys
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from truth import folders
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
@@ -341,7 +341,7 @@ def test_growth_a_step_is_the_greatest_amplification():
 
 def test_the_page_shows_what_is_computed():
     """Every row of the first table of docs/stability-grid.md, to the digits shown, and who sets it."""
-    page = (Path(__file__).parent.parent / "docs" / "stability-grid.md").read_text(encoding="utf-8")
+    page = folders.page("stability-grid")
     rows = [
         line.strip("| ").split(" | ") for line in page.split("## Runs on")[0].splitlines() if line.startswith("| `")
     ]
@@ -354,7 +354,7 @@ def test_the_page_shows_what_is_computed():
 
 
 def test_all_keys_of_a_limit_are_on_the_page():
-    page = (Path(__file__).parent.parent / "docs" / "stability-grid.md").read_text(encoding="utf-8")
+    page = folders.page("stability-grid")
     assert all(f"`{key}`" in page for key in advection_limit("upwind", "euler").plain())
 
 

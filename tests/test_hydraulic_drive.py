@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import tomllib
-from pathlib import Path
 
 import numpy as np
 from pytest import approx
 from truth.air import ATM, AirOil, follow
+from truth.folders import CASES
 
 import fvsolve
 from fvsolve.fluid import properties
 from fvsolve.studies.energy.energy import energy
 
-CASE = Path(__file__).parents[1] / "cases" / "hydraulic-drive.toml"
+CASE = CASES / "hydraulic-drive.toml"
 BREAKS = (5e-3, 15e-3, 90e-3, 110e-3, 170e-3, 180e-3)
 OPENING = (0.0, 1.0, 1.0, -0.6, -0.6, 0.0)
 HOLE, AREAS, DEAD, STROKE, MASS = 0.65 * 12e-6, (12.5e-4, 8e-4), 30e-6, 0.2, 60.0

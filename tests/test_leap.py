@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.folders import CASES
 from truth.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 
 import fvsolve
@@ -108,7 +108,7 @@ def test_only_upwind_and_euler_leap_and_only_pipes(case, allowed):
 def test_scenes_with_events_are_stepped_one_by_one_and_end():
     """A leap that an event cut short stood still for ever."""
     plain = {"numerics.scheme": "upwind", "numerics.method": "euler", "numerics.courant": 1.0}
-    case = Path(__file__).parent.parent / "cases" / "relief-on-closed-main.toml"
+    case = CASES / "relief-on-closed-main.toml"
     result = fvsolve.run(case, set=plain)
     assert result.ok and result.summary["events"]
     assert not LOOP.leap_allowed(build(load(case, plain)), method_named("euler"))

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
-from pathlib import Path
 
 import pytest
+from truth import folders
 
 from fvsolve.steppers import METHODS, Facts, analyse
 
-DOCS = (Path(__file__).parent.parent / "docs" / "choosing-a-method.md").read_text(encoding="utf-8")
+DOCS = folders.page("choosing-a-method")
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 ASKED = {
     "order", "stage_order", "stages", "explicit", "a_stable", "l_stable", "real_interval", "imaginary_interval",

@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ import pytest
 import fvsolve
 from fvsolve.errors import FvsolveError
 
-CASES = Path(__file__).parent.parent / "cases"
 WATER = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2000.0}
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import njit
+from truth.folders import CASES
 from truth.scenes import WATER, chamber, scene, valve
 
 import fvsolve
@@ -15,7 +15,6 @@ from fvsolve.errors import FvsolveError
 from fvsolve.solve.loop import Loop
 from fvsolve.steppers import METHODS, integrate, slots
 
-CASES = Path(__file__).parent.parent / "cases"
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]
 ITERATED = [name for name in IMPLICIT if METHODS[name].kind != "linear"]

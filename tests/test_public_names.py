@@ -13,12 +13,12 @@ from inspect import isfunction
 from pathlib import Path
 
 import pytest
+from truth import folders
 
 import fvsolve
 import fvsolve.studies
 
-DOCS_FOLDER = Path(__file__).parent.parent / "docs"
-DOCS = (DOCS_FOLDER / "python.md").read_text(encoding="utf-8")
+DOCS = folders.page("python")
 
 
 def test_at_most_twenty():
@@ -36,7 +36,7 @@ def test_the_page_names_no_other():
 
 
 def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
-    shutil.copytree(Path(__file__).parent.parent / "cases", tmp_path / "cases")
+    shutil.copytree(folders.CASES, tmp_path / "cases")
     monkeypatch.chdir(tmp_path)
     found = {}
     for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
@@ -77,7 +77,7 @@ def test_importing_imports_nothing_heavy():
 
 PAGES = {
     page.name: page.read_text(encoding="utf-8")
-    for page in [*DOCS_FOLDER.glob("*.md"), DOCS_FOLDER.parent / "README.md"]
+    for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]
 }
 
 

@@ -8,6 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from test_faults import SCENE
+from truth import scenes
 
 from fvsolve import run
 from fvsolve.case import load
@@ -16,8 +18,6 @@ from fvsolve.case.sections import FluidSpec
 from fvsolve.errors import listing
 from fvsolve.parts import KINDS
 from fvsolve.run import model_of
-from tests.test_faults import SCENE
-from tests.truth import scenes
 
 CASES = sorted(path for path in Path("cases").glob("*.toml"))
 EXAMPLES = {  # what the docs print of cases

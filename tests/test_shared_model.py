@@ -5,10 +5,10 @@ import subprocess
 import sys
 import threading
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.folders import CASES
 
 import fvsolve
 from fvsolve.model import Model, Slate
@@ -16,7 +16,6 @@ from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import slots
 from fvsolve.studies.outcome import outcome
 
-CASES = Path(__file__).parent.parent / "cases"
 SCENES = {  # waves in pipes; flags and marks of devices; cells of a basin, and what it works in; scalars in one; Newton
     "nine pipes": ("streeter-nine-pipes", {"numerics.end": 5.0}),
     "nine pipes, log": ("streeter-nine-pipes", {"numerics.end": 0.5, "fluid.law": "log"}),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.scenes import scene
 
 import fvsolve
 from fvsolve.limits.grid import advection_limit
@@ -21,7 +22,6 @@ from fvsolve.solve.loop import MOST_IN_A_SPAN, SPAN, Loop
 from fvsolve.solve.soundness import OPEN, Soundness, unclosed
 from fvsolve.steppers import slots
 from fvsolve.studies import sweep
-from tests.truth.scenes import scene
 
 MAIN = "cases/valve-closure.toml"
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
+from truth import folders
 from truth.random_networks import random_network
 from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
@@ -19,7 +19,7 @@ from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.signatures import function_types
 from fvsolve.steppers.structure import KINDS, Structure
 
-CASES = sorted((Path(__file__).parent.parent / "cases").glob("*.toml"))
+CASES = sorted(folders.CASES.glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]
 TIMES = (0.0, 0.7, 2.3, 3.5)  # of random networks: valves open, half shut, all but shut, shut
 

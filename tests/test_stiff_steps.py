@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import njit
+from truth import folders
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, analyse, integrate
@@ -117,7 +117,7 @@ def test_where_it_is_not_stiff_the_order_is_whole(name):
 
 
 def test_the_page_says_what_its_example_prints(capsys):
-    page = (Path(__file__).parent.parent / "docs" / "choosing-a-method.md").read_text(encoding="utf-8")
+    page = folders.page("choosing-a-method")
     section = page.split("## Orders that stiffness leaves")[1].split("\n## ")[0]
     code, printed = re.findall(r"```(?:python)?\n(.*?)```", section, re.DOTALL)
     exec(compile(code, "example", "exec"), {})

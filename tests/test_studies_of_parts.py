@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from truth.folders import CASES
 
 import fvsolve
 from fvsolve.cli.order import unit
@@ -31,7 +30,6 @@ from fvsolve.studies.stability.stability import stability
 from fvsolve.studies.truth import candidates, truth
 
 RHO_WATER = 998.2
-CASES = Path(__file__).parent.parent / "cases"
 
 
 def case(name, **numerics):

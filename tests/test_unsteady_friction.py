@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx
 from test_sparsity import random_state, stray
 from truth import laminar
+from truth.folders import CASES
 from truth.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
@@ -22,7 +22,6 @@ from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.ports.response import response
 from fvsolve.studies.truth import start_of
 
-CASES = Path(__file__).parent.parent / "cases"
 FOOT = 0.3048
 NUMBERS = (0.005, 0.05)  # nu L / (a R^2)
 START, DURATION = 0.1, 0.4  # of the smooth closure, in travel times of the line, which are seconds

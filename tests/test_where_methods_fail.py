@@ -6,11 +6,11 @@ The sections of docs/where-methods-fail.md name these tests. Pipes have theirs i
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import njit
+from truth.folders import CASES
 from truth.scenes import AMBIENT, RHO, WATER, chamber, ramp, reservoir, scene, step, tank, valve
 
 import fvsolve
@@ -18,8 +18,6 @@ from fvsolve.case import load
 from fvsolve.steppers import analyse, method_named, seen_frequency, stability_function
 from fvsolve.studies.failure.watched import watched
 from fvsolve.studies.outcome import outcome, prepared
-
-CASES = Path(__file__).parent.parent / "cases"
 
 
 def r_of(method: str, z: complex) -> complex:

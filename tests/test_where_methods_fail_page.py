@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limit, lossless, scaled
+from truth import folders
 
 from fvsolve.cli import main
 from fvsolve.cli.app import load_case
@@ -17,7 +18,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.failure import failure_map
 
 TESTS = Path(__file__).parent
-PAGE = (TESTS.parent / "docs" / "where-methods-fail.md").read_text(encoding="utf-8")
+PAGE = folders.page("where-methods-fail")
 WORDS = {"What happens", "Why", "Predicted", "Remedy"}
 
 
