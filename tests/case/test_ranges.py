@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_faults import SCENE
+from case.test_faults import SCENE
 from truth import scenes
 
 from fvsolve import run

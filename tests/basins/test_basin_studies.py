@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from model.test_sparsity import stray
 from pytest import approx
-from test_sparsity import stray
 from truth.folders import CASES
 from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from test_output import branched
+from output.test_output import branched
 from truth.scenes import reservoir, scene, tank, valve
 
 import fvsolve

@@ -11,7 +11,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from test_output import branched
+from output.test_output import branched
 
 import fvsolve
 from fvsolve.errors import FvsolveError, RunError

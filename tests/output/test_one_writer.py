@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from test_text_as_it_stands import still
+from house.test_text_as_it_stands import still
 
 import fvsolve
 from fvsolve.errors import RunError

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from model.test_sparsity import stray
 from pytest import approx
-from test_sparsity import stray
 from truth.meshes import write
 from truth.plain import boundary, triangles
 from truth.scenes import RHO, WATER, scene

@@ -9,9 +9,9 @@ from importlib import import_module
 import meshio
 import numpy as np
 import pytest
+from model.test_sparsity import random_state, stray
 from pytest import approx
 from scipy.special import erfc
-from test_sparsity import random_state, stray
 from truth.orders import observed_order
 from truth.scenes import (
     AMBIENT,

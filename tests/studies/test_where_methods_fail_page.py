@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limit, lossless, scaled
+from studies.test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limit, lossless, scaled
 from truth import folders
 
 from fvsolve.cli import main

@@ -3,10 +3,10 @@
 import copy
 import tomllib
 
+from case.test_case_file import SCENE, two_tanks
+from case.test_faults import CHAMBER, TANK
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_case_file import SCENE, two_tanks
-from test_faults import CHAMBER, TANK
 from truth import folders
 
 from fvsolve.case import Case, load

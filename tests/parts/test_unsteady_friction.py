@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
+from model.test_sparsity import random_state, stray
 from pytest import approx
-from test_sparsity import random_state, stray
 from truth import laminar
 from truth.folders import CASES
 from truth.scenes import WATER, area, junction, reservoir, scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_faces import triangles
+from basins.test_faces import triangles
 from truth.scenes import pipe, reservoir, scene
 
 import fvsolve

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 import pytest
-from test_output import branched
-from test_text_as_it_stands import still
+from house.test_text_as_it_stands import still
+from output.test_output import branched
 
 import fvsolve
 from fvsolve.case.size import free_memory, on_disk

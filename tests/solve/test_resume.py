@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_basin import alone, basin
-from test_output import branched
+from basins.test_basin import alone, basin
+from output.test_output import branched
 
 import fvsolve
 from fvsolve.output.memory import MemorySink

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import test_faces
+from basins import test_faces
+from basins.test_liquid import RHO, SCHEMES, Box, C, noise
 from pytest import approx
-from test_liquid import RHO, SCHEMES, Box, C, noise
 from truth.isentrope import Isentrope, Riemann
 from truth.meshes import write
 from truth.plain import boundary, triangles

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_output import branched
-from test_text_as_it_stands import still
+from house.test_text_as_it_stands import still
+from output.test_output import branched
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies
