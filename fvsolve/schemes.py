@@ -36,7 +36,7 @@ class Scheme:
     more : cells that it reads at an end where a wave leaves, beyond its polynomial
     quicker : how much quicker than its inside a pipe of 1, 2, 3, ... cells is, for its ends: 0.9, or 0.9 times the
     limit on a long pipe where that is less, over the Courant number at which ssp-rk3 grows in it between open and shut
-    ends (tests/test_ends.py), where that is more than one
+    ends (tests/limits/test_ends.py), where that is more than one
     """
 
     name: str

@@ -2,7 +2,7 @@
 
 A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last
 cells gives its value at the end; where it enters, the node's value is the datum of the polynomial. (From
-cells alone the closure is slightly unstable; with the datum no growing mode is known: tests/test_ends.py.)
+cells alone the closure is slightly unstable; with the datum no growing mode is known: tests/limits/test_ends.py.)
 """
 
 from fractions import Fraction

@@ -27,7 +27,7 @@ SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
 SHARE = 0.05  # of an estimate: up to here beyond it a step is doubtful, from there on wrong
 SMOOTH = 1e6  # times that deviations of cells must grow to be wrong where no schedule jumps: there are hardly any
 STILL, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05  # of its range by which a step leaves what is no wave astray, on average
-LIMITED = 0.3  # the same where limiters stand between few cells: they hold by up to so much more (tests/test_ends.py)
+LIMITED = 0.3  # the same of limiters between few cells: they hold by up to so much more (tests/limits/test_ends.py)
 
 
 class Room(NamedTuple):

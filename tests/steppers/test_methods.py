@@ -1,4 +1,4 @@
-"""`integrate`: what it accepts, and what it refuses. What its steps do is in test_stepped_methods.py."""
+"""`integrate`: what it accepts, and what it refuses. What its steps do is in steppers/test_stepped_methods.py."""
 
 from __future__ import annotations
 

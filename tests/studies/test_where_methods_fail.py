@@ -1,6 +1,7 @@
 """Where methods fail in time: each failure happens where it is predicted, and its remedy removes it.
 
-The sections of docs/where-methods-fail.md name these tests. Pipes have theirs in test_where_methods_fail_in_pipes.py.
+The sections of docs/where-methods-fail.md name these tests. Pipes have theirs in
+studies/test_where_methods_fail_in_pipes.py.
 """
 
 from __future__ import annotations
