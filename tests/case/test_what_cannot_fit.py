@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 import pytest
-from house.test_text_as_it_stands import still
-from output.test_output import branched
+from truth.fork import branched
+from truth.scenes import still
 
 import fvsolve
 from fvsolve.case.size import free_memory, on_disk

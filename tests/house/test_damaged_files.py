@@ -11,7 +11,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from output.test_output import branched
+from truth.fork import branched
 
 import fvsolve
 from fvsolve.errors import FvsolveError, RunError

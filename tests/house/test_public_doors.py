@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from house.test_text_as_it_stands import still
-from output.test_output import branched
+from truth.fork import branched
+from truth.scenes import still
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies

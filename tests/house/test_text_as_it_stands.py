@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from output.test_output import branched
-from truth.scenes import reservoir, scene, tank, valve
+from truth.fork import branched
+from truth.scenes import scene, still
 
 import fvsolve
 from fvsolve.draw.plot import history_figure
@@ -23,11 +23,6 @@ from fvsolve.output.fields import read_series
 
 TITLE = r"a $\nothing_{$ b, $5 and $6 [bold] [/red] <image> & 100 % \o/"
 STEERS = "a\x1b[31mb\u202ec\x07"
-
-
-def still(**top) -> dict:
-    nodes = {"lake": reservoir(1.5e5), "pond": tank(1.0, 1.0)}
-    return scene(nodes, {"gate": valve("lake", "pond", 0.001)}, 1.0, {"rtol": 1e-6}, ["pond.level"], 0.1, **top)
 
 
 @pytest.mark.parametrize("title", [TITLE, "$x$", "$\\foo$", "a$b", STEERS, "ü 水 \U0001f30a", "[/]", "x" * 10**5])

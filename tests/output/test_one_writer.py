@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from house.test_text_as_it_stands import still
+from truth.scenes import still
 
 import fvsolve
 from fvsolve.errors import RunError

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from basins.test_basin import alone, basin
-from output.test_output import branched
+from truth.fork import branched
 
 import fvsolve
 from fvsolve.output.memory import MemorySink

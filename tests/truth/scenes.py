@@ -138,3 +138,9 @@ def pump(start: str, end: str, **more: Any) -> dict:
 
 def inflow(flow: Any, **more: Any) -> dict:
     return {"type": "inflow", "flow": flow, **more}
+
+
+def still(**top) -> dict:
+    """A pond that fills from a lake: the smallest run there is, without a pipe or a field."""
+    nodes = {"lake": reservoir(1.5e5), "pond": tank(1.0, 1.0)}
+    return scene(nodes, {"gate": valve("lake", "pond", 0.001)}, 1.0, {"rtol": 1e-6}, ["pond.level"], 0.1, **top)
