@@ -7,25 +7,12 @@ import re
 from truth import folders
 
 TOP = folders.DOCS.parent
-NAMED = re.compile(
-    r"(?<![\w/])(?:tests/)?((?:\w+/)?test_\w+\.py|truth/\w+\.py)"
-)  # parts/test_leak.py, with tests/ or not
+TEXTS = "README.md CONTRIBUTING.md pyproject.toml docs/**/*.md cases/*.toml fvsolve/**/*.py tests/**/*.py".split()
+NAMED = re.compile(r"(?<![\w/])(?:tests/)?((?:\w+/)?test_\w+\.py|truth/\w+\.py)")  # with `tests/` or without
 
 
 def test_every_file_of_tests_that_is_named_is_there():
-    named = {
-        (path.relative_to(TOP).as_posix(), name)
-        for pattern in (
-            "README.md",
-            "CONTRIBUTING.md",
-            "*.toml",
-            "docs/**/*.md",
-            "cases/*.toml",
-            "fvsolve/**/*.py",
-            "tests/**/*.py",
-        )
-        for path in TOP.glob(pattern)
-        for name in NAMED.findall(path.read_text(encoding="utf-8"))
-    }
+    texts = {path: path.read_text(encoding="utf-8") for pattern in TEXTS for path in TOP.glob(pattern)}
+    named = {(path.relative_to(TOP).as_posix(), name) for path, text in texts.items() for name in NAMED.findall(text)}
     assert len(named) > 50
-    assert sorted(one for one in named if not (TOP / "tests" / one[1]).is_file()) == []
+    assert sorted((path, name) for path, name in named if not (TOP / "tests" / name).is_file()) == []
