@@ -8,7 +8,7 @@ from truth import folders
 
 TOP = folders.DOCS.parent
 TEXTS = "README.md CONTRIBUTING.md pyproject.toml docs/**/*.md cases/*.toml fvsolve/**/*.py tests/**/*.py".split()
-NAMED = re.compile(r"(?<![\w/])(?:tests/)?((?:\w+/)?test_\w+\.py|truth/\w+\.py)")  # with `tests/` or without
+NAMED = re.compile(r"(?<![\w/])(?:tests/)?(\w+/test_\w+\.py|truth/\w+\.py)")  # with `tests/` or without
 
 
 def test_every_file_of_tests_that_is_named_is_there():
