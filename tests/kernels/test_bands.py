@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.folders import CASES
 
 import fvsolve
 from fvsolve.kernels.handle import make_handle
@@ -35,7 +35,7 @@ def handles(slate: Slate, cuts: list[int]) -> list[np.ndarray]:
 @pytest.mark.parametrize("cuts", [[0, 4, 9], [0, 1, 2, 9]])
 def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
     """In turn, backwards and in threads."""
-    path = Path(fvsolve.__file__).parents[1] / "cases" / "streeter-nine-pipes.toml"
+    path = CASES / "streeter-nine-pipes.toml"
     model = fvsolve.build(fvsolve.load(path, {"fluid.law": law}))
     y = model.start + 0.1 * model.scale * np.random.default_rng(3).normal(size=model.y_size)
     dydt, out = model.evaluate(0.3, y)
