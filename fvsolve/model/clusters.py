@@ -24,7 +24,7 @@ def sort_nodes(draft) -> None:
                 if k not in touched[group[i]]:
                     touched[group[i]].append(k)
     known = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
-    integers = draft.integers = []
+    integers = draft.integers
     clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
     nodes["solve"], even = rec.ALONE, is_root(valves)
