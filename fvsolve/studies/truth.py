@@ -189,14 +189,14 @@ def sided(t: np.ndarray) -> np.ndarray:
     return moved
 
 
-def start_of(model) -> room.Start:
+def start_of(model) -> room.ExactStart:
     """Pressures and flows that a model starts from."""
     rho, tables = model.case.properties.density, model.tables
     flows = {pipe.name: row["flow"] for pipe, row in zip(model.pipes, tables.pipes, strict=True)}
     flows |= {name: row["flow"] for name, row in zip(model.column_names, tables.columns, strict=True)}
     flows |= {name: row["flow"] for name, row in zip(model.valve_names, tables.valves, strict=True)}
     pressures = zip(model.node_names, tables.nodes["pressure"], strict=True)
-    return room.Start({n: float(p) for n, p in pressures}, {n: float(m) / rho for n, m in flows.items()})
+    return room.ExactStart({n: float(p) for n, p in pressures}, {n: float(m) / rho for n, m in flows.items()})
 
 
 # finer runs -------------------------------------------------------------------------------------------------------
