@@ -1,0 +1,68 @@
+"""The key tables of docs/parts.md are the declarations: each table as it is made now, each part with one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fvsolve.case.key_tables import MARK, key_table, main, page
+from fvsolve.errors import FvsolveError
+from fvsolve.parts import KINDS
+
+PAGE = Path(__file__).parents[1] / "docs" / "parts.md"
+PART = '''"""A plate with a hole."""
+from typing import Annotated
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.value import VALUE, Number, Quantity, positive
+
+class Plate(TwoPort, kind="plate"):
+    """q = loss."""
+
+    bore: Annotated[float, Quantity("length", positive, "of the hole [m]")]
+    ageing: Annotated[float | None, Number(about="of its edge; as new if left out", changes=VALUE)] = None
+    turns: Annotated[float, Number(positive)] = 2.0
+'''
+
+
+def test_the_tables_of_the_page_are_those_of_the_declarations():
+    text = PAGE.read_text(encoding="utf-8")
+    assert page(text) == text  # else: python -m fvsolve.case.key_tables docs/parts.md
+
+
+def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
+    named = [name for _, name, _ in MARK.findall(PAGE.read_text(encoding="utf-8"))]
+    assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}  # a valve by another name
+    assert len(named) == len({*named})
+    assert [line.split(" | ")[0] for line in key_table("chamber").splitlines()[2:]] == [
+        "| `volume`",
+        "| `initial_pressure`",
+    ]
+
+
+def test_a_part_from_outside_has_its_table_too(tmp_path):
+    (tmp_path / "plate").mkdir()
+    (tmp_path / "plate" / "part.py").write_text(PART)
+    done = subprocess.run(
+        [sys.executable, "-m", "fvsolve.case.key_tables", "plate"],
+        check=True, capture_output=True, text=True, env={**os.environ, "FVSOLVE_PARTS": str(tmp_path / "plate")},
+    )  # fmt: skip
+    assert done.stdout.splitlines()[2:] == [
+        "| `bore` | m, above 0 | *needed* | profile | of the hole |",
+        "| `ageing` | - | as new | value | of its edge |",
+        "| `turns` | -, above 0 | 2 | profile |  |",
+    ]
+
+
+def test_writing_a_page_leaves_its_prose_alone(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text("Before.\n\n<!-- keys: frame -->\nold\n<!-- end -->\n\nAfter.\n")
+    main([str(path)])
+    before, table, after = path.read_text().partition(key_table("frame"))
+    assert (before, after) == ("Before.\n\n<!-- keys: frame -->\n", "<!-- end -->\n\nAfter.\n") and table
+
+
+def test_what_has_no_keys_is_named():
+    with pytest.raises(FvsolveError, match='no keys of "vlave"; did you mean "valve"'):
+        key_table("vlave")
