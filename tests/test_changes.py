@@ -116,7 +116,7 @@ class Trial:
             value = declared(table, words)
             self.values.append(value)
             often[id(value)] += 1
-            if (self.every and often[id(value)] <= 2) or id(value) not in self.done:
+            if (self.every and often[id(value)] == 1) or id(value) not in self.done:
                 self.key(name, before, changes(case, spoken(words)), keys, value)
 
     def key(self, name: str, before, said: str, keys: tuple, value) -> None:
