@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from truth.scenes import pipe, reservoir, scene
 
 import fvsolve
 from fvsolve.case.changes import CLASSES, changes, declared
@@ -17,6 +18,10 @@ CASES = Path(__file__).parents[1] / "cases"
 LARGE = ("net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")  # which take seconds to be built over and over
 NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
 HAIR = 1e-4
+ALIKE = {
+    "loss_in",
+    "loss_out",
+}  # of class `shape`; the shipped case that has them does not show it, the test below does
 
 
 def raw_case(name: str) -> dict:
@@ -154,8 +159,18 @@ def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
         if path.stem not in LARGE:
             trial.case(path.stem)
     assert trial.wrong == []
-    assert trial.never() == []
+    assert {place.split(".")[-1] for place in trial.never()} <= ALIKE
     assert len(trial.names) > 100
+
+
+def test_losses_alike_are_another_shape_where_a_pipe_joins():
+    """Of a throat with one loss for both ways the place has a closed root; the shipped one is joined by a column."""
+    tank = {"type": "tank", "area": 2.0, "level": 3.0, "connection": {"diameter": 0.1, "loss_in": 1.0, "loss_out": 1.5}}
+    case = scene({"lake": reservoir(2e5), "tank": tank}, {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4)}, 1.0, {})
+    before = fvsolve.build(fvsolve.load(case))
+    for key, other in (("loss_in", 1.5), ("loss_out", 1.0)):
+        after = fvsolve.build(fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other)))
+        assert found_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
 
 
 @pytest.mark.slow

@@ -23,12 +23,11 @@ class Connection(Table):
     diameter: Annotated[
         float | None, Quantity("length", positive, "of the throat [m]", Usual(5e-5, 14.0, "capillaries to shafts"))
     ] = None
+    # losses alike have other roots, where a pipe joins
     loss_in: Annotated[
         float, Number(positive, "K of K rho v^2 / 2 with v in the throat, into the vessel", changes=SHAPE)
     ]
-    loss_out: Annotated[
-        float, Number(positive, "K likewise, out of the vessel", changes=SHAPE)
-    ]  # losses alike: another law
+    loss_out: Annotated[float, Number(positive, "K likewise, out of the vessel", changes=SHAPE)]
 
 
 class Joined(Value):
