@@ -70,5 +70,30 @@ def test_files_and_names_of_the_pages_are_there(page):
     there = [f"/{path.as_posix()}" for folder in ("fvsolve", "tests", "cases") for path in (TOP / folder).rglob("*.*")]
     said = {*re.findall(r"`([\w/]+\.(?:py|json))`", text)} - {"summary.json"}
     assert [name for name in said if "NAME" not in name and not any(one.endswith(f"/{name}") for one in there)] == []
-    links = [link.split("#")[0] for link in re.findall(r"\]\(([^):]+)\)", text)]
-    assert [link for link in links if not (TOP / page).parent.joinpath(link).exists()] == []
+
+
+def pages() -> list[Path]:
+    return [*TOP.glob("*.md"), *(TOP / "docs").rglob("*.md"), *(TOP / "benchmarks").glob("*.md")]
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_links_of_every_page_lead_to_files_and_headings(page):
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^):\s]+)\)", text):
+        name, _, heading = link.partition("#")
+        target = page.parent / name if name else page
+        assert target.exists(), link
+        if heading:
+            titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert heading in {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}, link
+
+
+def test_the_changelog_has_the_form_of_keep_a_changelog():
+    """https://keepachangelog.com/en/1.1.0/: what is not released first, six kinds of change, a list under each."""
+    text = (TOP / "CHANGELOG.md").read_text(encoding="utf-8")
+    top, *versions = re.split(r"^## ", text, flags=re.MULTILINE)
+    assert top.startswith("# Changelog\n") and "keepachangelog.com" in top and versions[0].startswith("[Unreleased]\n")
+    for version in versions:
+        kinds = re.findall(r"^### (.*)\n\n- ", version, re.MULTILINE)
+        order = ["Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"]
+        assert kinds and set(kinds) <= {*order} and len(kinds) == len(set(kinds)) == version.count("\n### ")
