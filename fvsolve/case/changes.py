@@ -32,10 +32,10 @@ def changes(case: Case, key: str) -> str:
     has no such key.
     """
     keys = dotted(key)
-    if keys[:1] == ("signals",):
-        found = [classed(case, other) for other in followers(case.raw, keys[1] if keys[1:] else "")]
-        return max(found, key=CLASSES.index, default=VALUE)
-    return classed(case, keys)
+    own = classed(case, keys)
+    if keys[0] != "signals" or not keys[1:]:
+        return own
+    return max((classed(case, other) for other in followers(case.raw, keys[1])), key=CLASSES.index, default=VALUE)
 
 
 def classed(case: Case, keys: tuple[Any, ...]) -> str:
@@ -49,7 +49,7 @@ def classed(case: Case, keys: tuple[Any, ...]) -> str:
 
 def declared(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
     """What a key may be, as its part declares it; of a key below one that says all, what that one may be."""
-    found: Value | None = Keys(whole(raw))
+    found: Value | None = Keys(known(raw))
     for key in keys:
         outer = found
         try:
@@ -71,9 +71,10 @@ class Keys(Value):
         return self.values[key]
 
 
-def whole(raw: dict[str, Any]) -> dict[str, Value]:
+def known(raw: dict[str, Any]) -> dict[str, Value]:
     """What each key of a case may be; where parts have names of their own, those of this one."""
-    found = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": Scheduled("number")}
+    signals = Keys(dict.fromkeys(raw.get("signals", {}), Scheduled("number")))
+    found = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
     found |= {name: Inside(model) for name, model in TABLES.items()}
     for group, kinds in KINDS.items():
         parts = raw.get(group, {}).items()

@@ -62,6 +62,11 @@ class Range:
         if value < self.least or value > self.greatest or (self.open and value == self.least):
             raise ValueError(f"{show(given)} is out of range; wanted a value {self}")
 
+    @property
+    def bounds(self) -> str:
+        """', above 0', as it stands behind a unit; nothing of all numbers."""
+        return "" if self == Range() else f", {self}".replace("of at least", "at least")
+
     def __str__(self) -> str:
         if self.greatest == math.inf:
             return f"above {self.least:g}" if self.open else f"of at least {self.least:g}"
@@ -76,11 +81,6 @@ class Usual(NamedTuple):
     least: float
     greatest: float
     practice: str  # whose, or what it spans
-
-
-def said(range: Range) -> str:
-    """', above 0': a range behind a unit; of all numbers nothing."""
-    return f", {range}".replace("of at least", "at least") if range != Range() else ""
 
 
 anything = Range()
@@ -153,7 +153,7 @@ class Quantity(Value):
 
     @property
     def takes(self) -> str:
-        return f"{units.DIMENSIONS[self.dimension].si}{said(self.range)}"
+        return f"{units.DIMENSIONS[self.dimension].si}{self.range.bounds}"
 
     def json(self) -> dict[str, Any]:
         if self.dimension == "number":
@@ -183,7 +183,7 @@ class Whole(Value):
 
     @property
     def takes(self) -> str:
-        return f"whole number{said(self.range)}"
+        return f"whole number{self.range.bounds}"
 
     def json(self) -> dict[str, Any]:
         return {"type": "integer", "minimum": self.range.least}
@@ -293,7 +293,9 @@ class Rows(Value):
     @property
     def takes(self) -> str:
         unit = units.DIMENSIONS[self.dimension].si
-        return (f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]") + said(self.range)
+        return (
+            f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]"
+        ) + self.range.bounds
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": Quantity(self.dimension).json(), "minItems": self.length or 1}
