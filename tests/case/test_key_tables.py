@@ -1,23 +1,20 @@
 """The key tables of docs/parts.md are the declarations: each table as it is made now, each part with one."""
 
-from pathlib import Path
-
 import pytest
+from truth.folders import page as page_of
 
 from fvsolve.case.key_tables import MARK, key_table, main, page
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS
 
-PAGE = Path(__file__).parents[1] / "docs" / "parts.md"
-
 
 def test_the_tables_of_the_page_are_those_of_the_declarations():
-    text = PAGE.read_text(encoding="utf-8")
+    text = page_of("parts")
     assert page(text) == text  # else: python -m fvsolve.case.key_tables docs/parts.md
 
 
 def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
-    named = [name for _, name, _ in MARK.findall(PAGE.read_text(encoding="utf-8"))]
+    named = [name for _, name, _ in MARK.findall(page_of("parts"))]
     assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}  # a valve by another name
     assert len(named) == len({*named})
     assert [line.split(" | ")[0] for line in key_table("chamber").splitlines()[2:]] == [

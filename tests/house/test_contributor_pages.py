@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from truth.folders import DOCS
 
-TOP = Path(__file__).parents[1]
+TOP = DOCS.parent
 PAGES = {name: (TOP / name).read_text(encoding="utf-8") for name in ("CONTRIBUTING.md", "docs/developing.md")}
 HEAVY = ("python3.11", ".ci/run")  # installs, or runs all
 
