@@ -13,7 +13,7 @@ from fvsolve.case.probe import Kinds, Probe, read_probe
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.series import copy_name, find_file, read_columns
 from fvsolve.parts.table import read_keys
-from fvsolve.parts.value import NEEDED, Misfit, Number, Quantity, Setting, Text, nonnegative
+from fvsolve.parts.value import NEEDED, VALUE, Misfit, Number, Quantity, Setting, Text, nonnegative
 from fvsolve.units import show
 
 FUNCTIONS = ("max", "min", "mean", "final", "at")
@@ -92,17 +92,17 @@ def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
     """Keys of a claim on a probe of that dimension; a pressure's tolerance is a difference, never gauge."""
     difference = "modulus" if dimension.endswith("pressure") else dimension
     return {
-        "value": (Quantity(dimension), NEEDED),
-        "rtol": (Number(nonnegative), 0.0),
-        "atol": (Quantity(difference, nonnegative), 0.0),
+        "value": (Quantity(dimension, changes=VALUE), NEEDED),
+        "rtol": (Number(nonnegative, changes=VALUE), 0.0),
+        "atol": (Quantity(difference, nonnegative, changes=VALUE), 0.0),
     }
 
 
 COMPARE_KEYS = {
-    "file": (Text("a CSV file with a header, relative to the case"), NEEDED),
-    "time": (Text("header of the times, the first column if left out"), None),
-    "value": (Text("header of the values, the second column if left out"), None),
-    "shift": (Quantity("time", about="added to its times [s]"), 0.0),
+    "file": (Text("a CSV file with a header, relative to the case", VALUE), NEEDED),
+    "time": (Text("header of the times, the first column if left out", VALUE), None),
+    "value": (Text("header of the values, the second column if left out", VALUE), None),
+    "shift": (Quantity("time", about="added to its times [s]", changes=VALUE), 0.0),
 }
 
 

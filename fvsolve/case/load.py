@@ -27,6 +27,7 @@ from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
 from fvsolve.parts.value import (
     ROOT,
+    VALUE,
     Misfit,
     Quantity,
     Setting,
@@ -50,9 +51,9 @@ KEYS = (
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
-    "title": (Text(), ""),
-    "description": (Text(), ""),
-    "source": (Text(), ""),
+    "title": (Text(changes=VALUE), ""),
+    "description": (Text(changes=VALUE), ""),
+    "source": (Text(changes=VALUE), ""),
     "gravity": (Quantity("acceleration", nonnegative), 9.80665),
 }
 

@@ -93,7 +93,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
     before = {group: list(parts) for group, parts in groups.items() if isinstance(parts, dict)}
     for key, value in settings.items():
-        keys = _dotted(str(key))
+        keys = dotted(str(key))
         try:
             _put(raw.table, keys, _copy(_parsed(value)))
             raw.overridden.append(keys)
@@ -198,7 +198,8 @@ def _copy(value: Any, depth: int = 0) -> Any:
     return value
 
 
-def _dotted(key: str) -> tuple[str, ...]:
+def dotted(key: str) -> tuple[str, ...]:
+    """The keys of a path as TOML writes it: "links.valve.area"."""
     try:
         found: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
     except ValueError:

@@ -14,6 +14,10 @@ from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import keys_json
 from fvsolve.parts.value import Quantity
 
+BESIDE = ("description", "default")  # words that may stand beside a reference
+WORDS = ("properties", "items", "anyOf", "additionalProperties", "$defs")
+SHORT = 60  # letters: what is shorter is said again
+
 
 def schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) of a case file; what is said twice stands once under `$defs`."""
@@ -48,34 +52,39 @@ def whole() -> dict[str, Any]:
         "title": "fvsolve case",
         "type": "object",
         "properties": properties,
-        "required": list(GROUPS),
+        "required": [group for group in GROUPS if group != "links"],
+        "if": {
+            "properties": {"nodes": {"additionalProperties": {"properties": {"type": {"not": {"const": "basin"}}}}}}
+        },
+        "then": {"required": ["links"]},  # without a basin
         "additionalProperties": False,
         "$defs": definitions,
     }
 
 
 def shared(made: dict[str, Any]) -> dict[str, Any]:
-    """The same schema with schedules and forms of them that are said twice said once, under `$defs`."""
+    """The same schema with what is said twice said once, under `$defs`; words and defaults stand beside references."""
     times: Counter[str] = Counter()
-
-    def count(part: Any) -> None:
-        if isinstance(part, dict) and _name(part):
-            times[dumps(part)] += 1
-        for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
-            count(inner)
-
-    count(made)
-    texts = [text for text, many in times.items() if many > 1]
     names: dict[str, str] = {}
-    for text in texts:
-        name = _name(loads(text))
-        alike = sum(_name(loads(known)) == name for known in names)
-        names[text] = f"{name}-{alike + 1}" if alike else name
+
+    def count(part: Any, key: str) -> None:
+        if isinstance(part, dict) and _schema(part):
+            text = dumps(_bare(part), sort_keys=True)
+            times[text] += 1
+            if times[text] > 1:  # all below it is said where this is
+                return
+            names[text] = _name(part) or key
+        for word, inner in part.items() if isinstance(part, dict) else [(key, inner) for inner in part]:
+            if isinstance(inner, (dict, list)):
+                count(inner, key if word in WORDS else word)
+
+    count(made, "case")
+    names = _apart({text: names[text] for text, many in times.items() if many > 1 and len(text) > SHORT})
 
     def replaced(part: Any, whole: bool = False) -> Any:
         if isinstance(part, dict):
-            if not whole and (name := names.get(dumps(part))):
-                return {"$ref": f"#/$defs/{name}"}
+            if not whole and (name := names.get(dumps(_bare(part), sort_keys=True))):
+                return {"$ref": f"#/$defs/{name}", **{key: part[key] for key in BESIDE if key in part}}
             return {key: replaced(inner) for key, inner in part.items()}
         return [replaced(inner) for inner in part] if isinstance(part, list) else part
 
@@ -84,20 +93,54 @@ def shared(made: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
+def _bare(part: dict[str, Any]) -> dict[str, Any]:
+    return {key: one for key, one in part.items() if key not in BESIDE}
+
+
+def _schema(part: dict[str, Any]) -> bool:
+    """Whether it says what a value may be, and is no table of such by key."""
+    return any(isinstance(part.get(word), (str, list)) for word in ("type", "anyOf", "enum"))
+
+
+def _apart(names: dict[str, str]) -> dict[str, str]:
+    """Names numbered where they are alike."""
+    many: Counter[str] = Counter()
+    for text, name in names.items():
+        many[name] += 1
+        names[text] = f"{name}-{many[name]}" if many[name] > 1 else name
+    return names
+
+
 def _name(part: dict[str, Any]) -> str:
-    """What a part that may be shared is called: a schedule or its forms, by what they are of; none for others."""
+    """What a part that may be shared is called: its dimension, of a schedule its values', of a table its keys."""
     first = next(iter(part.get("anyOf", [])), part)
-    if set(part) == {"anyOf"} and isinstance(first, dict) and set(first) <= {"type", "examples", "x-dimension"}:
+    if isinstance(first, dict) and set(first) <= {"type", "examples", "x-dimension", *BESIDE} and "anyOf" in part:
         return f"schedule-of-{first.get('x-dimension', 'number')}"
+    if part.get("type") == "array" and "enum" not in part["items"]:
+        least = part.get("minItems", 1)
+        return f"{least if least > 1 else 'list'}-of-{part['items'].get('x-dimension', 'number')}"
     keys = part.get("properties")
-    if isinstance(keys, dict) and set(part) <= {"type", "properties", "required", "additionalProperties"}:
+    if isinstance(keys, dict) and "title" not in part:
         return "-".join(keys)
-    return ""
+    return part.get("x-dimension", "")
+
+
+def _without_titles(part: Any) -> Any:
+    """The same without what pydantic adds to every key: its name again, and that nothing is the default."""
+    if isinstance(part, list):
+        return [_without_titles(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    made = {key: _without_titles(one) for key, one in part.items() if (key, one) != ("default", None)}
+    if isinstance(made.get("properties"), dict):
+        made["properties"] = {key: {word: said for word, said in one.items() if word != "title"}
+                              for key, one in made["properties"].items()}  # fmt: skip
+    return made
 
 
 def _hoisted(model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     """A model's schema with its definitions moved to the top."""
-    made = model.model_json_schema(by_alias=True)
+    made = _without_titles(model.model_json_schema(by_alias=True))
     definitions |= made.pop("$defs", {})
     return made
 

@@ -14,6 +14,10 @@ from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OILY
 from fvsolve.parts.table import Named, Table
 from fvsolve.parts.value import (
+    COUNTED,
+    PROFILE,
+    SHAPE,
+    VALUE,
     Choice,
     Flag,
     Misfit,
@@ -34,6 +38,7 @@ from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.structure import KINDS
 from fvsolve.units import show
 
+STARTS = ("steady", "equilibrium", "rest")
 CAVITY_SCHEMES = tuple(name for name, one in SCHEMES.items() if one.cavities)
 
 # Every default of [numerics] and [output], chosen by docs/accuracy-and-speed.md. Steps: Courant where there are cells,
@@ -56,12 +61,16 @@ VISCOSITIES = Usual(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 class FluidSpec(Table):
     """`[fluid]`: which fluid, at which state, under which density law; numbers here override CoolProp's."""
 
-    name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"')]
-    temperature: Annotated[float, Quantity("temperature", positive, "where properties are taken [K]")] = 293.15
-    pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]")] = 101325.0
+    name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', COUNTED)]
+    temperature: Annotated[
+        float, Quantity("temperature", positive, "where properties are taken [K]", changes=COUNTED)
+    ] = 293.15
+    pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]", changes=COUNTED)] = (
+        101325.0
+    )
     law: Annotated[str, Choice("density law", tuple(LAWS), "one for the case")] = "linear"
-    density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES)] = None
-    bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI)] = None
+    density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES, COUNTED)] = None
+    bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI, COUNTED)] = None
     viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]", VISCOSITIES)] = None
     vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
     air_fraction: Annotated[float | None, Number(between(0, 1), "of the volume at 1 atm, law mixture")] = None
@@ -108,18 +117,54 @@ class Numerics(Table):
     end: Annotated[float, Quantity("time", about="when the run ends [s]")]
     start: Annotated[float, Quantity("time", about="when it begins [s]")] = 0.0
     initial: Annotated[
-        str, Choice("start", ("steady", "equilibrium", "rest"), "steady flow, nothing may move, or no flow")
+        str,
+        Choice(
+            "start",
+            STARTS,
+            "stated levels, pressures and flows are held and the rest in equilibrium, nothing may move, or no flow",
+            changes=PROFILE,
+        ),
     ] = "steady"
     scheme: Annotated[str, Choice("scheme", tuple(SCHEMES), "reconstruction in the cells")] = DEFAULT_SCHEME
     limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "of the scheme muscl")] = DEFAULT_LIMITER
-    method: Annotated[str | None, Choice("method", MethodNames(), "Runge-Kutta method")] = None
-    courant: Annotated[float | None, Number(positive, "step, in travel times of the quickest cell")] = None
-    step: Annotated[float | None, Quantity("time", positive, "fixed step [s]")] = None
-    rtol: Annotated[float | None, Number(between(0, 1, open=True), "error per step, relative")] = None
-    linear_algebra: Annotated[
-        str | None, Choice("linear algebra", KINDS, "of implicit steps; the structure chooses if left out")
+    method: Annotated[
+        str | None,
+        Choice(
+            "method",
+            MethodNames(),
+            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}) if left out",
+            changes=PROFILE,
+        ),
     ] = None
-    cell_time: Annotated[float | None, Quantity("time", positive, "of pipes that state no cells [s]")] = None
+    courant: Annotated[
+        float | None,
+        Number(
+            positive,
+            f"step over the travel time of the quickest cell; {DEFAULT_COURANT} where there are cells if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    step: Annotated[float | None, Quantity("time", positive, "fixed step [s]", changes=VALUE)] = None
+    rtol: Annotated[
+        float | None,
+        Number(
+            between(0, 1, open=True),
+            f"error per step; {DEFAULT_RTOL:g} without cells, under auto and of implicit methods that can if left out",
+        ),
+    ] = None
+    linear_algebra: Annotated[
+        str | None,
+        Choice("linear algebra", KINDS, "of implicit steps; by the structure of the scene if left out", changes=VALUE),
+    ] = None
+    cell_time: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            f"of pipes that state no cells [s]; longest travel time of a pipe / {DEFAULT_CELLS} if left out",
+            changes=SHAPE,
+        ),
+    ] = None
     below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
     def filled(self, has_cells: bool, carries: bool) -> Numerics:
@@ -144,7 +189,9 @@ def steps_by_error(method: str | None) -> bool:
 class OutputUnits(Value):
     """`[output] units`: a unit per quantity of a probe."""
 
-    about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }'
+    about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }; SI, absolute if left out'
+    takes = "`{ QUANTITY = UNIT }`"
+    changes = VALUE
     quantities = (
         "pressure",
         "gauge_pressure",
@@ -192,7 +239,8 @@ class OutputUnits(Value):
 class Names(Value):
     """A list of texts, read as probes later, when the parts are known."""
 
-    about = "what is recorded; all nodes and links if left out"
+    about = "what is recorded; those of all nodes and links if left out"
+    takes = "list of probes"
 
     def read(self, given: Any, setting: Setting) -> tuple[Any, ...]:
         if not isinstance(given, (list, tuple)):
@@ -206,17 +254,31 @@ class Names(Value):
 class Line(Table):
     """A line across a basin along which its fields are written at every frame."""
 
-    basin: Annotated[str, Text("its name")]
-    from_: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of its start [m]"), Field(alias="from")]
-    to: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of its end [m]")]
-    points: Annotated[int, Whole(between(2, 10**5), "evenly along it, both ends among them")] = 101
+    basin: Annotated[str, Text("its name", VALUE)]
+    from_: Annotated[
+        tuple[float, float],
+        Rows("length", length=2, about="x, y of its start [m]", changes=VALUE),
+        Field(alias="from"),
+    ]
+    to: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of its end [m]", changes=VALUE)]
+    points: Annotated[int, Whole(between(2, 10**5), "evenly along it, both ends among them", VALUE)] = 101
 
 
 class Output(Table):
     """`[output]`: when and what is recorded, and in which units it is shown."""
 
-    every: Annotated[float | None, Quantity("time", positive, "between rows of the history [s]")] = None
-    fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none")] = DEFAULT_FRAMES
+    every: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            f"between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
+        DEFAULT_FRAMES
+    )
     probes: Annotated[Any, Names()] = None
     lines: Annotated[Any, Named(Line, "lines by name: { centre = { basin, from, to, points } }")] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
@@ -230,4 +292,4 @@ class Output(Table):
 class ExactSpec(Table):
     """`[exact]`: the exact solution that this scene has; errors of a study are measured against it."""
 
-    name: Annotated[str, Choice("exact solution", tuple(NAMES), "what the scene is exactly")]
+    name: Annotated[str, Choice("exact solution", tuple(NAMES), "what the scene is exactly", changes=VALUE)]

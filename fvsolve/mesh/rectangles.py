@@ -123,6 +123,8 @@ def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Seque
         for k, (name, value) in enumerate(zip(names, hole, strict=True))
         if found[k] is None
     ]
+    if not faults and (found[0] == found[2] or found[1] == found[3]):
+        return [Fault(place, f"{_shown(hole)} has no cells; wanted x0 and x1, y0 and y1 on different grid lines")]
     if not faults:
         solid[found[1] : found[3], found[0] : found[2]] = False
     return faults
@@ -185,7 +187,7 @@ def _span(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid:
         return Fault(place, f"{_shown(span)}; wanted from below to, coordinates along the {side} side [m]")
     first, last = (_line(along, value) for value in span)
     text = f"{span[0]:.9g} to {span[1]:.9g} m"
-    if first is None or last is None:
+    if first is None or last is None or first == last:
         i, j = (int(np.argmin(np.abs(along - value))) for value in span)
         i = min(i, along.size - 2)
         near = f"{along[i]:.9g} to {along[max(j, i + 1)]:.9g} m"

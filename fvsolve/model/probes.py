@@ -12,7 +12,7 @@ from fvsolve.model.reading import along
 def lower_probes(draft) -> np.ndarray:
     """The probe table of a scene; pressures of the profile are filled in later by `probe_offsets`."""
     case, table = draft.case, np.zeros(len(draft.case.probes), rec.PROBE)
-    parts = {"nodes": {**case.places, **case.nodes}, "links": case.links}
+    parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
     for row, probe in zip(table, draft.case.probes, strict=True):
         if probe.point is not None:
             lower_point(draft, row, probe)

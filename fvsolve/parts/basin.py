@@ -10,8 +10,11 @@ from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import Named, Table, at_most_one, read_keys
+from fvsolve.parts.table import Inside, Named, Table, at_most_one, read_keys
 from fvsolve.parts.value import (
+    PROFILE,
+    SHAPE,
+    VALUE,
     Choice,
     Misfit,
     Quantity,
@@ -46,33 +49,37 @@ FIELDS = {  # what can be read at a point: name -> dimension
 class Patch(Table):
     """A stretch of the outline: a place `BASIN.PATCH` that links may join, or a boundary that is no wall."""
 
-    side: Annotated[str | None, Choice("side", SIDES, "of a rectangle")] = None
+    side: Annotated[str | None, Choice("side", SIDES, "of a rectangle, needed there; files name their own patches")] = (
+        None
+    )
     span: Annotated[
         tuple[float, float] | None,
-        Rows("length", nonnegative, length=2, about="along the side, all of it if left out [m]"),
+        Rows(
+            "length",
+            nonnegative,
+            length=2,
+            about="along the side, on lines of the grid [m]; all of it if left out",
+            changes=SHAPE,
+        ),
     ] = None
-    boundary: Annotated[str | None, Choice("boundary", ("wall", "open"), "a wall if left out")] = None
+    boundary: Annotated[
+        str | None, Choice("boundary", ("wall", "open"), "waves leave where it is open; a wall if left out")
+    ] = None
     impedance: Annotated[
-        float | None, Quantity("impedance", nonnegative, "of the boundary to waves, pressure over velocity [Pa s/m]")
+        float | None,
+        Quantity(
+            "impedance", nonnegative, "pressure over velocity of waves, in place of boundary, of a liquid [Pa s/m]"
+        ),
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars that the given velocity brings in")] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"),)
 
 
-class Inside(Value):
-    """A table of its own."""
-
-    def __init__(self, model: type[Table], about: str) -> None:
-        self.model, self.about = model, about
-
-    def read(self, given: Any, setting: Setting) -> Table:
-        return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
-
-
 class Cells(Value):
     """Numbers of cells along both sides."""
 
-    about = "[along x, along y]"
+    about = "numbers of cells along x and y; a mesh is needed if left out"
+    takes = "[whole number, whole number]"
 
     def read(self, given: Any, setting: Setting) -> tuple[int, int]:
         whole = (
@@ -86,7 +93,8 @@ class Cells(Value):
 class Holes(Value):
     """Rectangles that are cut out."""
 
-    about = "cut out of the rectangle, each [x0, y0, x1, y1] [m]"
+    about = "cut out of the rectangle, on lines of the grid"
+    takes = "list of [x0, y0, x1, y1], m"
 
     def read(self, given: Any, setting: Setting) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or (given and not isinstance(given[0], (list, tuple))):
@@ -154,6 +162,8 @@ class Flowing(Value):
     """A velocity: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
 
     about = "{ u, v } or { stream }, formulas of x and y in SI, { expression, its parameters } or { file }; and period"
+    takes = "`{ u, v }`, `{ stream }`, `{ expression, ... }` or `{ file }`, and `period`"
+    changes = PROFILE
 
     def read(self, given: Any, setting: Setting) -> Velocity:
         if isinstance(given, Velocity):
@@ -209,32 +219,67 @@ class Basin(Node, kind="basin"):
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
 
-    physics: Annotated[str, Choice("physics", PHYSICS)] = "free-surface"
-    size: Annotated[tuple[float, float] | None, Rows("length", positive, length=2, about="along x and y [m]")] = None
+    physics: Annotated[str, Choice("physics", PHYSICS, "of its fields")] = "free-surface"
+    size: Annotated[
+        tuple[float, float] | None,
+        Rows("length", positive, length=2, about="along x and y [m]; a mesh is needed if left out", changes=SHAPE),
+    ] = None
     cells: Annotated[Any, Cells()] = None
     grading: Annotated[
         tuple[float, float] | None,
-        Rows("number", positive, length=2, about="last over first spacing, along x and y, 1 if left out [-]"),
+        Rows(
+            "number",
+            positive,
+            length=2,
+            about="last over first spacing, along x and y [-]; 1 if left out",
+            changes=SHAPE,
+        ),
     ] = None
     holes: Annotated[Any, Holes()] = None
-    mesh: Annotated[MeshFile | None, Inside(MeshFile, "a mesh in place of a rectangle: { file, unit }")] = None
+    mesh: Annotated[
+        MeshFile | None,
+        Inside(MeshFile, "a file that meshio reads in place of a rectangle, and the unit of its coordinates"),
+    ] = None
     patches: Annotated[Any, Named(Patch, "patches by name: { outlet = { side, span } }")] = {}
-    start: Annotated[Start | None, Inside(Start, "where the start is not rest: { level | pressure, u, v }")] = None
+    start: Annotated[
+        Start | None, Inside(Start, "level or pressure above that at rest, and velocities; at rest if left out")
+    ] = None
 
-    level: Annotated[float | None, Quantity("level", anything, "of the water at rest, above the elevation [m]")] = None
-    bed: Annotated[Formula | None, Shaped("length", "height above the elevation, 0 if left out [m]")] = None
+    level: Annotated[
+        float | None,
+        Quantity("level", anything, "of the water at rest, above the elevation [m]; free surface, needed there"),
+    ] = None
+    bed: Annotated[Formula | None, Shaped("length", "height above the elevation [m], free surface; 0 if left out")] = (
+        None
+    )
     manning: Annotated[
         float | None,
-        Quantity("number", nonnegative, "Manning's n [s/m^(1/3)]", Usual(0.005, 0.5, "glass to dense brush")),
+        Quantity(
+            "number",
+            nonnegative,
+            "Manning's n [s/m^(1/3)], free surface; no friction if left out",
+            Usual(0.005, 0.5, "glass to dense brush"),
+            VALUE,
+        ),
     ] = None
     factor: Annotated[
         float | None,
-        Quantity("number", nonnegative, "friction factor after Darcy [-]", Usual(0.002, 3.0, "glass to boulders")),
+        Quantity(
+            "number",
+            nonnegative,
+            "Darcy's, in place of manning [-], free surface; no friction if left out",
+            Usual(0.002, 3.0, "glass to boulders"),
+            VALUE,
+        ),
     ] = None
 
-    pressure: Annotated[float | None, Quantity("pressure", positive, "at rest")] = None
-    thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]")] = None
-    wave_speed: Annotated[float | None, Quantity("velocity", positive, "the fluid's own if left out [m/s]")] = None
+    pressure: Annotated[float | None, Quantity("pressure", positive, "at rest [Pa]; liquid, needed there")] = None
+    thickness: Annotated[
+        float | None, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
+    ] = None
+    wave_speed: Annotated[
+        float | None, Quantity("velocity", positive, "of a liquid [m/s]; the fluid's own if left out")
+    ] = None
 
     velocity: Annotated[Any, Flowing()] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}

@@ -10,12 +10,23 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.friction import NONE, Friction
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.sizes import FITTINGS, bore, loss
-from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Misfit, Number, Quantity, Setting, Text, Usual, Value, nonnegative, positive
+from fvsolve.parts.value import (
+    COUNTED,
+    PROFILE,
+    Misfit,
+    Number,
+    Quantity,
+    Setting,
+    Text,
+    Usual,
+    Value,
+    nonnegative,
+    positive,
+)
 from fvsolve.units import show
 
 BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela are 13.7 m wide
-DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES)
+DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, COUNTED)
 LOSS = Number(nonnegative, "loss coefficient on its velocity, spread along it")
 
 
@@ -26,6 +37,8 @@ class Fittings(Value):
     """A list of names of fittings; a name may stand there several times."""
 
     about = "fittings by name, their loss coefficients are added to minor_loss"
+    takes = "list of names"
+    changes = PROFILE
 
     def read(self, given: Any, setting: Setting) -> list[str]:
         if not isinstance(given, (list, tuple)):
@@ -48,6 +61,8 @@ class Conduit(TwoPort):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
 
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"),)
+
     meant: ClassVar[dict[str, str]] = dict.fromkeys(
         ("roughness", "factor", "friction_factor", "darcy_factor"),
         'friction = { model = "quasi-steady", roughness = "0.1 mm" } or { model = "steady", factor = 0.02 }',
@@ -57,19 +72,19 @@ class Conduit(TwoPort):
     )
 
     length: Annotated[
-        float, Quantity("length", positive, "along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"))
+        float, Quantity("length", positive, "along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
     ]
     diameter: Annotated[float, DIAMETER] = None  # nominal stands in for it
-    nominal: Annotated[str | None, Text('nominal size in place of diameter, "DN100" or "NPS 4"')] = None
-    schedule: Annotated[str | None, Text('of the nominal size, "40" if left out')] = None
+    nominal: Annotated[str | None, Text('"DN100", "NPS 4" or "NPS 1-1/2", in place of diameter', COUNTED)] = None
+    schedule: Annotated[
+        str | None, Text('of the nominal size: "40", "80", "STD", "10S"; "40" if left out', COUNTED)
+    ] = None
     friction: Friction = NONE
     minor_loss: Annotated[float, LOSS] = 0.0
     fittings: Annotated[list[str] | None, Fittings()] = None
-    initial_flow: Annotated[float | None, Quantity("flow", about="at the start [m3/s]")] = None
-
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
-        return super().key_faults(given) + at_least_one(given, ("diameter", "nominal"))
+    initial_flow: Annotated[
+        float | None, Quantity("flow", about="at the start [m3/s]; that of the steady state if left out")
+    ] = None
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         if self.diameter > self.length:

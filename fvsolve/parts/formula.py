@@ -11,7 +11,7 @@ import numpy as np
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.parts.csv_rows import read_rows
 from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.value import Misfit, Quantity, Range, Setting, Value, anything
+from fvsolve.parts.value import PROFILE, Misfit, Quantity, Range, Setting, Value, anything
 from fvsolve.units import show
 
 
@@ -53,6 +53,7 @@ class Shaped(Value):
     dimension: str
     about: str = ""
     range: Range = anything
+    changes: str = PROFILE
 
     def read(self, given: Any, setting: Setting) -> Formula:
         if isinstance(given, Formula):
@@ -77,6 +78,10 @@ class Shaped(Value):
         except ValueError as error:
             raise Misfit([(("file",), str(error))]) from None
         return Formula({"file": copy_name(path, setting)}, Samples(columns))
+
+    @property
+    def takes(self) -> str:
+        return f"{Quantity(self.dimension, self.range).takes}; formula"
 
     def json(self) -> dict[str, Any]:
         return {"type": ["number", "string", "object"]}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.table import Table, at_least_one
-from fvsolve.parts.value import Choice, Number, Quantity, Usual, between, nonnegative, positive
+from fvsolve.parts.value import SHAPE, Choice, Number, Quantity, Usual, between, nonnegative, positive
 
 MODELS = ("none", "steady", "quasi-steady", "unsteady", "hazen-williams", "chezy-manning")
 WEIGHTINGS = ("zielke", "vardy-brown")
@@ -44,14 +44,26 @@ class Friction(Table):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("roughness", "factor"),)
 
     model: Annotated[str, Choice("friction model", MODELS, "how the wall brakes the flow", MEANT)]
-    roughness: Annotated[float | None, Quantity("length", nonnegative, "of the wall [m]")] = None
-    factor: Annotated[float | None, Number(nonnegative, "Darcy's factor, four times Fanning's [-]", FACTORS)] = None
-    coefficient: Annotated[float | None, Number(positive, "C of Hazen-Williams, or n of Manning")] = None
+    roughness: Annotated[
+        float | None, Quantity("length", nonnegative, "of the wall [m], of steady, quasi-steady and unsteady")
+    ] = None
+    factor: Annotated[
+        float | None, Number(nonnegative, "Darcy's, four times Fanning's, in place of roughness [-]", FACTORS)
+    ] = None
+    coefficient: Annotated[
+        float | None, Number(positive, "C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
+    ] = None
 
     weighting: Annotated[
-        str | None, Choice("weighting function", WEIGHTINGS, "of the past; by the Reynolds number of the start")
+        str | None,
+        Choice(
+            "weighting function", WEIGHTINGS, "of the past, unsteady; by the Reynolds number of the start if left out"
+        ),
     ] = None
-    accuracy: Annotated[float | None, Number(between(1e-6, 0.1), "of the sum of exponentials, relative; 1e-4")] = None
+    accuracy: Annotated[
+        float | None,
+        Number(between(1e-6, 0.1), "of the sum of exponentials, relative, unsteady; 1e-4 if left out", changes=SHAPE),
+    ] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

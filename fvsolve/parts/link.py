@@ -80,5 +80,9 @@ class Ports(Value):
     def keys(self) -> dict[str, tuple[Value, Any]]:
         return {name: (Text(), NEEDED) for name in self.names}
 
+    @property
+    def takes(self) -> str:
+        return f"`{{ {', '.join(self.names)} }}`"
+
     def json(self) -> dict[str, Any]:
         return keys_json(self.keys())

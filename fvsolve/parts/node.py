@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Quantity, Rows, Usual
+from fvsolve.parts.value import VALUE, Quantity, Rows, Usual
 from fvsolve.units import show
 
 HEIGHTS = Usual(-12e3, 9e3, "boreholes to mountains")
@@ -31,9 +31,16 @@ class Node(Table):
     domain: ClassVar[str] = "hydraulic"  # | "translational"
 
     elevation: Annotated[
-        float | None, Quantity("length", about="height above datum [m], 0 if left out", usual=HEIGHTS)
+        float | None,
+        Quantity(
+            "length",
+            about="height above datum [m], of a reservoir by head that of the far end; 0 for all if left out",
+            usual=HEIGHTS,
+        ),
     ] = None
-    position: Annotated[tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]")] = None
+    position: Annotated[
+        tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]", changes=VALUE)
+    ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars that flow in from it, or that it holds at the start")] = {}
 
     @classmethod

@@ -7,18 +7,18 @@ from typing import Annotated, Any
 
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Misfit, Number, Quantity, Setting, Text, Value, nonnegative
+from fvsolve.parts.value import PROFILE, VALUE, Misfit, Number, Quantity, Setting, Text, Value, nonnegative
 from fvsolve.units import show
 
 
 class Scalar(Table):
     """A quantity c per mass that the fluid carries: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient)."""
 
-    unit: Annotated[str, Text("a label, for headers")] = "-"
+    unit: Annotated[str, Text("a label, for headers", VALUE)] = "-"
     initial: Annotated[float, Number(about="wherever nothing else is said")] = 0.0
-    diffusivity: Annotated[float, Quantity("diffusivity", nonnegative, "along pipes [m2/s]")] = 0.0
-    decay: Annotated[float, Quantity("rate", nonnegative, "at which it falls to ambient [1/s]")] = 0.0
-    ambient: Annotated[float, Number(about="what it decays to")] = 0.0
+    diffusivity: Annotated[float, Quantity("diffusivity", nonnegative, "along pipes [m2/s]", changes=VALUE)] = 0.0
+    decay: Annotated[float, Quantity("rate", nonnegative, "at which it falls to ambient [1/s]", changes=VALUE)] = 0.0
+    ambient: Annotated[float, Number(about="what it decays to", changes=VALUE)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Carried(Value):
 
     about: str = "value of each scalar, by its name"
     value: Value = Scheduled("number")
+    changes: str = PROFILE
 
     def read(self, given: Any, setting: Setting) -> dict[str, Any]:
         if not isinstance(given, dict):
@@ -42,6 +43,13 @@ class Carried(Value):
         if faults:
             raise Misfit(faults)
         return found
+
+    def below(self, key: str) -> Value | None:
+        return self.value
+
+    @property
+    def takes(self) -> str:
+        return f"`{{ NAME = VALUE }}`, each {self.value.takes}"
 
     def json(self) -> dict[str, Any]:
         return {"type": "object", "additionalProperties": self.value.json()}

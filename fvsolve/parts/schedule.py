@@ -12,6 +12,7 @@ from fvsolve.parts.series import copy_name, find_file, read_columns
 from fvsolve.parts.table import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
+    PROFILE,
     ROOT,
     Choice,
     Misfit,
@@ -92,6 +93,7 @@ class Scheduled(Value):
     range: Range = anything
     about: str = ""
     usual: Usual | None = None
+    changes: str = PROFILE
 
     def read(self, given: Any, setting: Setting) -> Schedule:
         if isinstance(given, Schedule):
@@ -120,6 +122,10 @@ class Scheduled(Value):
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
             "signal": {"signal": (Text(), NEEDED)},
         }
+
+    @property
+    def takes(self) -> str:
+        return f"{Quantity(self.dimension, self.range).takes}; schedule"
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms().values())]}

@@ -52,12 +52,14 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True)
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # keys of which one at most is given
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # keys of which one at least is given
     meant: ClassVar[dict[str, str]] = {}  # keys of other programs -> what says it here
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         """Faults of keys that do not go together, as pairs of keys and message."""
-        return [fault for keys in cls.alternatives for fault in at_most_one(given, keys)]
+        too_many = [fault for keys in cls.alternatives for fault in at_most_one(given, keys)]
+        return too_many + [fault for keys in cls.needs for fault in at_least_one(given, keys)]
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
@@ -90,6 +92,13 @@ class Table(BaseModel):
         return [info.alias or name for name, info in cls.model_fields.items()]
 
     @classmethod
+    def values(cls) -> dict[str, Value]:
+        """What each key may be."""
+        said = {info.alias or name: (info.metadata, info.annotation) for name, info in cls.model_fields.items()}
+        return {key: next((one for one in metadata if isinstance(one, Value)), Inside(model))
+                for key, (metadata, model) in said.items()}  # fmt: skip
+
+    @classmethod
     def wanted(cls, given: Any) -> str:
         """What a value should have been that is no table."""
         return f"keys of {listing(cls.keys())}"
@@ -112,6 +121,23 @@ class Table(BaseModel):
         return made
 
 
+class Inside(Value):
+    """A table of its own."""
+
+    def __init__(self, model: type[Table], about: str = "") -> None:
+        self.model, self.about = model, about
+
+    def read(self, given: Any, setting: Setting) -> Table:
+        return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
+
+    def below(self, key: str) -> Value | None:
+        return self.model.values()[key]
+
+    @property
+    def takes(self) -> str:
+        return f"`{{ {', '.join(self.model.keys())} }}`"
+
+
 class Named(Value):
     """Tables of one kind by name."""
 
@@ -132,6 +158,13 @@ class Named(Value):
         if faults:
             raise Misfit(faults)
         return found
+
+    def below(self, key: str) -> Value | None:
+        return Inside(self.model)
+
+    @property
+    def takes(self) -> str:
+        return f"`{{ NAME = {{ {', '.join(self.model.keys())} }} }}`"
 
     def json(self) -> dict[str, Any]:
         return {"type": "object", "additionalProperties": {"type": "object"}}

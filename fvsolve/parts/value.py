@@ -18,6 +18,12 @@ from fvsolve.units import show
 ROOT = object()  # in the keys of a fault: what follows counts from the top of the case
 NEEDED = object()  # in place of a default: the key must be given
 
+# What moving a key from one number to another asks of a model that is there
+VALUE = "value"  # its tables alone: the run starts from where it did
+PROFILE = "profile"  # another start too, in tables of the same sizes, names and whole numbers
+COUNTED = "cells"  # the same, but `shape` where pipes state no cells: those are counted by travel time
+SHAPE = "shape"  # another model: cells, parts, methods
+
 
 class Misfit(ValueError):
     """What does not fit in a value: pairs of the keys below it and a message."""
@@ -56,6 +62,11 @@ class Range:
         if value < self.least or value > self.greatest or (self.open and value == self.least):
             raise ValueError(f"{show(given)} is out of range; wanted a value {self}")
 
+    @property
+    def bounds(self) -> str:
+        """', above 0', as it stands behind a unit; nothing of all numbers."""
+        return "" if self == Range() else f", {self}".replace("of at least", "at least")
+
     def __str__(self) -> str:
         if self.greatest == math.inf:
             return f"above {self.least:g}" if self.open else f"of at least {self.least:g}"
@@ -83,17 +94,31 @@ def between(least: float, greatest: float, open: bool = False) -> Range:
 
 
 class Value:
-    """Base of the annotations of fields: `read` turns what the file says into what the part holds."""
+    """Base of the annotations of fields: `read` turns what the file says into what the part holds.
+
+    about : words; "..., WHAT if left out" says what then holds in place of a default
+    changes : one of VALUE, PROFILE, COUNTED, SHAPE
+    """
 
     about: str = ""
+    changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> Any:
         """The value, or ValueError (Misfit where the fault lies below a key)."""
         raise NotImplementedError(type(self).__name__)
 
+    def below(self, key: str) -> Value | None:
+        """What a key of a table may be, KeyError where there is none such; None where this value says all."""
+        return None
+
     def json(self) -> dict[str, Any]:
         """The JSON schema of what the file may say."""
         return {}
+
+    @property
+    def takes(self) -> str:
+        """What it may be, in Markdown: unit, range, words."""
+        return ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(lambda given, info: self.read(given, setting_of(info)))
@@ -110,6 +135,7 @@ class Quantity(Value):
     range: Range = anything
     about: str = ""
     usual: Usual | None = None
+    changes: str = PROFILE
 
     def read(self, given: Any, setting: Setting) -> float:
         value = units.parse(given, self.dimension)
@@ -125,6 +151,10 @@ class Quantity(Value):
             raise ValueError(f'{fault}, in m; did you mean "{given:g} mm"?') from None
         return value
 
+    @property
+    def takes(self) -> str:
+        return f"{units.DIMENSIONS[self.dimension].si}{self.range.bounds}"
+
     def json(self) -> dict[str, Any]:
         if self.dimension == "number":
             return {"type": ["number", "string"]}
@@ -132,9 +162,9 @@ class Quantity(Value):
         return {"type": ["number", "string"], "examples": [example], "x-dimension": self.dimension}
 
 
-def Number(range: Range = anything, about: str = "", usual: Usual | None = None) -> Quantity:
+def Number(range: Range = anything, about: str = "", usual: Usual | None = None, changes: str = PROFILE) -> Quantity:
     """A number without a unit."""
-    return Quantity("number", range, about, usual)
+    return Quantity("number", range, about, usual, changes)
 
 
 @dataclass(frozen=True)
@@ -143,12 +173,17 @@ class Whole(Value):
 
     range: Range = anything
     about: str = ""
+    changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> int:
         if isinstance(given, bool) or not isinstance(given, int):
             raise ValueError(f"{show(given)} is no whole number; wanted one {self.range}")
         self.range.check(given, given)
         return given
+
+    @property
+    def takes(self) -> str:
+        return f"whole number{self.range.bounds}"
 
     def json(self) -> dict[str, Any]:
         return {"type": "integer", "minimum": self.range.least}
@@ -162,6 +197,7 @@ class Choice(Value):
     words: Collection[str]
     about: str = ""
     meant: Mapping[str, str] = field(default_factory=dict)  # words of others -> what says it here
+    changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> str:
         if not isinstance(given, str):
@@ -176,6 +212,11 @@ class Choice(Value):
             raise ValueError(f"no {self.what} named {show(given)}{hint}")
         return given
 
+    @property
+    def takes(self) -> str:
+        words = [f"`{word}`" for word in self.words]
+        return ", ".join(words if len(words) <= 10 else [*words[:3], "..."])
+
     def json(self) -> dict[str, Any]:
         return {"enum": list(self.words)}
 
@@ -185,11 +226,16 @@ class Flag(Value):
     """true or false."""
 
     about: str = ""
+    changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> bool:
         if not isinstance(given, bool):
             raise ValueError(f"{show(given)} is neither true nor false")
         return given
+
+    @property
+    def takes(self) -> str:
+        return "`true`, `false`"
 
     def json(self) -> dict[str, Any]:
         return {"type": "boolean"}
@@ -200,11 +246,16 @@ class Text(Value):
     """Any text."""
 
     about: str = ""
+    changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> str:
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is no text")
         return given
+
+    @property
+    def takes(self) -> str:
+        return "text"
 
     def json(self) -> dict[str, Any]:
         return {"type": "string"}
@@ -219,6 +270,7 @@ class Rows(Value):
     rising: bool = False
     length: int | None = None
     about: str = ""
+    changes: str = PROFILE
 
     def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
@@ -237,6 +289,13 @@ class Rows(Value):
         if self.rising:
             check_rising(values, given)
         return tuple(values)
+
+    @property
+    def takes(self) -> str:
+        unit = units.DIMENSIONS[self.dimension].si
+        return (
+            f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]"
+        ) + self.range.bounds
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": Quantity(self.dimension).json(), "minItems": self.length or 1}

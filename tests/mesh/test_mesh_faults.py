@@ -28,6 +28,10 @@ BAD_RECTANGLES = {
     "patches.a: 0.2 to 0.5 m does not hold whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.2, 0.5)}
     ),
+    "holes[0]: [0, 0, 1e-12, 1] has no cells; wanted x0 and x1": dict(holes=[(0, 0, 1e-12, 1)]),
+    "patches.a: 0 to 1e-12 m does not hold whole faces of the west side; nearest is 0 to 0.25 m": dict(
+        patches={"a": ("west", 0.0, 1e-12)}
+    ),
     "patches.a: 0.3 to 0.31 m does not hold whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.3, 0.31)}
     ),

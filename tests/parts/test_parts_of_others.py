@@ -68,6 +68,12 @@ def test_its_own_test_passes(home):
 
 def test_commands_know_it_like_any_other(home):
     assert "share of its blades that the shaft gets" in command(home, "schema")
+    told = python(home, "-m", "fvsolve.case.key_tables", "runner").splitlines()
+    assert told[2:] == [
+        "| `resistance` | -, above 0 | *needed* | profile | of its gaps [Pa s/m3] |",
+        "| `loss` | -, above 0 | *needed* | profile | of its blades [Pa s2/m6] |",
+        "| `efficiency` | -, between 0 and 1 | 0.8 | profile | share of its blades that the shaft gets |",
+    ]
     command(home, "check", "mill.toml")
     with pytest.raises(AssertionError, match="links.wheel.efficiency"):
         command(home, "check", "mill.toml", "--set", "links.wheel.efficiency=2")

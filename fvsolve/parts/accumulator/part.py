@@ -34,9 +34,19 @@ class Accumulator(Node, kind="accumulator"):
 
     volume: Annotated[float, Quantity("volume", positive, "that gas and fluid share [m3]", VOLUMES)]
     precharge: Annotated[
-        float | None, Quantity("pressure", about="of the gas when it fills the vessel [Pa]", usual=GAS)
+        float | None,
+        Quantity(
+            "pressure",
+            about="of the gas when it fills volume [Pa]: a bladder; gas_volume is needed if left out",
+            usual=GAS,
+        ),
     ] = None
-    gas_volume: Annotated[float | None, Quantity("volume", positive, "of the gas at the start [m3]", VOLUMES)] = None
+    gas_volume: Annotated[
+        float | None,
+        Quantity(
+            "volume", positive, "of the gas at the start [m3]: an air vessel; precharge is needed if left out", VOLUMES
+        ),
+    ] = None
     exponent: Annotated[float, Number(Range(1.0), "n of p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)] = 1.2
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="of the gas at the start [Pa]; in equilibrium if left out")

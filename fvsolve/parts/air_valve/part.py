@@ -33,9 +33,15 @@ class AirValve(Node, kind="air-valve"):
     inlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air in [m]")]
     outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air out [m]")]
     discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of both bores")] = 0.6
-    volume: Annotated[float | None, Quantity("volume", positive, "of the float's chamber [m3]")] = None
+    volume: Annotated[
+        float | None,
+        Quantity("volume", positive, "of the float's chamber [m3]; a cylinder three inlets long and wide if left out"),
+    ] = None
     temperature: Annotated[
-        float, Quantity("temperature", positive, "of the air [K]", Usual(220.0, 370.0, "outdoors to hot rooms"))
+        float,
+        Quantity(
+            "temperature", positive, "of the air, which keeps it [K]", Usual(220.0, 370.0, "outdoors to hot rooms")
+        ),
     ] = 293.15
 
     initial_pressure: ClassVar[None] = None

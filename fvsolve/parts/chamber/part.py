@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.node import Node
-from fvsolve.parts.value import Quantity, Usual, positive
+from fvsolve.parts.value import VALUE, Quantity, Usual, positive
 
 
 class Chamber(Node, kind="chamber"):
@@ -19,7 +19,9 @@ class Chamber(Node, kind="chamber"):
     own_scalars: ClassVar[str] = "start"
     fixes_pressure: ClassVar[bool] = True
 
-    volume: Annotated[float, Quantity("volume", positive, "fluid held [m3]", Usual(1e-10, 1e5, "cylinders to caverns"))]
+    volume: Annotated[
+        float, Quantity("volume", positive, "fluid held [m3]", Usual(1e-10, 1e5, "cylinders to caverns"), VALUE)
+    ]
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium if left out")
     ] = None

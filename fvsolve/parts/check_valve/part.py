@@ -26,7 +26,12 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
     ] = 0.0
     overpressure: Annotated[
         float | None,
-        Quantity("pressure_drop", positive, "drop above cracking_pressure that opens it fully [Pa]", DROPS),
+        Quantity(
+            "pressure_drop",
+            positive,
+            "drop above cracking_pressure that opens it fully [Pa], with a disc that takes its time",
+            DROPS,
+        ),
     ] = None
 
     @classmethod

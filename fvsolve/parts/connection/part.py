@@ -6,8 +6,8 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.link import TwoPort
-from fvsolve.parts.table import Table, at_least_one
-from fvsolve.parts.value import Number, Quantity, Setting, Usual, Value, positive
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import SHAPE, Number, Quantity, Setting, Usual, Value, positive
 from fvsolve.units import show
 
 
@@ -15,6 +15,7 @@ class Connection(Table):
     """The throat between a vessel and its place: dp = loss rho v |v| / 2, v in its area, one loss each way."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
 
     area: Annotated[
         float | None, Quantity("area", positive, "of the throat [m2]", Usual(1e-9, 200.0, "capillaries to shafts"))
@@ -22,18 +23,18 @@ class Connection(Table):
     diameter: Annotated[
         float | None, Quantity("length", positive, "of the throat [m]", Usual(5e-5, 14.0, "capillaries to shafts"))
     ] = None
-    loss_in: Annotated[float, Number(positive, "K on the velocity in the throat, into the vessel")]
-    loss_out: Annotated[float, Number(positive, "K out of the vessel")]
-
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list:
-        return super().key_faults(given) + at_least_one(given, ("area", "diameter"))
+    # losses alike have other roots, where a pipe joins
+    loss_in: Annotated[
+        float, Number(positive, "K of K rho v^2 / 2 with v in the throat, into the vessel", changes=SHAPE)
+    ]
+    loss_out: Annotated[float, Number(positive, "K likewise, out of the vessel", changes=SHAPE)]
 
 
 class Joined(Value):
     """The table of a connection."""
 
-    about = "throat with a loss each way: { diameter or area, loss_in, loss_out }"
+    about = "a throat with a loss each way; joined without loss if left out"
+    takes = "[connection](#connection)"
 
     def read(self, given: Any, setting: Setting) -> Connection:
         if isinstance(given, Connection):
@@ -41,6 +42,9 @@ class Joined(Value):
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is no connection; wanted {{ diameter, loss_in, loss_out }}")
         return Connection.model_validate(given, context=setting)
+
+    def below(self, key: str) -> Value | None:
+        return Connection.values()[key]
 
     def json(self) -> dict[str, Any]:
         return Connection.model_json_schema()

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.chamber.part import Chamber
 from fvsolve.parts.link import Link, Ports
-from fvsolve.parts.value import Quantity, Usual, nonnegative, positive
+from fvsolve.parts.value import VALUE, Quantity, Usual, nonnegative, positive
 
 SIZES = Usual(5e-4, 30.0, "micro-hydraulics to ship lifts")
 AREAS = Usual(1e-7, 30.0, "micro-hydraulics to presses")
@@ -29,26 +29,42 @@ class Cylinder(Link, kind="cylinder"):
     quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
 
     ports: Annotated[dict[str, str], Ports(("rod", "case"))]
-    stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]", SIZES)]
-    area_A: Annotated[float | None, Quantity("area", positive, "of the piston at A [m2]", AREAS)] = None
-    area_B: Annotated[float | None, Quantity("area", positive, "of the piston at B, without the rod [m2]", AREAS)] = (
-        None
-    )
+    stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]", SIZES, VALUE)]
+    area_A: Annotated[
+        float | None,
+        Quantity("area", positive, "of the piston at A [m2]; piston_diameter is needed if left out", AREAS),
+    ] = None
+    area_B: Annotated[
+        float | None,
+        Quantity("area", positive, "the ring at B, without the rod [m2]; rod_diameter is needed if left out", AREAS),
+    ] = None
     piston_diameter: Annotated[float | None, Quantity("length", positive, "in place of area_A [m]", SIZES)] = None
     rod_diameter: Annotated[
-        float | None, Quantity("length", nonnegative, "on B's side, in place of area_B [m]", SIZES)
+        float | None, Quantity("length", nonnegative, "in place of area_B, beside piston_diameter [m]", SIZES)
     ] = None
-    dead_volume_A: Annotated[float, Quantity("volume", positive, "of A at x = 0 [m3]")]
-    dead_volume_B: Annotated[float, Quantity("volume", positive, "of B at x = stroke [m3]")]
+    dead_volume_A: Annotated[
+        float, Quantity("volume", positive, "of A with the rod in, lines included [m3]", changes=VALUE)
+    ]
+    dead_volume_B: Annotated[
+        float, Quantity("volume", positive, "of B with the rod out, lines included [m3]", changes=VALUE)
+    ]
     initial_pressure_A: Annotated[
-        float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium with its links if left out")
+        float | None,
+        Quantity(
+            "pressure", about="at the start [Pa]; in equilibrium with its links (ambient without any) if left out"
+        ),
     ] = None
     initial_pressure_B: Annotated[
-        float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium with its links if left out")
+        float | None,
+        Quantity(
+            "pressure", about="at the start [Pa]; in equilibrium with its links (ambient without any) if left out"
+        ),
     ] = None
     leakage: Annotated[float, Quantity("leakage", nonnegative, "flow from A to B per pressure [m3/s/Pa]")] = 0.0
-    viscous_friction: Annotated[float, Quantity("damping", nonnegative, "of piston and rod [N s/m]")] = 0.0
-    elevation: Annotated[float | None, Quantity("length", about="of its chambers above datum [m]")] = None
+    viscous_friction: Annotated[float, Quantity("damping", nonnegative, "of piston and rod [N s/m]", changes=VALUE)] = (
+        0.0
+    )
+    elevation: Annotated[float | None, Quantity("length", about="of both chambers, as of nodes [m]")] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fvsolve.parts.link import Coupling
-from fvsolve.parts.value import Quantity, positive
+from fvsolve.parts.value import VALUE, Quantity, positive
 
 
 class Damper(Coupling, kind="damper"):
@@ -15,4 +15,4 @@ class Damper(Coupling, kind="damper"):
     (v_to - v_from)^2 [W].
     """
 
-    damping: Annotated[float, Quantity("damping", positive, "force per velocity [N s/m]")]
+    damping: Annotated[float, Quantity("damping", positive, "force per velocity [N s/m]", changes=VALUE)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fvsolve.parts.table import Table, at_most_one
-from fvsolve.parts.value import Number, Quantity, Usual, nonnegative, positive
+from fvsolve.parts.value import VALUE, Number, Quantity, Usual, nonnegative, positive
 
 DROPS = Usual(20.0, 1e8, "millimetres of water to the springs of test rigs")
 
@@ -18,13 +18,25 @@ class Disc(Table):
 
     time_constant: Annotated[
         float | None,
-        Quantity("time", positive, "damper over spring of its disc [s]", Usual(1e-6, 300.0, "poppets to damped flaps")),
+        Quantity(
+            "time",
+            positive,
+            "damper over spring of its disc [s]; at once if left out",
+            Usual(1e-6, 300.0, "poppets to damped flaps"),
+            VALUE,
+        ),
     ] = None
     natural_frequency: Annotated[
         float | None,
-        Quantity("frequency", positive, "undamped, of its disc [Hz]", Usual(1e-2, 2e4, "flaps to poppets")),
+        Quantity(
+            "frequency",
+            positive,
+            "of its disc, undamped, in place of time_constant [Hz]",
+            Usual(1e-2, 2e4, "flaps to poppets"),
+            VALUE,
+        ),
     ] = None
-    damping_ratio: Annotated[float | None, Number(nonnegative, "of its disc, 1 is critical")] = None
+    damping_ratio: Annotated[float | None, Number(nonnegative, "of its disc, 1 is critical", changes=VALUE)] = None
 
     @property
     def moves(self) -> bool:

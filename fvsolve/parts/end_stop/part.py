@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, ClassVar
 
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import Coupling
-from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Quantity, nonnegative, positive
+from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
 
 class EndStop(Coupling, kind="end-stop"):
@@ -17,14 +16,16 @@ class EndStop(Coupling, kind="end-stop"):
     stiffness d^2 / 2 [J]. Dissipated power: (force - stiffness d) dd/dt [W].
     """
 
-    stiffness: Annotated[float, Quantity("stiffness", positive, "of the contact [N/m]")]
-    damping: Annotated[float, Quantity("damping", nonnegative, "of the contact [N s/m]")] = 0.0
-    least: Annotated[float | None, Quantity("position", about="x_to - x_from below which it pushes [m]")] = None
-    greatest: Annotated[float | None, Quantity("position", about="x_to - x_from above which it holds [m]")] = None
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("least", "greatest"),)
 
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list:
-        return super().key_faults(given) + at_least_one(given, ("least", "greatest"))
+    stiffness: Annotated[float, Quantity("stiffness", positive, "of the contact [N/m]", changes=VALUE)]
+    damping: Annotated[float, Quantity("damping", nonnegative, "of the contact [N s/m]", changes=VALUE)] = 0.0
+    least: Annotated[
+        float | None, Quantity("position", about="x_to - x_from below which it pushes [m]", changes=VALUE)
+    ] = None
+    greatest: Annotated[
+        float | None, Quantity("position", about="x_to - x_from above which it holds [m]", changes=VALUE)
+    ] = None
 
     def faults(self, name: str, around: Around) -> Faults:
         if around.starts(self) is not None and None not in (self.least, self.greatest) and self.least >= self.greatest:

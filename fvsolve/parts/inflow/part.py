@@ -17,4 +17,4 @@ class Inflow(Node, kind="inflow"):
     driven: ClassVar[tuple[str, float]] = "flow", 1.0
     own_scalars: ClassVar[str] = "inflow"
 
-    flow: Annotated[Schedule, Scheduled("flow", about="positive into the network [m3/s]")]
+    flow: Annotated[Schedule, Scheduled("flow", about="positive into the network, of the reference density [m3/s]")]

@@ -25,11 +25,15 @@ class Junction(Node, kind="junction"):
 
     driven: ClassVar[tuple[str, float]] = "demand", -1.0
 
-    demand: Annotated[Schedule, Scheduled("flow", about="positive outward [m3/s]")] = Field(
+    demand: Annotated[Schedule, Scheduled("flow", about="positive outward, of the reference density [m3/s]")] = Field(
         default_factory=lambda: constant(0.0)
     )
-    required_pressure: Annotated[float | None, Quantity("pressure", about="at which it gets all it wants [Pa]")] = None
-    minimum_pressure: Annotated[float | None, Quantity("pressure", about="below which none; ambient [Pa]")] = None
+    required_pressure: Annotated[
+        float | None, Quantity("pressure", about="from which it gets all of its demand [Pa]; always if left out")
+    ] = None
+    minimum_pressure: Annotated[
+        float | None, Quantity("pressure", about="up to which it gets none [Pa]; ambient if left out")
+    ] = None
     demand_exponent: Annotated[float, Number(between(0, 3, open=True), "of the pressure between the two")] = 0.5
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

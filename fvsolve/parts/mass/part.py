@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from fvsolve.parts.node import Node
-from fvsolve.parts.value import Quantity, Usual, positive
+from fvsolve.parts.value import VALUE, Quantity, Usual, positive
 
 
 class Mass(Node, kind="mass"):
@@ -18,7 +18,7 @@ class Mass(Node, kind="mass"):
     quantities: ClassVar[dict[str, str]] = {"position": "position", "velocity": "velocity"}
 
     mass: Annotated[
-        float, Quantity("mass", positive, "of all that moves with it [kg]", Usual(1e-6, 1e9, "poppets to ships"))
+        float, Quantity("mass", positive, "of all that moves with it [kg]", Usual(1e-6, 1e9, "poppets to ships"), VALUE)
     ]
     initial_position: Annotated[float, Quantity("position", about="at the start, along the common axis [m]")] = 0.0
     initial_velocity: Annotated[float, Quantity("velocity", about="at the start [m/s]")] = 0.0

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from fvsolve.parts.conduit import Conduit
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import Number, Quantity, Setting, Usual, Value, Whole, between, positive
+from fvsolve.parts.value import COUNTED, Number, Quantity, Setting, Usual, Value, Whole, between, positive
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
@@ -25,16 +25,18 @@ SOFT = (  # modulus [Pa], wall over bore below which no pipe of it stands: of th
 class Wall(Table):
     """An elastic wall: 1/K = 1/beta + diameter / (youngs_modulus thickness), wave speed sqrt(K / rho)."""
 
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI)]
+    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI, COUNTED)]
     thickness: Annotated[
-        float, Quantity("length", positive, "of the wall [m]", Usual(1e-6, 2.0, "foils to lined rock"))
+        float, Quantity("length", positive, "of the wall [m]", Usual(1e-6, 2.0, "foils to lined rock"), COUNTED)
     ]
 
 
 class WallOrStiff(Value):
     """The text "stiff" or the table of an elastic wall."""
 
-    about = 'the wall: "stiff", or { youngs_modulus, thickness }'
+    about = 'elastic or stiff; "stiff" if left out'
+    takes = '`"stiff"`, or `{ youngs_modulus, thickness }`, Pa and m'
+    changes = COUNTED
 
     def read(self, given: Any, setting: Setting) -> Wall | str:
         if isinstance(given, Wall) or given == "stiff":
@@ -42,6 +44,9 @@ class WallOrStiff(Value):
         if not isinstance(given, dict):
             raise ValueError(f'{show(given)} is no wall; wanted "stiff" or {{ youngs_modulus, thickness }}')
         return Wall.model_validate(given, context=setting)
+
+    def below(self, key: str) -> Value | None:
+        return Wall.values()[key]
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
@@ -62,9 +67,12 @@ class Pipe(Conduit, kind="pipe"):
         "flow": "flow",
     }  # fmt: skip
 
-    wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES)] = None
+    wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
-    cells: Annotated[int | None, Whole(between(1, MOST_CELLS), "finite volumes along it")] = None
+    cells: Annotated[
+        int | None,
+        Whole(between(1, MOST_CELLS), "finite volumes along it; as many as its travel time over cell_time if left out"),
+    ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

@@ -11,6 +11,7 @@ from fvsolve.parts.pump.suter_tables import SUTER_TABLES
 from fvsolve.parts.table import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
+    PROFILE,
     Choice,
     Misfit,
     Number,
@@ -72,7 +73,8 @@ def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Val
 class HeadCurve(Value):
     """A head curve: points { flow, head }, or { coefficients } of head [m] over powers of flow [m3/s]."""
 
-    about = "head over flow at relative speed 1"
+    about = "head [m] over flow [m3/s] at relative speed 1, coefficients over powers of flow"
+    takes = "`{ flow = [...], head = [...] }`, or `{ coefficients = [...] }`"
     polynomial = {"coefficients": (Rows("number"), NEEDED)}
 
     def read(self, given: Any, setting: Setting) -> CurvePoints:
@@ -124,7 +126,9 @@ def first_root(coefficients: tuple[float, ...]) -> float | None:
 class Efficiency(Value):
     """A number, or points { flow, efficiency }."""
 
-    about = "hydraulic power over power at the shaft: at the rated point, or over flow [-]"
+    about = "hydraulic power over power at the shaft: at the rated point, or over flow; 0.75 if left out"
+    takes = "-, or `{ flow = [...], efficiency = [...] }`"
+    changes = PROFILE
     number = Number(between(0, 1, open=True))
 
     def read(self, given: Any, setting: Setting) -> float | CurvePoints:
@@ -144,7 +148,9 @@ class Efficiency(Value):
 class ShaftPower(Value):
     """Points { flow, power }."""
 
-    about = "power at the shaft over flow, at relative speed 1 [W]"
+    about = "power at the shaft [W] over flow, at relative speed 1, in place of efficiency"
+    takes = "`{ flow = [...], power = [...] }`"
+    changes = PROFILE
 
     def read(self, given: Any, setting: Setting) -> CurvePoints:
         if isinstance(given, CurvePoints):
@@ -180,6 +186,7 @@ class Suter(Value):
     """A table of Suter form."""
 
     about = "all four quadrants: WH and WB at equal distances of x = pi + atan2(flow / rated, speed / rated)"
+    takes = "`{ rated_flow, rated_head, table }`, or `{ rated_flow, rated_head, head = [...], torque = [...] }`"
     keys = {
         "rated_flow": (Quantity("flow", positive), NEEDED),
         "rated_head": (Quantity("head", positive), NEEDED),

@@ -9,8 +9,7 @@ from pydantic import Field
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Flag, Quantity, Usual, nonnegative, positive
+from fvsolve.parts.value import PROFILE, VALUE, Flag, Quantity, Usual, nonnegative, positive
 
 EFFICIENCY = 0.75
 SPEEDS = Usual(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of small ones")
@@ -28,6 +27,7 @@ class Pump(TwoPort, kind="pump"):
         ("curve", "power", "suter"),
         ("efficiency", "shaft_power"),
     )
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("curve", "power", "suter"),)
     owns: ClassVar[dict[str, str]] = {"shaft": "rotational"}
     quantities: ClassVar[dict[str, str]] = {
         "flow": "flow", "head": "head", "speed": "number", "torque": "torque", "power": "power"
@@ -37,22 +37,31 @@ class Pump(TwoPort, kind="pump"):
     power: Annotated[float | None, Quantity("power", positive, "given to the fluid whatever its flow [W]")] = None
     suter: Annotated[SuterTable | None, Suter()] = None
     speed: Annotated[
-        Schedule, Scheduled("number", nonnegative, "relative speed", Usual(0.0, 2.5, "of the rated speed"))
+        Schedule,
+        Scheduled("number", nonnegative, "relative to that of the curve", Usual(0.0, 2.5, "of the rated speed")),
     ] = Field(default_factory=lambda: constant(1.0))
     rated_speed: Annotated[
-        float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]", SPEEDS)
+        float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]", SPEEDS, VALUE)
     ] = None
     inertia: Annotated[
-        float | None, Quantity("inertia", positive, "of all that turns with the shaft, water too [kg m2]")
+        float | None,
+        Quantity(
+            "inertia",
+            positive,
+            "of all that turns with the shaft, the water in it too [kg m2]; wants rated_speed",
+            changes=VALUE,
+        ),
     ] = None
-    trip: Annotated[float | None, Quantity("time", about="when its motor lets the shaft run down [s]")] = None
+    trip: Annotated[float | None, Quantity("time", about="when the motor lets go of the shaft [s]; wants inertia")] = (
+        None
+    )
     efficiency: Annotated[Any, Efficiency()] = None
     shaft_power: Annotated[CurvePoints | None, ShaftPower()] = None
-    check_valve: Annotated[bool, Flag("lets nothing pass from `to` to `from`, without loss")] = False
+    check_valve: Annotated[bool, Flag("lets nothing pass from `to` to `from`, without loss", PROFILE)] = False
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
-        faults = super().key_faults(given) + at_least_one(given, ("curve", "power", "suter"))
+        faults = super().key_faults(given)
         if "trip" in given and "inertia" not in given:
             faults.append((("trip",), "wants the inertia of all that turns with the shaft; to stop it at once let "
                                       "speed fall to 0 by a schedule"))  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import Quantity, Usual, positive
+from fvsolve.parts.value import VALUE, Quantity, Usual, positive
 from fvsolve.parts.valve.part import Sized
 
 STROKES = Usual(1e-4, 1e5, "servo valves to motor drives")
@@ -19,7 +19,7 @@ class Regulating(Sized, TwoPort):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     time_constant: Annotated[
-        float, Quantity("time", positive, "time in which an error of one band moves it fully [s]", STROKES)
+        float, Quantity("time", positive, "time in which an error of one band moves it fully [s]", STROKES, VALUE)
     ]
 
 
@@ -54,4 +54,6 @@ class FlowControl(Regulating, kind="flow-control"):
     power: dp q [W].
     """
 
-    set_flow: Annotated[Schedule, Scheduled("flow", positive, "greatest flow that it lets pass [m3/s]")]
+    set_flow: Annotated[
+        Schedule, Scheduled("flow", positive, "greatest flow that it lets pass, of the reference density [m3/s]")
+    ]

@@ -19,7 +19,9 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    set_pressure: Annotated[float, Quantity("pressure", about="at `from` above which it opens [Pa]")]
+    set_pressure: Annotated[
+        float, Quantity("pressure", about="at `from`, above which it opens, gauge or absolute as its unit says [Pa]")
+    ]
     overpressure: Annotated[
         float, Quantity("pressure_drop", positive, "above set_pressure that opens it fully [Pa]", DROPS)
     ]

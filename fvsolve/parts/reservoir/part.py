@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from fvsolve import units
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.table import at_least_one
 
 
 class Reservoir(Node, kind="reservoir"):
@@ -21,14 +20,11 @@ class Reservoir(Node, kind="reservoir"):
     driven: ClassVar[tuple[str, float]] = "pressure", 0.0
     own_scalars: ClassVar[str] = "inflow"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
     fixes_pressure: ClassVar[bool] = True
 
     pressure: Annotated[Schedule | None, Scheduled("pressure", about="at its elevation [Pa]")] = None
     head: Annotated[Schedule | None, Scheduled("head", about="of the fluid above datum, from ambient [m]")] = None
-
-    @classmethod
-    def key_faults(cls, given: dict[str, Any]) -> list:
-        return super().key_faults(given) + at_least_one(given, ("pressure", "head"))
 
     def faults(self, name: str, around: Around) -> Faults:
         if self.pressure is not None:

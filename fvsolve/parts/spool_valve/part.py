@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from fvsolve.parts.link import Link, Ports
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import between
+from fvsolve.parts.value import SHAPE, between
 from fvsolve.parts.valve.part import Sized
 
 EDGES = (("P", "A", 1), ("P", "B", -1), ("A", "T", -1), ("B", "T", 1))  # from, to, side of zero on which it opens
@@ -23,4 +23,6 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
     quantities: ClassVar[dict[str, str]] = {f"flow_{port}": "flow" for port in ("P", "T", "A", "B")}
 
     ports: Annotated[dict[str, str], Ports(("P", "T", "A", "B"))]
-    position: Annotated[Schedule, Scheduled("number", between(-1, 1), "of the spool, -1 to 1")]
+    position: Annotated[  # which is cut where it crosses zero
+        Schedule, Scheduled("number", between(-1, 1), "of the spool, -1 to 1", changes=SHAPE)
+    ]

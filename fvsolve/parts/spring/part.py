@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import Coupling
-from fvsolve.parts.value import Quantity, nonnegative, positive
+from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
 
 class Spring(Coupling, kind="spring"):
@@ -17,9 +17,16 @@ class Spring(Coupling, kind="spring"):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
 
-    stiffness: Annotated[float, Quantity("stiffness", positive, "force per length [N/m]")]
-    free_length: Annotated[float | None, Quantity("length", nonnegative, "without load [m]")] = None
-    preload: Annotated[float | None, Quantity("force", about="at the start, positive: compressed [N]")] = None
+    stiffness: Annotated[float, Quantity("stiffness", positive, "force per length [N/m]", changes=VALUE)]
+    free_length: Annotated[
+        float | None,
+        Quantity(
+            "length", nonnegative, "x_to - x_from without load [m]; 0 (none with preload) if left out", changes=VALUE
+        ),
+    ] = None
+    preload: Annotated[
+        float | None, Quantity("force", about="at the start, positive: compressed [N]", changes=VALUE)
+    ] = None
 
     def model_post_init(self, _: Any) -> None:
         if self.free_length is self.preload is None:

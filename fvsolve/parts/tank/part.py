@@ -15,6 +15,8 @@ from fvsolve.parts.schedule import constant
 from fvsolve.parts.table import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
+    PROFILE,
+    VALUE,
     Misfit,
     Quantity,
     Rows,
@@ -53,9 +55,11 @@ class AreaTable:
 class Surface(Value):
     """A free surface: one area, or a table of areas over levels."""
 
-    about = "free surface [m2], or { level = [...], area = [...] }"
+    about = "free surface, linear between levels and held above the last [m2]"
+    takes = "m2, or `{ level = [0, ...], area = [...] }`"
     usual = Usual(1e-6, 1e10, "tubes to lakes")
     dimension = "area"
+    changes = PROFILE
     keys = {"level": (Rows("level", nonnegative), NEEDED), "area": (Rows("area", positive), NEEDED)}
 
     def read(self, given: Any, setting: Setting) -> float | AreaTable:
@@ -95,8 +99,11 @@ class Tank(Node, kind="tank"):
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
-    level: Annotated[float, Quantity("level", nonnegative, "level at the start, above its bottom [m]", LEVELS)]
-    height: Annotated[float | None, Quantity("level", positive, "level above which it spills [m]", LEVELS)] = None
+    level: Annotated[float, Quantity("level", nonnegative, "at the start, above its bottom [m]", LEVELS)]
+    height: Annotated[
+        float | None,
+        Quantity("level", positive, "above its bottom, where it spills [m]; never if left out", LEVELS, VALUE),
+    ] = None
     connection: Annotated[Connection | None, Joined()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -19,7 +19,7 @@ class Torque(Link, kind="torque"):
     joins: ClassVar[dict[str, str]] = {"to": "rotational"}
     quantities: ClassVar[dict[str, str]] = {}
 
-    to: Annotated[str, Text("the shaft it turns, for example pump.shaft")]
+    to: Annotated[str, Text("the shaft it turns, PUMP.shaft")]
     torque: Annotated[Schedule, Scheduled("torque", about="in the direction in which a pump is driven [N m]")]
 
     @property

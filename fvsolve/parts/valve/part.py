@@ -58,6 +58,7 @@ class Trim(Value):
     """A characteristic: one of two names, or a table."""
 
     about = "relative flow area over opening"
+    takes = '`"linear"`, `"equal-percentage"`, `{ opening = [0, ..., 1], flow_area = [0, ...] }`'
     names = Choice("characteristic", ("linear", "equal-percentage"))
     keys = {
         "opening": (Rows("number", between(0, 1)), NEEDED),
@@ -98,12 +99,23 @@ class Sized(Table):
         ("area", "diameter"),
     )
 
-    discharge_coefficient: Annotated[float | None, Number(between(0, 1, open=True), "Cd, with area or diameter")] = None
+    discharge_coefficient: Annotated[
+        float | None,
+        Number(between(0, 1, open=True), f"Cd, with area or diameter; {DISCHARGE_COEFFICIENT} if left out"),
+    ] = None
     loss_coefficient: Annotated[float | None, Number(positive, "K on the velocity in area or diameter")] = None
-    Kv: Annotated[float | None, Number(positive, "m3/h of water at 1 bar", COEFFICIENTS)] = None
-    Cv: Annotated[float | None, Number(positive, "US gpm of water at 1 psi", COEFFICIENTS)] = None
+    Kv: Annotated[float | None, Number(positive, "m3/h at 1 bar, of water of 1000 kg/m3", COEFFICIENTS)] = None
+    Cv: Annotated[
+        float | None, Number(positive, "US gpm at 1 psi, of water of 999.016 kg/m3 (60 degF)", COEFFICIENTS)
+    ] = None
     area: Annotated[
-        float | None, Quantity("area", positive, "of the opening [m2]", Usual(1e-12, 200.0, "leaks to sluices"))
+        float | None,
+        Quantity(
+            "area",
+            positive,
+            "of the opening [m2]; it or diameter is needed, but for Kv and Cv",
+            Usual(1e-12, 200.0, "leaks to sluices"),
+        ),
     ] = None
     diameter: Annotated[
         float | None, Quantity("length", positive, "of the opening [m]", Usual(1e-6, 14.0, "leaks to sluices"))

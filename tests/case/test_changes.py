@@ -1,0 +1,257 @@
+"""What a key says it changes is what moving it changes: every key given in every shipped case, moved and built anew."""
+
+import copy
+import re
+import tomllib
+from collections import Counter
+
+import pytest
+from truth.folders import CASES
+from truth.scenes import pipe, reservoir, scene
+
+import fvsolve
+from fvsolve.case.changes import CLASSES, changes, declared
+from fvsolve.errors import FvsolveError
+from fvsolve.parts.value import SHAPE, Choice
+
+LARGE = ("net3-pump-trip", "adelaide", "bowl", "swirl", "accumulator")  # which take seconds to be built over and over
+NUMBER = re.compile(r"\s*([+-]?[\d._]+(?:[eE][+-]?\d+)?)(\s*\S.*|)")
+HAIR = 1e-4
+# of class `shape`; the shipped case that has them does not show it, a test of its own does
+ALIKE = {"loss_in", "loss_out"}
+
+
+def raw_case(name: str) -> dict:
+    """A shipped case without what the shortest run does not need."""
+    table = tomllib.loads((CASES / f"{name}.toml").read_text(encoding="utf-8"))
+    return {key: one for key, one in table.items() if key not in ("expect", "compare")}
+
+
+def leaves(table, keys=()):
+    """(keys, value) of all that a case gives; of a list those of its entries."""
+    inner = table.items() if isinstance(table, dict) else enumerate(table) if isinstance(table, list) else ()
+    for key, one in inner:
+        yield from leaves(one, (*keys, key))
+    if not isinstance(table, (dict, list)):
+        yield keys, table
+
+
+def others(table: dict, keys: tuple, value, far: bool) -> list:
+    """What else a key may say: numbers a hair more, of shapes (or if `far`) much more, other words, other places."""
+    inner = table
+    for key in keys[:-1]:
+        inner = inner[key]
+    given, places = inner[keys[-1]], [*table["nodes"]]
+    if isinstance(given, bool):
+        return [not given]
+    if isinstance(value, Choice):
+        return [word for word in value.words if word != given][: None if value.changes == SHAPE else 2]
+    if isinstance(given, str) and not NUMBER.fullmatch(given):
+        return [name for name in places if name != given][:2] if given in places else []
+    if isinstance(given, int) and value.changes == SHAPE:
+        return [given + 1, given - 1, 2 * given, given + 1e-9]
+    number, unit = NUMBER.fullmatch(given).groups() if isinstance(given, str) else (given, None)
+    near = [float(number) * factor for factor in ((1 + HAIR, 4 / 3) if far else (1 + HAIR,))]
+    if value.changes == SHAPE:
+        near += [4 / 3 * float(number), 1e-9, -1e-9, 10 * float(number), 1000 * float(number)]
+        near += [one for one in (inner.values() if isinstance(inner, dict) else ()) if isinstance(one, float)]
+    return [f"{one!r}{unit}" for one in near] if unit is not None else near
+
+
+def moved(table: dict, keys: tuple, to) -> dict:
+    table = copy.deepcopy(table)
+    inner = table
+    for key in keys[:-1]:
+        inner = inner[key]
+    inner[keys[-1]] = to
+    return table
+
+
+def form(model) -> tuple:
+    """Sizes, names and whole numbers of a model."""
+    tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
+              for name, table in zip(model.tables._fields, model.tables, strict=True)}  # fmt: skip
+    tables["integers"] = model.tables.integers.tobytes()
+    names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
+             model.piston_names, model.body_names, model.events, [probe.text for probe in model.probes])  # fmt: skip
+    return tables, names, model.shapes
+
+
+def whole_columns(table) -> list[str]:
+    return [name for name in table.dtype.names or () if table.dtype[name].kind in "iub"]
+
+
+def start(model) -> list[bytes]:
+    """Where a run starts from: the state, and pressures and flows of the profile that it deviates from."""
+    tables = model.tables
+    flows = [table["flow"].tobytes() for table in (tables.pipes, tables.columns, tables.valves)]
+    profile = [profile.tobytes() for _, profile in sorted(model.profiles.items())]
+    return [model.start.tobytes(), tables.nodes["pressure"].tobytes(), *flows, *profile]
+
+
+def found_class(before, after) -> str:
+    if form(before) != form(after):
+        return "shape"
+    return "value" if start(before) == start(after) else "profile"
+
+
+def spoken(keys: tuple) -> str:
+    """The path of a key as a setting says it, without places in lists."""
+    return ".".join(f'"{key}"' if re.search(r"\W", key) else key for key in keys if isinstance(key, str))
+
+
+class Trial:
+    """Keys of cases, moved: what is wrong of them, and of those that say `shape` which were seen to change it."""
+
+    def __init__(self, every: bool) -> None:
+        self.every, self.wrong, self.done = (
+            every,
+            [],
+            set(),
+        )  # every : each kind of key in each case, of large ones those that no other has; else in one
+        self.told: dict[int, bool] = {}
+        self.names: dict[int, str] = {}
+        self.values: list = []  # so that no other gets the number of one
+
+    def case(self, name: str, given: dict | None = None) -> None:
+        table = given or raw_case(name)
+        case = fvsolve.load(table)
+        before, often = fvsolve.build(case), Counter()
+        for keys, _ in leaves(table):
+            words = tuple(key for key in keys if isinstance(key, str))
+            value = declared(table, words)
+            self.values.append(value)
+            often[id(value)] += 1
+            if (self.every and name not in LARGE and often[id(value)] == 1) or id(value) not in self.done:
+                self.key(name, table, before, changes(case, spoken(words)), keys, value)
+
+    def key(self, name: str, table: dict, before, said: str, keys: tuple, value) -> None:
+        for to in others(table, keys, value, self.every):
+            try:
+                found = found_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
+            except FvsolveError:
+                continue
+            place = f"{name}: {spoken(keys)}"
+            if CLASSES.index(found) > CLASSES.index(said):
+                self.wrong.append(f"{place} = {to} changes the {found}, not only the {said}")
+            self.names[id(value)] = place
+            if value.changes == SHAPE:
+                self.told[id(value)] = self.told.get(id(value), False) or found == "shape"
+            if value.changes != SHAPE or found == "shape":
+                self.done.add(id(value))
+                if not self.every and found == "shape":
+                    return
+
+    def never(self) -> list[str]:
+        """Keys that say `shape` and never changed one."""
+        return [self.names[key] for key, told in self.told.items() if not told]
+
+
+@pytest.fixture(autouse=True)
+def beside_their_files(monkeypatch):
+    monkeypatch.chdir(CASES)
+
+
+def test_a_key_changes_no_more_than_it_says_and_each_that_says_shape_does():
+    """Each kind of key in one case; in all of them is the slow test below."""
+    trial = Trial(every=False)
+    for path in sorted(CASES.glob("*.toml")):
+        if path.stem not in LARGE:
+            trial.case(path.stem)
+    assert trial.wrong == []
+    assert {place.split(".")[-1] for place in trial.never()} <= ALIKE
+    assert len(trial.names) > 100
+
+
+SIZE = {"diameter": 0.05, "loss_coefficient": 2.0}
+TRIM = {"opening": [0.0, 0.5, 1.0], "flow_area": [0.0, 0.2, 1.0]}
+OTHERS = scene(  # keys that no shipped case gives
+    {
+        "lake": {"type": "reservoir", "head": 60.0},
+        "a": {"type": "junction", "demand": 2e-3, "required_pressure": 4e5, "minimum_pressure": 1.5e5,
+              "demand_exponent": 0.6},
+        "b": {"type": "junction"}, "c": {"type": "junction"}, "d": {"type": "junction"}, "e": {"type": "junction"},
+        "gas": {"type": "accumulator", "volume": 0.1, "precharge": 2e5, "exponent": 1.3,
+                "connection": {"area": 2e-3, "loss_in": 1.0, "loss_out": 1.5}},
+        "air": {"type": "air-valve", "inlet": 0.05, "outlet": 0.01, "discharge_coefficient": 0.5, "volume": 1e-3,
+                "temperature": 290.0},
+        "pond": {"type": "tank", "area": {"level": [0.0, 5.0], "area": [2.0, 3.0]}, "level": 1.0},
+    },
+    {
+        "main": {"type": "pipe", "from": "lake", "to": "a", "length": 200.0, "diameter": 0.2, "cells": 9,
+                 "wall": {"youngs_modulus": 2e11, "thickness": 5e-3}, "fittings": ["bend-90"], "minor_loss": 1.0,
+                 "friction": {"model": "quasi-steady", "factor": 0.02}},
+        "hole": {"type": "leak", "from": "a", "coefficient": 1e-6, "exponent": 0.7, "opening": 0.5},
+        "on": {"type": "pipe", "from": "a", "to": "b", "length": 100.0, "nominal": "DN100", "wave_speed": 1000.0},
+        "check": {"type": "check-valve", "from": "b", "to": "gas", "cracking_pressure": 100.0, "overpressure": 1e4,
+                  "natural_frequency": 5.0, "damping_ratio": 0.5, **SIZE},
+        "trim": {"type": "valve", "from": "b", "to": "air", "characteristic": TRIM, "laminar_reynolds": 20.0, **SIZE},
+        "down": {"type": "pipe", "from": "air", "to": "c", "length": 50.0, "diameter": 0.1, "wave_speed": 1000.0,
+                 "friction": {"model": "steady", "roughness": 1e-4}, "cells": 4},
+        "keep": {"type": "pressure-sustaining", "from": "c", "to": "d", "set_pressure": 3e5, "band": 2e5,
+                 "time_constant": 1.0, **SIZE},
+        "limit": {"type": "flow-control", "from": "d", "to": "e", "set_flow": 5e-3, "time_constant": 2.0, **SIZE},
+        "rest": {"type": "rigid-column", "from": "e", "to": "pond", "length": 10.0, "diameter": 0.1,
+                 "friction": {"model": "chezy-manning", "coefficient": 0.01}},
+        "lift": {"type": "pump", "from": "pond", "to": "c", "power": 500.0, "efficiency": 0.7, "rated_speed": 150.0,
+                 "inertia": 1.0, "speed": 1.0},
+        "turn": {"type": "torque", "to": "lift.shaft", "torque": 20.0},
+    },
+    1.0, {"cell_time": 0.02},
+)  # fmt: skip
+DYED = scene(
+    {"lake": reservoir(2e5, scalars={"dye": 1.0}), "tank": {"type": "tank", "area": 2.0, "level": 3.0}},
+    {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4, scalars={"dye": 0.5}, minor_loss=1.0)}, 1.0, {},
+    scalars={"dye": {"unit": "g/l", "initial": 0.1, "diffusivity": 1e-3, "decay": 0.1, "ambient": 0.2}},
+)  # fmt: skip
+
+
+def test_keys_that_no_shipped_case_gives_change_no_more_than_they_say():
+    trial = Trial(every=False)
+    trial.case("others", OTHERS)
+    trial.case("dyed", DYED)
+    assert trial.wrong == []
+    assert len(trial.names) > 60
+
+
+def test_losses_alike_are_another_shape_where_a_pipe_joins():
+    """Of a throat with one loss for both ways the place has a closed root; the shipped one is joined by a column."""
+    tank = {"type": "tank", "area": 2.0, "level": 3.0, "connection": {"diameter": 0.1, "loss_in": 1.0, "loss_out": 1.5}}
+    case = scene({"lake": reservoir(2e5), "tank": tank}, {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4)}, 1.0, {})
+    before = fvsolve.build(fvsolve.load(case))
+    for key, other in (("loss_in", 1.5), ("loss_out", 1.0)):
+        after = fvsolve.build(fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other)))
+        assert found_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
+
+
+@pytest.mark.slow
+def test_no_key_of_any_shipped_case_changes_more_than_it_says():
+    trial = Trial(every=True)
+    for path in sorted(CASES.glob("*.toml")):
+        trial.case(path.stem)
+    assert trial.wrong == []
+
+
+def test_what_a_key_changes_depends_on_the_case_where_its_part_says_so():
+    """A length makes cells where a pipe states none; a signal changes what it drives; friction with a past what not."""
+    case = fvsolve.load("valve-closure")
+    for key, said in {
+        "links.valve.area": "profile", "links.main.length": "profile", "links.main.cells": "shape", "title": "value",
+        "links.valve.discharge_coefficient": "profile", "fluid.bulk_modulus": "profile", "nodes.gate.position": "value",
+        "links.main.friction.model": "shape", "numerics.courant": "value", "links.valve.opening.start": "profile",
+        '"expect"."max(gate.pressure)".value': "value",
+    }.items():  # fmt: skip
+        assert changes(case, key) == said, key
+    left_out = raw_case("valve-closure")
+    del left_out["links"]["main"]["cells"]
+    assert changes(fvsolve.load(left_out), "links.main.length") == "shape"
+    past = fvsolve.load("laminar-line")
+    assert changes(past, "fluid.viscosity") == "shape" and changes(past, "numerics.courant") == "value"
+    assert changes(fvsolve.load("rigid-column"), "signals.stroke.value") == "profile"
+
+
+def test_a_key_that_is_not_there_changes_nothing_but_is_named():
+    with pytest.raises(FvsolveError, match='no key "links.valve.aera"; wanted one of the case'):
+        changes(fvsolve.load("valve-closure"), "links.valve.aera")
+    with pytest.raises(FvsolveError, match='no key "signals.strok.value"'):
+        changes(fvsolve.load("rigid-column"), "signals.strok.value")

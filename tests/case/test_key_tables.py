@@ -1,0 +1,42 @@
+"""The key tables of docs/parts.md are the declarations: each table as it is made now, each part with one."""
+
+import pytest
+from truth.folders import page as page_of
+
+from fvsolve.case.key_tables import MARK, key_table, main, page
+from fvsolve.errors import FvsolveError
+from fvsolve.parts import KINDS
+
+
+def test_the_tables_of_the_page_are_those_of_the_declarations():
+    text = page_of("parts")
+    assert page(text) == text  # else: python -m fvsolve.case.key_tables docs/parts.md
+
+
+def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
+    named = [name for _, name, _ in MARK.findall(page_of("parts"))]
+    assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}  # a valve by another name
+    assert len(named) == len({*named})
+    assert [line.split(" | ")[0] for line in key_table("chamber").splitlines()[2:]] == [
+        "| `volume`",
+        "| `initial_pressure`",
+    ]
+
+
+def test_what_holds_where_a_key_is_left_out_has_a_column():
+    rows = key_table("accumulator").splitlines()
+    assert "| `initial_pressure` | Pa | in equilibrium | profile | of the gas at the start |" in rows
+    assert "| `exponent` | -, at least 1 | 1.2 | profile | n of p V^n: 1 isothermal, 1.4 adiabatic air |" in rows
+
+
+def test_writing_a_page_leaves_its_prose_alone(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text("Before.\n\n<!-- keys: frame -->\nold\n<!-- end -->\n\nAfter.\n")
+    main([str(path)])
+    before, table, after = path.read_text().partition(key_table("frame"))
+    assert (before, after) == ("Before.\n\n<!-- keys: frame -->\n", "<!-- end -->\n\nAfter.\n") and table
+
+
+def test_what_has_no_keys_is_named():
+    with pytest.raises(FvsolveError, match='no keys of "vlave"; did you mean "valve"'):
+        key_table("vlave")
