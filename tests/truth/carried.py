@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.plane import advection, diffusion
 from fvsolve.mesh import rectangle
-from fvsolve.model.velocity import face_flows, grid_flows
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
 
 SCHEMES = {
     "upwind": (rec.UPWIND, 0),

@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.basin import Basin
-from fvsolve.model.velocity import face_flows, grid_flows, velocity_flows
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
 
 
 class Transport(Basin, physics="transport"):
