@@ -29,8 +29,8 @@ DIGEST = hashlib.sha256().digest_size
 KEPT = 3  # generations of compiled code kept beside the present one
 
 PACKAGE = Path(__file__).resolve().parent
-# What compiled code can depend on: the rooms that compile and, by contract, all they may import; of parts their laws, of
-# basins all but what is declared and lowered.
+# What compiled code can depend on: the rooms that compile and, by contract, all they may import; of parts the laws, of
+# basins all but declarations and what lowers them.
 ROOMS = ("kernels", "steppers", "jit", "units", "errors")
 PYTHON = ("part", "lower")  # what names of files of basins begin with that compile nothing
 OUTSIDE: dict[Path, str] = {}  # folders whose sources may be compiled and cached too, and where below the code folder

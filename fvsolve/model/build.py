@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
+from fvsolve.basins.free_surface import lower_dispersion as dispersion
 from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import at_start, dispersion, lower_basins
+from fvsolve.model.basins import at_start, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes

@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 
+from fvsolve.basins.free_surface.lower_dispersion import Watch, Waves
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
-from fvsolve.model.basins.dispersion import Watch, Waves
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.soundness import Soundness, parted

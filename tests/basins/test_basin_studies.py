@@ -12,10 +12,10 @@ from truth.folders import CASES
 from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.basins.free_surface.lower import FreeSurface
+from fvsolve.basins.free_surface.lower_dispersion import on_grid, on_mesh, waves
 from fvsolve.errors import FvsolveError
 from fvsolve.model import Slate
-from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
-from fvsolve.model.basins.free_surface import FreeSurface
 from fvsolve.model.dependence import sparsity
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.studies.accuracy.cells import counts, keys, scaled

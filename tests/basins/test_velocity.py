@@ -12,9 +12,9 @@ from truth.plain import triangles, write_msh
 from truth.scenes import scene
 
 import fvsolve
+from fvsolve.basins.transport.lower_velocity import EXPRESSIONS, face_flows, grid_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import read, rectangle
-from fvsolve.basins.transport.lower_velocity import EXPRESSIONS, face_flows, grid_flows
 
 PI = np.pi
 BUMP = "exp(-50*((x - 0.4)**2 + (y - 0.5)**2))"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.model.basins.basin import Basin
-from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
 
 
 class Transport(Basin, physics="transport"):

@@ -9,12 +9,12 @@ its change since the profile [J].
 
 from math import sqrt
 
+from fvsolve.basins.free_surface.friction import FASTEST
+from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.jit import njit
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.behind import counted, weight
-from fvsolve.kernels.plane.friction import FASTEST
-from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import CARRIED_GRID, MANNING, NO_DRAG, SHALLOW_FACES
 
 ROWS = 4  # of `power` a basin

@@ -13,6 +13,7 @@ compiled, so that neither law compiles or runs anything of the other's.
 
 from math import sqrt
 
+from fvsolve.basins.free_surface.grid import put_inward
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.plane.liquid import (
@@ -33,7 +34,6 @@ from fvsolve.kernels.plane.liquid import (
     side_of,
     value_upwind5,
 )
-from fvsolve.kernels.plane.shallow import put_inward
 from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import LINEAR, UPWIND, WENO5

@@ -2,10 +2,10 @@
 
 from math import log1p, sqrt
 
+from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import (
     CELL_DEPTH,
     CELL_SPEED,

@@ -2,6 +2,7 @@
 
 from math import inf, log1p, sqrt
 
+from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.behind import (
@@ -14,7 +15,6 @@ from fvsolve.kernels.plane.behind import (
     weight,
     weight_out,
 )
-from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.kernels.records import LAW_LOG, PATCH, RATE, SHALLOW_FACES
 from fvsolve.kernels.restrictions import head_drop
 

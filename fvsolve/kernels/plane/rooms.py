@@ -1,9 +1,11 @@
 """Basins as rooms of a scene, one for each kind: rates of their cells. Knows the tables; knows no flux."""
 
+from fvsolve.basins.free_surface import faces as shallow_faces
+from fvsolve.basins.free_surface import grid as shallow
+from fvsolve.basins.free_surface.friction import FASTEST, add_friction
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log, shallow, shallow_faces
-from fvsolve.kernels.plane.friction import FASTEST, add_friction
+from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log
 from fvsolve.kernels.plane.patches import book_open
 from fvsolve.kernels.records import ACOUSTIC_GRID, LIQUID_FACES, LIQUID_GRID, NO_DRAG, RATE, SHALLOW_FACES, SHALLOW_GRID
 

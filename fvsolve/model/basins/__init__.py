@@ -12,8 +12,9 @@ def lower_basins(draft) -> None:
     """Fill the tables of basins and their patches, and states for their cells."""
     draft.basins, draft.basin_table, draft.patch_table = [], np.zeros(0, rec.BASIN), np.zeros(0, rec.PATCHES)
     if draft.case.meshes:
+        import fvsolve.basins.free_surface.lower
         import fvsolve.basins.transport.lower  # noqa: F401
-        from fvsolve.model.basins import free_surface, liquid  # noqa: F401
+        from fvsolve.model.basins import liquid  # noqa: F401
         from fvsolve.model.basins.basin import lower
 
         lower(draft)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels.plane.shallow_rows import THIN
+from fvsolve.basins.free_surface.rows import THIN
 
 
 def weights(basin, y: np.ndarray) -> np.ndarray:

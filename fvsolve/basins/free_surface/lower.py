@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.basins.free_surface import faces as shallow_faces
+from fvsolve.basins.free_surface import grid as shallow
+from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.case.basins import bed_of, means, samples
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import shallow, shallow_faces
-from fvsolve.kernels.plane.shallow_rows import THIN
 from fvsolve.model.basins.basin import Basin
 from fvsolve.schemes import SCHEMES
 

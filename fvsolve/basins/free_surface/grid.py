@@ -12,8 +12,7 @@ has half the depth of the deepest, and limited values elsewhere. It is of that o
 cells; in the plane of second order, since a flux of mean values is not the mean flux.
 """
 
-from fvsolve.jit import njit
-from fvsolve.kernels.plane.shallow_rows import (
+from fvsolve.basins.free_surface.rows import (
     EAST,
     FIELDS,
     FLOW_EAST,
@@ -33,7 +32,8 @@ from fvsolve.kernels.plane.shallow_rows import (
     put_limited,
     put_rates,
 )
-from fvsolve.kernels.plane.shallow_smooth import put_smooth
+from fvsolve.basins.free_surface.smooth import put_smooth
+from fvsolve.jit import njit
 from fvsolve.kernels.records import LINEAR, WENO5
 
 __all__ = ["PLANS", "WORK", "grid_rates"]

@@ -7,8 +7,8 @@ that takes no part of a second in water that moves, and none that the step must 
 
 from math import sqrt
 
+from fvsolve.basins.free_surface.rows import THIN, TINY
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.shallow_rows import THIN, TINY
 from fvsolve.kernels.records import MANNING
 
 FASTEST = 20.0  # [1/s]

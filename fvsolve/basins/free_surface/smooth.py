@@ -7,8 +7,8 @@ third differences of either add to it with the second of the other.
 
 from math import sqrt
 
+from fvsolve.basins.free_surface.rows import EAST, FLOW_EAST, HIGH, NORTH, PUSH, STRIDE, SURFACE, THIN, WAVE
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.shallow_rows import EAST, FLOW_EAST, HIGH, NORTH, PUSH, STRIDE, SURFACE, THIN, WAVE
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import WENO5
 
