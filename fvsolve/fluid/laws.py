@@ -1,7 +1,7 @@
 """Density laws: what each can carry, and how density, head and mass hang on pressure. Knows one fluid; knows no scene.
 
 A law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their own
-(`model.basins.liquid`). What is asked of a law elsewhere is asked by these names, never by its own.
+(`basins.liquid.lower`). What is asked of a law elsewhere is asked by these names, never by its own.
 """
 
 from __future__ import annotations

@@ -15,7 +15,8 @@ from truth.meshes import corner_lists, shaken, write
 from truth.orders import observed_order
 
 from fvsolve.basins.free_surface import faces as shallow_faces
-from fvsolve.kernels.plane import advection_faces, liquid_faces
+from fvsolve.basins.liquid import faces as liquid_faces
+from fvsolve.kernels.plane import advection_faces
 from fvsolve.kernels.records import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle
 from fvsolve.model.face_mesh import lower_mesh

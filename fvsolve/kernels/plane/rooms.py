@@ -3,9 +3,11 @@
 from fvsolve.basins.free_surface import faces as shallow_faces
 from fvsolve.basins.free_surface import grid as shallow
 from fvsolve.basins.free_surface.friction import FASTEST, add_friction
+from fvsolve.basins.liquid import faces as liquid_faces
+from fvsolve.basins.liquid import grid as liquid
+from fvsolve.basins.liquid import grid_full as liquid_log
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log
 from fvsolve.kernels.plane.patches import book_open
 from fvsolve.kernels.records import ACOUSTIC_GRID, LIQUID_FACES, LIQUID_GRID, NO_DRAG, RATE, SHALLOW_FACES, SHALLOW_GRID
 

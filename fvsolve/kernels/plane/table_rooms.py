@@ -1,10 +1,10 @@
 """Liquids under law `table` as rooms of a scene: rates, pressures of patches, probes. Knows no flux."""
 
+from fvsolve.basins.liquid.waves import pressure
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.plane.patches import mean_deviation
 from fvsolve.kernels.plane.rooms import full_grid, liquid_mesh, wanted
-from fvsolve.kernels.plane.waves import pressure
 from fvsolve.kernels.records import CELL_STATE, TABLE_FACES, TABLE_GRID
 
 

@@ -13,8 +13,8 @@ def lower_basins(draft) -> None:
     draft.basins, draft.basin_table, draft.patch_table = [], np.zeros(0, rec.BASIN), np.zeros(0, rec.PATCHES)
     if draft.case.meshes:
         import fvsolve.basins.free_surface.lower
+        import fvsolve.basins.liquid.lower
         import fvsolve.basins.transport.lower  # noqa: F401
-        from fvsolve.model.basins import liquid  # noqa: F401
         from fvsolve.model.basins.basin import lower
 
         lower(draft)

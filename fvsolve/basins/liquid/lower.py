@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
+from fvsolve.basins.liquid import faces as liquid_faces
+from fvsolve.basins.liquid import grid as liquid
+from fvsolve.basins.liquid import grid_full as liquid_log
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import liquid, liquid_faces, liquid_log
 from fvsolve.model.basins.basin import Basin
 
 SCALE = 1e5  # [Pa]
@@ -28,7 +30,7 @@ class Liquid(Basin, physics="liquid"):
         fluid = case.properties
         self.linear, self.waves = case.law.linear, None
         if case.law.tabulated:
-            from fvsolve.model.basins.waves import Waves
+            from fvsolve.basins.liquid.lower_waves import Waves
 
             self.waves = Waves(fluid, self.part.pressure, self.part.wave_speed)
             self.density, self.speed = self.waves.density, self.waves.speed

@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from fvsolve.basins.liquid.waves import HEAD
 from fvsolve.fluid.laws import TableLaw
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane.waves import HEAD
 
 FINER, LEAST = 4, 512  # intervals of the kernels' tables for each of the fluid's, and at least for all of these
 PANELS = 8  # of the integral, for each of the fluid's
@@ -89,7 +89,7 @@ class Waves:
         return p
 
     def table(self) -> np.ndarray:
-        """What `kernels.plane.waves` reads : float64[...]."""
+        """What `basins.liquid.waves` reads : float64[...]."""
         per_r, first_r, r = self.places(self.deviation(np.array(self.ends)))
         per_w, first_w, w = self.places(self.invariant(np.array(self.ends)))
         p, q = self.pressure(r), self.pressure_of(w)

@@ -9,6 +9,8 @@ from math import sqrt
 
 import numpy as np
 
+from fvsolve.basins.liquid.grid_full import log_sum
+from fvsolve.basins.liquid.waves import invariant, state
 from fvsolve.jit import njit
 from fvsolve.kernels.plane.faces import (
     BLOCK,
@@ -27,8 +29,6 @@ from fvsolve.kernels.plane.faces import (
     put_inward,
     put_sides,
 )
-from fvsolve.kernels.plane.liquid_log import log_sum
-from fvsolve.kernels.plane.waves import invariant, state
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
 # rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step, flow through the side

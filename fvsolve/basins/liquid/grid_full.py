@@ -14,9 +14,7 @@ compiled, so that neither law compiles or runs anything of the other's.
 from math import sqrt
 
 from fvsolve.basins.free_surface.grid import put_inward
-from fvsolve.jit import inner, njit
-from fvsolve.kernels.limiters import by_limiter, slope
-from fvsolve.kernels.plane.liquid import (
+from fvsolve.basins.liquid.grid import (
     BEYOND,
     EDGE,
     RING,
@@ -34,7 +32,9 @@ from fvsolve.kernels.plane.liquid import (
     side_of,
     value_upwind5,
 )
-from fvsolve.kernels.plane.waves import invariant, state
+from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.jit import inner, njit
+from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
 
