@@ -15,9 +15,9 @@ import numpy as np
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
-from fvsolve.fluid.laws import LAWS, named
+from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import Place
+from fvsolve.parts.basin import Place, Start
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show
@@ -198,28 +198,27 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)
-        if fluid is not None and basin.physics not in LAWS[fluid.law].basins:
-            what = {"free-surface": "a free surface, whose water has one density"}.get(basin.physics, "basins")
-            wanted = named(lambda law, physics=basin.physics: physics in law.basins)
-            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {what}; wanted {wanted}"
+        own = basin.own
+        if fluid is not None and not own.goes(fluid.law):
+            wanted = named(lambda law, own=own: own.goes(law.name))
+            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.but}; wanted {wanted}"
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"
-            elif f"{name}.{patch}" in joined and basin.physics == "transport":
+            elif f"{name}.{patch}" in joined and not own.joined:
                 yield (*key, "patches", patch), "a link joins here, but what flows is given by velocity"
             elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:
                 what = "boundary" if one.boundary else "impedance"
                 yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
-            if one.impedance is not None and basin.physics != "liquid":
+            if one.impedance is not None and not own.echoes:
                 yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
         shapes = {("bed",): basin.bed}
         if basin.start is not None:
-            shapes |= {("start", what): getattr(basin.start, what) for what in ("level", "pressure", "u", "v")}
-            other = {"free-surface": "pressure", "liquid": "level", "transport": "u"}[basin.physics]
-            if getattr(basin.start, other) is not None:
+            shapes |= {("start", what): getattr(basin.start, what) for what in Start.model_fields}
+            for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
         shapes |= {("scalars", scalar): shape for scalar, shape in basin.scalars.items()}
         if basin.velocity is not None:

@@ -38,14 +38,17 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
             for scalar, value in getattr(part, "scalars", {}).items():
                 if (said := _wrong(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), said
-            if scalars and getattr(part, "physics", "") == "liquid":
-                yield (group, name), "is a basin of liquid, whose waves carry no scalars; wanted a free surface"
+            if scalars and isinstance(part, Basin) and not part.own.carries:
+                yield (
+                    (group, name),
+                    f"is a basin of {part.physics}, whose waves carry no scalars; wanted a free surface",
+                )
             for patch, one in getattr(part, "patches", {}).items():
                 for scalar in one.scalars:
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown(scalar, scalars)
-                    elif part.physics != "transport" and one.boundary != "open":
+                    elif part.own.joined and one.boundary != "open":
                         yield place, 'comes with what links bring; it goes with a given velocity or boundary = "open"'
             if scalars and part.no_scalars:
                 article = "an" if part.kind[0] in "aeiou" else "a"

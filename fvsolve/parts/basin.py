@@ -2,48 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.errors import listing
+from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import Inside, Named, Table, at_most_one, read_keys
+from fvsolve.parts.table import Inside, Named, Table
 from fvsolve.parts.value import (
-    PROFILE,
     SHAPE,
-    VALUE,
     Choice,
-    Misfit,
     Quantity,
     Rows,
     Setting,
     Text,
-    Usual,
     Value,
-    anything,
     nonnegative,
     positive,
 )
 from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
-PHYSICS = ("free-surface", "liquid", "transport")
-OF_ONE = {  # keys that mean something to some physics alone
-    "level": ("free-surface",), "bed": ("free-surface",), "manning": ("free-surface",), "factor": ("free-surface",),
-    "pressure": ("liquid",), "wave_speed": ("liquid",), "velocity": ("transport",),
-    "thickness": ("liquid", "transport"),
-}  # fmt: skip
-NEEDS = {"free-surface": ("level",), "liquid": ("pressure", "thickness"), "transport": ("velocity",)}
 OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
-MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}
-FIELDS = {  # what can be read at a point: name -> dimension
-    "free-surface": {"depth": "level", "surface": "level", "bed": "level", **MOVES},
-    "liquid": {"pressure": "pressure", **MOVES},
-    "transport": {},
-}
+MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of what has velocities
 
 
 class Patch(Table):
@@ -122,77 +107,15 @@ class MeshFile(Table):
     unit: Annotated[str, Text("of its coordinates")] = "m"
 
 
-class Start(Table):
-    """What a basin starts from where that is not rest."""
+class Moving(Table):
+    """What starts with a velocity."""
 
-    level: Annotated[Formula | None, Shaped("length", "of the free surface above the elevation [m]")] = None
-    pressure: Annotated[Formula | None, Shaped("pressure_drop", "of a liquid above that at rest [Pa]")] = None
     u: Annotated[Formula, Shaped("velocity", "velocity along x [m/s]")] = even(0.0)
     v: Annotated[Formula, Shaped("velocity", "velocity along y [m/s]")] = even(0.0)
 
 
-@dataclass(frozen=True)
-class Velocity:
-    """A given velocity: `way` "u, v" | "stream" | "expression" | "file", what it takes, and when it turns back [s].
-
-    given : {"u": Formula, "v": Formula} | {"stream": Formula} | {"expression": name, its parameters} | {"file": path}
-    """
-
-    way: str
-    given: dict[str, Any]
-    period: float | None
-    said: dict[str, Any]
-
-    def table(self) -> dict[str, Any]:
-        """What the file would say."""
-        return self.said
-
-
-PARAMETERS: dict[str, Value] = {  # of velocities by name
-    "expression": Text(),
-    **dict.fromkeys(("u", "v", "speed"), Quantity("velocity")),
-    **dict.fromkeys(("size", "width", "height", "y0", "south", "north"), Quantity("length")),
-    **dict.fromkeys(("centre", "origin"), Rows("length", length=2)),
-    "angular_velocity": Quantity("angular_velocity"),
-    "rate": Quantity("rate"),
-}
-
-
-class Flowing(Value):
-    """A velocity: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
-
-    about = "{ u, v } or { stream }, formulas of x and y in SI, { expression, its parameters } or { file }; and period"
-    takes = "`{ u, v }`, `{ stream }`, `{ expression, ... }` or `{ file }`, and `period`"
-    changes = PROFILE
-
-    def read(self, given: Any, setting: Setting) -> Velocity:
-        if isinstance(given, Velocity):
-            return given
-        ways = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
-        if "expression" in ways and not {"stream", "file"} & {*ways}:
-            ways = ["expression"]  # which may have parameters u and v
-        if not ways or (len(ways) > 1 and ways != ["u", "v"]):
-            has = f"has {listing(given) or 'nothing'}" if isinstance(given, dict) else f"{show(given)} is no velocity"
-            raise ValueError(f"{has}; wanted {self.about}")
-        found = {key: value for key, value in given.items() if key != "period"}
-        period, said = None, dict(given)
-        if "period" in given:
-            period = said["period"] = Quantity("time", positive).read(given["period"], setting)
-        way = "u, v" if ways[0] in "uv" else ways[0]
-        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(found))
-        faults = [((key,), f"unknown key; wanted {listing([*known, 'period'])}") for key in found if key not in known]
-        if faults:
-            raise Misfit(faults)
-        if way in ("u, v", "stream"):
-            of = "number" if way == "stream" else "velocity"
-            found = {key: Shaped(of).read(found.get(key, 0.0), setting) for key in known}
-        elif way == "expression":
-            own = {key: one for key, one in found.items() if key in PARAMETERS}
-            found |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
-        elif way == "file":
-            said["file"] = File("").read(found["file"], setting)
-            found = {"file": setting.files[said["file"]]}
-        return Velocity(way, found, period, said)
+class Start(Table):
+    """What a basin starts from where that is not rest: the keys that its physics has."""
 
 
 class Place(Node):
@@ -208,18 +131,69 @@ class Place(Node):
     pressure: float | None = None  # of a liquid at rest [Pa]
 
 
+class Physics(Table):
+    """What the cells of basins hold: its name in the file, keys of its own, and what goes with it.
+
+    One without a default must be given. Its folder has `lower.py` beside `part.py`, which see.
+    states : quantities of cells -> their units, the first is what is stored; fields : what can be read at a point
+    alike : keys of which one at most is given; starts : keys of `start`
+    laws : of density that it goes with, all if left out; but : what that law meets, in words
+    joined : whether links may join its patches; a given velocity passes others
+    carries : whether it carries scalars; echoes : whether its boundary may have an impedance
+    steep : whether its fronts steepen into jumps that keep, and smooth flow in the plane is of second order at most
+    """
+
+    kinds: ClassVar[dict[str, type[Physics]]] = {}
+    name: ClassVar[str] = ""
+    states: ClassVar[dict[str, str]] = {}
+    fields: ClassVar[dict[str, str]] = {}
+    starts: ClassVar[type[Table]] = Start
+    laws: ClassVar[tuple[str, ...]] = ()
+    but: ClassVar[str] = "basins"
+    joined: ClassVar[bool] = True
+    carries: ClassVar[bool] = True
+    echoes: ClassVar[bool] = False
+    steep: ClassVar[bool] = False
+
+    def __init_subclass__(cls, name: str, **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        if name in Physics.kinds:
+            raise FvsolveError(f"a physics {show(name)} is there already; wanted another name")
+        cls.name = name
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **rest: Any) -> None:
+        Physics.kinds[cls.name] = cls
+        grow(Start, cls.starts)
+        grow(Basin, cls)
+
+    @classmethod
+    def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        """Faults of the keys of physics that a basin of this one has or lacks."""
+        faults = cls.key_faults(given)
+        for key in given:
+            goes = [name for name, one in Physics.kinds.items() if key in one.model_fields]
+            if goes and cls.name not in goes:
+                faults.append(((key,), f"means nothing to physics {show(cls.name)}; it goes with {listing(goes)}"))
+        needed = [key for key, info in cls.model_fields.items() if info.is_required()]
+        return faults + [((), f"{key} is missing") for key in needed if key not in given]
+
+    @classmethod
+    def goes(cls, law: str) -> bool:
+        """Whether it goes with a density law."""
+        return law in (cls.laws or (law,))
+
+
 class Basin(Node, kind="basin"):
     """Fields in the plane between walls, joined to the network by patches.
 
-    free-surface: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction.
-    liquid: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0.
-    transport: (d phi)_t + div(d w phi) = div(d D grad phi), velocity w given.
+    What its cells hold, and by which keys it says so, its physics declares.
     """
 
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
 
-    physics: Annotated[str, Choice("physics", PHYSICS, "of its fields")] = "free-surface"
+    physics: Annotated[str, Choice("physics", Physics.kinds, "of its fields")] = "free-surface"
     size: Annotated[
         tuple[float, float] | None,
         Rows("length", positive, length=2, about="along x and y [m]; a mesh is needed if left out", changes=SHAPE),
@@ -245,58 +219,19 @@ class Basin(Node, kind="basin"):
         Start | None, Inside(Start, "level or pressure above that at rest, and velocities; at rest if left out")
     ] = None
 
-    level: Annotated[
-        float | None,
-        Quantity("level", anything, "of the water at rest, above the elevation [m]; free surface, needed there"),
-    ] = None
-    bed: Annotated[Formula | None, Shaped("length", "height above the elevation [m], free surface; 0 if left out")] = (
-        None
-    )
-    manning: Annotated[
-        float | None,
-        Quantity(
-            "number",
-            nonnegative,
-            "Manning's n [s/m^(1/3)], free surface; no friction if left out",
-            Usual(0.005, 0.5, "glass to dense brush"),
-            VALUE,
-        ),
-    ] = None
-    factor: Annotated[
-        float | None,
-        Quantity(
-            "number",
-            nonnegative,
-            "Darcy's, in place of manning [-], free surface; no friction if left out",
-            Usual(0.002, 3.0, "glass to boulders"),
-            VALUE,
-        ),
-    ] = None
-
-    pressure: Annotated[float | None, Quantity("pressure", positive, "at rest [Pa]; liquid, needed there")] = None
-    thickness: Annotated[
-        float | None, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
-    ] = None
-    wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "of a liquid [m/s]; the fluid's own if left out")
-    ] = None
-
-    velocity: Annotated[Any, Flowing()] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
 
-    def fields(self) -> dict[str, str]:
-        """What can be read at a point of it: name -> dimension."""
-        return FIELDS[self.physics]
+    @property
+    def own(self) -> type[Physics]:
+        """What declares its physics."""
+        return Physics.kinds[self.physics]
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
-        physics = given.get("physics", "free-surface")
-        faults = at_most_one(given, ("manning", "factor"))
-        if physics in PHYSICS:
-            for key, goes in OF_ONE.items():
-                if key in given and physics not in goes:
-                    faults.append(((key,), f"means nothing to physics {show(physics)}; it goes with {listing(goes)}"))
-            faults += [((), f"{key} is missing") for key in NEEDS[physics] if key not in given]
+        physics = given.get("physics", cls.model_fields["physics"].default)
+        faults = (
+            Physics.kinds[physics].own_faults(given) if isinstance(physics, str) and physics in Physics.kinds else []
+        )
         if "mesh" in given:
             faults += [((key,), "goes with rectangles; the basin has a mesh") for key in OUTLINE if key in given]
         else:
@@ -313,3 +248,15 @@ class Basin(Node, kind="basin"):
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
         patches = given.get("patches")
         return tuple(patches) if isinstance(patches, dict) else ()
+
+
+def grow(table: type[Table], other: type[Table]) -> None:
+    """Give a table the keys of another, which it may leave out."""
+    for key, info in other.model_fields.items():
+        table.model_fields[key] = found = copy(info)
+        found.default = None if info.is_required() else info.default
+    table.model_rebuild(force=True)
+
+
+for folder in sorted(Path(__file__).parents[1].glob("basins/*/part.py")):
+    import_module(f"fvsolve.basins.{folder.parent.name}.part")

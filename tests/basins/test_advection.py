@@ -10,8 +10,8 @@ from pytest import approx
 from scipy.special import erfc
 from truth.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 
+from fvsolve.basins import diffusion
 from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
-from fvsolve.kernels.plane import diffusion
 from fvsolve.mesh import rectangle
 
 TURN = {"expression": "rotation", "centre": (0.5, 0.5), "angular_velocity": 2.0 * np.pi}

@@ -9,8 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from fvsolve.jit import njit
-from fvsolve.kernels.plane.faces import (
+from fvsolve.basins.faces import (
     BLOCK,
     HEAD,
     HUGE,
@@ -28,6 +27,7 @@ from fvsolve.kernels.plane.faces import (
     put_inward,
     put_sides,
 )
+from fvsolve.jit import njit
 from fvsolve.kernels.records import UPWIND
 
 DEPTH, SURFACE, PLANS = 0, 1, 2  # rows of plan: the profile's depth, its surface less the level

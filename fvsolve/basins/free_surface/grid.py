@@ -33,6 +33,7 @@ from fvsolve.basins.free_surface.rows import (
     put_rates,
 )
 from fvsolve.basins.free_surface.smooth import put_smooth
+from fvsolve.basins.patches import put_inward
 from fvsolve.jit import njit
 from fvsolve.kernels.records import LINEAR, WENO5
 
@@ -49,13 +50,6 @@ def copy(source, target):
     """target = source[: target.size]."""
     for i in range(target.size):
         target[i] = source[i]
-
-
-@njit
-def put_inward(turn, k, flux, inward):
-    """Flows through a row of faces; turn : 1 or -1 for fluxes inward or outward, k : 1 / lengths of faces."""
-    for i in range(inward.size):
-        inward[i] = turn * flux[i] / k[i]
 
 
 @njit

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from fvsolve.basins.free_surface import faces as shallow_faces
 from fvsolve.basins.free_surface import grid as shallow
+from fvsolve.basins.free_surface.lower_dispersion import notices
+from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.lower_basin import Basin
+from fvsolve.basins.lower_pieces import MARKED
 from fvsolve.case.basins import bed_of, means, samples
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins.basin import Basin
-from fvsolve.schemes import SCHEMES
+from fvsolve.kernels.phases import Pieces
 
+HOME = __package__
+WATER = Pieces(
+    home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_water",
+    power="energy: add_power", stored="energy: add_stored",
+)  # fmt: skip
 SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # of levels and beds, less than which is no water
 TINY = 1e-300
@@ -37,16 +48,23 @@ def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
     return np.maximum(still + (means(deep) - there) - follows * (still - there), 0.0)
 
 
-class FreeSurface(Basin, physics="free-surface"):
+class FreeSurface(Basin):
     """Shallow water, states depth [m] and flows per width [m2/s]."""
 
-    quantities = ("depth", "flow_x", "flow_y")
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
+    deep, far_ends = True, False
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
         self.bed = bed_of(self.part, self.mesh)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        yield Pieces(home=HOME, rates="rates: rates_on_grids" if self.is_grid else "rates: rates_on_meshes")
+        yield WATER
+        yield MARKED
+        if valves:
+            yield Pieces(home=HOME, brake="patches: quickest_inflow")
 
     def scales(self) -> list[float]:
         flow = SCALE * np.sqrt(self.case.gravity * SCALE)
@@ -67,13 +85,12 @@ class FreeSurface(Basin, physics="free-surface"):
         row["plan"] = draft.to_plane(plan)
 
     def lower_grid(self, draft, row) -> None:
-        row["kind"] = rec.SHALLOW_GRID
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
-        row["unsplit"] = SHORES if dry and SCHEMES[self.scheme].order > 2 else UNSPLIT
+        row["unsplit"] = SHORES if dry and self.fifth else UNSPLIT
         row["work"] = draft.to_work(shallow.WORK)
 
     def lower_faces(self, draft, row) -> None:
-        row["kind"], row["unsplit"] = rec.SHALLOW_FACES, UNSPLIT
+        row["unsplit"] = UNSPLIT
         row["work"] = draft.to_work(shallow_faces.work_size(self.integers))
 
     def start(self) -> np.ndarray:
@@ -105,13 +122,27 @@ class FreeSurface(Basin, physics="free-surface"):
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field not in ("depth", "surface", "bed"):
             return super().lower_probe(row, field, cells, weights)
-        row["kind"], row["scale"] = rec.CELL_DEPTH, float(field != "bed")
+        row["side"], row["scale"] = DEPTH, float(field != "bed")
         if field != "depth":
             row["offset"] = weights @ self.bed[cells] + (self.part.elevation or 0.0)
 
     def mass(self) -> tuple[float, np.ndarray]:
         per = self.case.properties.density * self.mesh.area
         return float(np.sum(per * self.depth)), per
+
+    def weights(self, y: np.ndarray) -> np.ndarray:
+        per, depth = self.case.properties.density * self.mesh.area, np.maximum(self.depth + y[0], THIN)
+        return np.array([0.5 * self.case.gravity * per, 0.5 * per / depth, 0.5 * per / depth])
+
+    def above(self, y: np.ndarray, datum: float) -> float:
+        depth, bed = np.maximum(self.depth + y[0], 0.0), self.bed + (self.part.elevation or 0.0) - datum
+        height = 0.5 * self.case.gravity * ((bed + depth) ** 2 - np.maximum(bed, 0.0) ** 2)
+        wet = np.maximum(depth, THIN)
+        moves = depth / (depth**2 + wet**2) * (y[1] ** 2 + y[2] ** 2)
+        return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
+
+    def notices(self, y: np.ndarray) -> list[Notice]:
+        return notices(self, y)
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

@@ -96,10 +96,10 @@ def notice(basin, found: Waves, when: str = "") -> Notice:
     return Notice("dispersion", f"nodes.{basin.name}", said(basin, found) + when, None, float(found.wrong), WRONG)
 
 
-def warnings(basins, y: np.ndarray) -> list[Notice]:
-    """Of basins whose waves are too short at the start y of a model."""
-    pairs = [(basin, waves(basin, basin.of(y))) for basin in surfaces(basins)]
-    return [notice(basin, found) for basin, found in pairs if found is not None and found.wrong > WRONG]
+def notices(basin, y: np.ndarray) -> list[Notice]:
+    """That waves of a basin are too short at deviations y, where they are."""
+    found = waves(basin, y)
+    return [notice(basin, found)] if found is not None and found.wrong > WRONG else []
 
 
 def surfaces(basins) -> list:

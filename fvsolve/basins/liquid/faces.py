@@ -9,10 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from fvsolve.basins.liquid.grid_full import log_sum
-from fvsolve.basins.liquid.waves import invariant, state
-from fvsolve.jit import njit
-from fvsolve.kernels.plane.faces import (
+from fvsolve.basins.faces import (
     BLOCK,
     HEAD,
     HUGE,
@@ -29,6 +26,9 @@ from fvsolve.kernels.plane.faces import (
     put_inward,
     put_sides,
 )
+from fvsolve.basins.liquid.grid_full import log_sum
+from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.jit import njit
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
 # rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step, flow through the side

@@ -13,7 +13,6 @@ compiled, so that neither law compiles or runs anything of the other's.
 
 from math import sqrt
 
-from fvsolve.basins.free_surface.grid import put_inward
 from fvsolve.basins.liquid.grid import (
     BEYOND,
     EDGE,
@@ -33,6 +32,7 @@ from fvsolve.basins.liquid.grid import (
     value_upwind5,
 )
 from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.basins.patches import put_inward
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.reconstruction import value_weno5

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from fvsolve.basins.liquid import faces as liquid_faces
 from fvsolve.basins.liquid import grid as liquid
 from fvsolve.basins.liquid import grid_full as liquid_log
-from fvsolve.kernels import records as rec
-from fvsolve.model.basins.basin import Basin
+from fvsolve.basins.liquid.observe import PRESSURE
+from fvsolve.basins.lower_basin import Basin
+from fvsolve.basins.lower_pieces import MARKED
+from fvsolve.kernels.phases import Pieces
 
+HOME = __package__
+LIQUID = Pieces(
+    home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_liquid",
+    power="energy: add_power", stored="energy: add_stored",
+)  # fmt: skip
 SCALE = 1e5  # [Pa]
 SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
 
 
-class Liquid(Basin, physics="liquid"):
+class Liquid(Basin):
     """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
 
     law linear: p = a^2 (rho - rho0); laws log, p = K ln(rho / rho0), and table with the full momentum flux.
     """
 
-    quantities = ("density", "flow_x", "flow_y")
     units = {"pressure": "Pa", "velocity": "m/s"}
 
     def __init__(self, case, name: str) -> None:
@@ -38,6 +45,19 @@ class Liquid(Basin, physics="liquid"):
         strain = (self.part.pressure - fluid.pressure) / fluid.bulk_modulus
         self.density = fluid.density * (1.0 if self.linear else math.exp(strain))
         self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        module = "table" if self.waves is not None else "rates"
+        on_grid = "waves_on_grids" if self.linear else "rates_on_grids"
+        yield Pieces(home=HOME, rates=f"{module}: {on_grid if self.is_grid else 'rates_on_meshes'}")
+        yield LIQUID
+        yield MARKED
+        if self.waves is not None:
+            yield Pieces(home=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
+
+    @property
+    def even_paced(self) -> bool:
+        return self.linear
 
     def scales(self) -> list[float]:
         return [SCALE / self.speed**2, SCALE / self.speed, SCALE / self.speed]
@@ -56,11 +76,9 @@ class Liquid(Basin, physics="liquid"):
         if self.waves is not None:
             self.lower_waves(draft, row)
         if self.is_grid:
-            row["kind"] = rec.ACOUSTIC_GRID if self.linear else rec.TABLE_GRID if self.waves else rec.LIQUID_GRID
             size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
             row["work"] = draft.to_work(size)
         else:
-            row["kind"] = rec.TABLE_FACES if self.waves else rec.LIQUID_FACES
             row["work"] = draft.to_work(liquid_faces.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
@@ -109,7 +127,7 @@ class Liquid(Basin, physics="liquid"):
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         if field != "pressure":
             return super().lower_probe(row, field, cells, weights)
-        row["kind"], row["scale"], row["offset"] = rec.CELL_STATE, self.speed**2, self.part.pressure
+        row["side"], row["scale"], row["offset"] = PRESSURE, self.speed**2, self.part.pressure
 
     def mass(self) -> tuple[float, np.ndarray]:
         per, fluid = self.part.thickness * self.mesh.area, self.case.properties
@@ -117,6 +135,16 @@ class Liquid(Basin, physics="liquid"):
         if self.linear:
             density *= 1.0 + (self.part.pressure - fluid.pressure) / (self.density * self.speed**2)
         return float(np.sum(per)) * density, per
+
+    def weights(self, y: np.ndarray) -> np.ndarray:
+        per = 0.5 * self.part.thickness * self.mesh.area / self.density
+        return np.array([self.speed**2 * per, per, per])
+
+    def above(self, y: np.ndarray, datum: float) -> float:
+        rho, height = self.case.properties.density, (self.part.elevation or 0.0) - datum
+        rest = self.part.pressure - self.case.ambient_pressure + rho * self.case.gravity * height
+        square = (rest + self.speed**2 * y[0]) ** 2 / self.speed**2 + y[1] ** 2 + y[2] ** 2
+        return float(0.5 * self.part.thickness / rho * np.sum(self.mesh.area * square))
 
     def held(self) -> np.ndarray:
         return np.zeros(self.n)

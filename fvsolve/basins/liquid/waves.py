@@ -3,7 +3,7 @@
 w = integral of c / rho over the density from rest on; r [kg/m3] and p [Pa] are deviations from rest. A table is
     1/dr, first interval, how many follow, offset, 1/dw, first interval, how many follow, offset
 and four coefficients of s in [0, 1] an interval: of w over r, then of r and of p over w. Intervals are counted from
-rest, where all is 0 to the bit; the first and the last are straight and have no end. `basins.liquid.lower_waves` makes it.
+rest, where all is 0 to the bit; the first and the last are straight and have no end. `lower_waves` makes it.
 """
 
 from fvsolve.jit import njit

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from fvsolve.basins.lower_basin import Basin
 from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins.basin import Basin
+from fvsolve.kernels.phases import Pieces
 
 
-class Transport(Basin, physics="transport"):
+class Transport(Basin):
     """Nothing moves but what is carried; depth 1."""
+
+    given = True
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        yield Pieces(home=__package__, observe="observe: observe_given_flows")
 
     def lower(self, draft, row) -> None:
         given, mesh = self.part.velocity, self.mesh
         flows = self.flows(draft)
         row["thickness"], row["density"] = self.part.thickness or 1.0, self.case.properties.density
-        row["kind"], row["period"] = rec.CARRIED_GRID if self.is_grid else rec.CARRIED_FACES, given.period or 0.0
+        row["period"] = given.period or 0.0
         if self.is_grid:
             grid = mesh.grid
             flow_x, flow_y = grid_flows(mesh, flows)

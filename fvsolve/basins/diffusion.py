@@ -3,8 +3,8 @@
 s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
 """
 
+from fvsolve.basins.advection import THIN, put_values
 from fvsolve.jit import inner, njit
-from fvsolve.kernels.plane.advection import THIN, put_values
 
 
 @njit

@@ -5,13 +5,13 @@ Amounts are per area, s = depth c; a basin with a given velocity has depth 1.
 
 from math import cos, pi
 
+from fvsolve.basins.advection import THIN
+from fvsolve.basins.behind import counted, is_given, weight
+from fvsolve.basins.diffusion import add_decay
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
-from fvsolve.kernels.plane.advection import THIN
-from fvsolve.kernels.plane.behind import counted, is_given, through_patch, weight
-from fvsolve.kernels.plane.diffusion import add_decay
-from fvsolve.kernels.records import CELL_SCALAR, GIVEN_FLOW, SHALLOW_FACES
+from fvsolve.kernels.records import CELL_SCALAR
 from fvsolve.kernels.schedules import schedule_value
 
 LEAST = 1e-12  # what a dry cell counts by in the value at a patch [m]
@@ -20,7 +20,7 @@ LEAST = 1e-12  # what a dry cell counts by in the value at a patch [m]
 @njit
 def depth_at(tables, basin, y, i):
     """Depth of a cell that an amount is spread over."""
-    if basin["kind"] > SHALLOW_FACES:
+    if basin["deep"] == 0:
         return 1.0
     return max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
 
@@ -40,11 +40,11 @@ def patch_values(t, y, dydt, out, handle):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
         for q in range(tables.scalars.size):
-            water, total, held = basin["kind"] <= SHALLOW_FACES, 0.0, 0.0
+            deep, total, held = basin["deep"] == 1, 0.0, 0.0
             for m in range(patch["count"]):
                 i = tables.integers[patch["first"] + m]
                 part = tables.plane[basin["area"] + i]
-                part *= max(weight(tables.plane, basin, True, i, y), LEAST) if water else 1.0
+                part *= max(weight(tables.plane, basin, True, i, y), LEAST) if deep else 1.0
                 total, held = total + part, held + part * cell_value(tables, basin, q, y, i)
             out[value + q * nodes + patch["node"]] = held / total
 
@@ -60,18 +60,6 @@ def observe_values(t, y, out, handle, values):
             for m in range(probe["count"]):
                 i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
                 values[k] += weight * cell_value(tables, tables.basins[probe["index"]], probe["scalar"], y, i)
-
-
-@njit
-def observe_given_flows(t, y, out, handle, values):
-    """values[k] of every probe of what a given velocity brings in through a patch [m3/s]."""
-    tables = open_tables(handle)
-    for k in range(tables.probes.size):
-        if tables.probes[k]["kind"] == GIVEN_FLOW:
-            patch = tables.patches[tables.probes[k]["index"]]
-            basin, values[k] = tables.basins[patch["basin"]], 0.0
-            if patch["open"] == 1:
-                values[k] = turned(t, basin) * basin["thickness"] * through_patch(tables, patch)
 
 
 @njit
@@ -91,7 +79,7 @@ def made_ready(t, tables, b, y):
     """Depths and values beyond the boundary of a basin, for its scalars."""
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at = basin["n"], basin["y"], basin["plan"]
-    if basin["kind"] <= SHALLOW_FACES:
+    if basin["deep"] == 1:
         depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
         for i in range(n):
             depth[i] = max(rest[i] + change[i], 0.0)
@@ -109,7 +97,7 @@ def turned(t, basin):
 @njit
 def deep(basin):
     """Number of depths that were made ready: none where it is 1."""
-    return basin["n"] if basin["kind"] <= SHALLOW_FACES else 0
+    return basin["n"] if basin["deep"] == 1 else 0
 
 
 @njit
@@ -121,7 +109,7 @@ def settle_amounts(t, y, dydt, out, handle):
         basin = tables.basins[b]
         n, depth = basin["n"], work[basin["toil"] : basin["toil"] + deep(basin)]
         per = tables.settings[0]["rho"]
-        if basin["kind"] > SHALLOW_FACES:
+        if basin["deep"] == 0:
             per = basin["density"] * basin["thickness"]
         for q in range(tables.scalars.size if basin["carried"] >= 0 else 0):
             at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
@@ -141,7 +129,7 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
             high = depth[i] if depth.size > 0 else 1.0
             lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
         add_decay(scalar["decay"], scalar["ambient"], depth, s, rate)
-    for p in range(0 if basin["kind"] > SHALLOW_FACES else patches.size):
+    for p in range(0 if is_given(basin) else patches.size):
         if patches[p]["basin"] == b and patches[p]["open"] == 0:
             bring(tables, patches[p], basin, q, y, rate, out)
 

@@ -11,8 +11,7 @@ flow leaves; where it enters, the value outside holds at the face.
 
 import numpy as np
 
-from fvsolve.jit import njit
-from fvsolve.kernels.plane.faces import (
+from fvsolve.basins.faces import (
     BLOCK,
     CELL,
     DISTANCES,
@@ -34,6 +33,7 @@ from fvsolve.kernels.plane.faces import (
     place,
     put_sides,
 )
+from fvsolve.jit import njit
 from fvsolve.kernels.records import UPWIND
 
 THIN = 1e-6  # depth below which values fade [m]

@@ -1,6 +1,6 @@
 """A mesh lowered to the flat arrays that loops over the sides of cells run on. Knows geometry; knows no physics.
 
-The layout is that of `fvsolve.kernels.plane.faces`, where the words are explained.
+The layout is that of `fvsolve.basins.faces`, where the words are explained.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fvsolve.kernels.plane import faces
+from fvsolve.basins import faces
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh

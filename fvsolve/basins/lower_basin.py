@@ -2,41 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from fvsolve.basins import advection_faces
+from fvsolve.basins.advection import THIN, advection_work
+from fvsolve.basins.diffusion import diffusion_work
+from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.lower_mesh import lower_mesh
+from fvsolve.basins.observe import SPEED, U, V
 from fvsolve.case.basins import behind, is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import advection_faces
-from fvsolve.kernels.plane.advection import THIN, advection_work
-from fvsolve.kernels.plane.diffusion import diffusion_work
-from fvsolve.model.face_mesh import lower_mesh
 from fvsolve.model.schemes import CODES, family
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
 
 if TYPE_CHECKING:
+    from fvsolve.kernels.phases import Pieces
     from fvsolve.mesh.points import MeshPoints
 
 ROUNDING = 1e-12  # of rates
-MOVES = {"u": rec.CELL_U, "v": rec.CELL_V, "speed": rec.CELL_SPEED}
+VELOCITIES = {"u": U, "v": V, "speed": SPEED}
 
 
 class Basin:
     """A basin of a model: its part, its mesh, and its row once it is lowered."""
 
-    physics: ClassVar[dict[str, type[Basin]]] = {}
-    quantities: ClassVar[tuple[str, ...]] = ()  # of cells, as states have them; the first is what is stored
+    physics: ClassVar[dict[str, type[Basin]]] = {}  # by the package that declares it
     units: ClassVar[dict[str, str]] = {}  # of fields
+    deep: ClassVar[bool] = False  # whether its first quantity is a depth, over that in `plan`, that holds scalars
+    given: ClassVar[bool] = False  # whether flows through its faces are those of a given velocity
+    far_ends: ClassVar[bool] = True  # whether waves leave it on a polynomial of five cells
     gathers: float = 0.0  # greatest divergence of a given velocity [1/s]
 
-    def __init_subclass__(cls, physics: str) -> None:
-        Basin.physics[physics] = cls
+    def __init_subclass__(cls) -> None:
+        Basin.physics[cls.__module__.rpartition(".")[0]] = cls
 
     def __init__(self, case, name: str) -> None:
         self.case, self.name, self.part, self.mesh = case, name, case.nodes[name], case.meshes[name]
@@ -44,12 +50,17 @@ class Basin:
         self.n = self.x.size
         self.memory = 0  # its tables and its state [bytes]
         self.is_grid = is_grid(self.mesh)
-        self.scalars = list(case.scalars)
+        self.scalars = list(case.scalars) if self.part.own.carries else []
+        self.quantities = tuple(self.part.own.states)  # of cells, as states have them; the first is what is stored
 
     # what a physics says ------------------------------------------------------------------------------------
 
     def lower(self, draft, row) -> None:
         """Fill what its law needs of the row, and reserve what its kernels work in."""
+        raise NotImplementedError
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        """Of what its right-hand side and readers consist, in order; valves : whether there are any in the network."""
         raise NotImplementedError
 
     def scales(self) -> list[float]:
@@ -94,19 +105,41 @@ class Basin:
         return bool(self.quantities)
 
     @property
+    def even_paced(self) -> bool:
+        """Whether waves run at one speed, whatever they do."""
+        return False
+
+    @property
     def scheme(self) -> str:
         """The scheme that its kernels take."""
         return SCHEMES[self.case.numerics.scheme].on(self.is_grid).name
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
-        """Fill what a probe of a field is, beside the cells that it reads; scalar fields are its physics' own."""
-        row["kind"], row["scale"] = MOVES[field], 1.0
+        """Fill what a probe of a field is, beside the cells that it reads; all but velocities are its physics' own."""
+        row["side"], row["scale"] = VELOCITIES[field], 1.0
 
     def mass(self) -> tuple[float, np.ndarray]:
         """Mass of the start's profile [kg], and mass per deviation of the first quantity : float64[n]."""
         raise NotImplementedError
 
+    def weights(self, y: np.ndarray) -> np.ndarray:
+        """Weights w of small deviations d from y that store w d^2 : float64[quantities, n]."""
+        return np.tile(0.5 * self.mesh.area, (len(self.quantities), 1))
+
+    def above(self, y: np.ndarray, datum: float) -> float:
+        """Energy at deviations y over that at rest and at P = 0, a surface at the datum or on the bed [J]."""
+        return 0.0
+
+    def notices(self, y: np.ndarray) -> list[Notice]:
+        """What there is to know of deviations at the start."""
+        return []
+
     # ----------------------------------------------------------------------------------------------------------
+
+    @property
+    def fifth(self) -> bool:
+        """Whether its scheme is of more than second order."""
+        return SCHEMES[self.scheme].order > 2
 
     @cached_property
     def points(self) -> MeshPoints:
@@ -157,6 +190,11 @@ class Basin:
         """Fill what all kinds need."""
         numerics, mesh, before = self.case.numerics, self.mesh, draft.room()
         self.row, row["n"] = row, self.n
+        row["kind"], row["deep"], row["given"] = (
+            kind_of(type(self).__module__.rpartition(".")[0]),
+            self.deep,
+            self.given,
+        )
         row["scheme"] = family(self.scheme)
         row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].wide
         row["area"] = draft.to_plane(mesh.area)
@@ -282,17 +320,3 @@ class Basin:
         given = stated.scalars if stated is not None else {}
         row["values"] = len(draft.integers)
         draft.integers += [draft.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
-
-
-def lower(draft) -> None:
-    """Fill the tables of basins and their patches, and states for their cells."""
-    case = draft.case
-    draft.basins = [Basin.physics[case.nodes[name].physics](case, name) for name in case.meshes]
-    draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
-    for basin, row in zip(draft.basins, draft.basin_table, strict=True):
-        basin.lower_common(draft, row)
-    patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]
-    draft.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
-    for row, (name, place) in zip(draft.patch_table, patches, strict=True):
-        row["basin"], row["node"] = names.index(place.basin), draft.node_index[name]
-        draft.basins[row["basin"]].lower_patch(draft, place.patch, row)

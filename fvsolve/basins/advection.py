@@ -8,10 +8,10 @@ between `least` and `most`; upwind5 promises nothing. SSP methods do as Euler wi
 The ring of a grid is its boundary faces, west (ny), east (ny), south (nx), north (nx).
 """
 
+from fvsolve.basins.bounds import bound, bound_work
+from fvsolve.basins.fifth_order import grid_excesses, grid_excesses_work, settle_excesses
+from fvsolve.basins.second_order import second_order_rates, second_order_work
 from fvsolve.jit import njit
-from fvsolve.kernels.plane.bounds import bound, bound_work
-from fvsolve.kernels.plane.fifth_order import grid_excesses, grid_excesses_work, settle_excesses
-from fvsolve.kernels.plane.second_order import second_order_rates, second_order_work
 from fvsolve.kernels.records import MUSCL, UPWIND, WENO5
 
 INFINITE = float("inf")

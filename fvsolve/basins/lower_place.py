@@ -26,5 +26,5 @@ class PatchRows(Lowering, kind="patch"):
         if probe.quantity != "flow":
             return super().probe(draft, name, probe, row)
         row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
-        if draft.case.nodes[draft.case.places[name].basin].physics == "transport":
+        if not draft.case.nodes[draft.case.places[name].basin].own.joined:
             row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

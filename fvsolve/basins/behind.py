@@ -1,7 +1,6 @@
 """Cells behind a patch: what each counts by in what passes it. Knows cells and faces; knows no network."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.records import CARRIED_GRID
 
 SHALLOW = 1e-3  # depth behind a patch below which no more than a share of what is asked can leave [m]
 HARDLY = 1e-9  # volume behind a patch, over its area, below which its surface turns to the lowest one's [m]
@@ -46,7 +45,7 @@ def counted(tables, patch, leaves, y):
 @njit(forceinline=True)
 def is_given(basin):
     """Whether flows through faces are those of a given velocity, in `plane`; others are found in a run, in `work`."""
-    return basin["kind"] >= CARRIED_GRID
+    return basin["given"] == 1
 
 
 @njit

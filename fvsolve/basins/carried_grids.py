@@ -1,18 +1,18 @@
 """Scalars in basins on grids as a room of a scene. Knows the tables; the rest is as in `carried`."""
 
+from fvsolve.basins.advection import add_fifth_order, grid_advection, grid_fastest
+from fvsolve.basins.behind import is_given
+from fvsolve.basins.carried import deep, made_ready, turned
+from fvsolve.basins.diffusion import grid_diffusion
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane.advection import add_fifth_order, grid_advection, grid_fastest
-from fvsolve.kernels.plane.behind import is_given
-from fvsolve.kernels.plane.carried import deep, made_ready, turned
-from fvsolve.kernels.plane.diffusion import grid_diffusion
-from fvsolve.kernels.records import CARRIED_GRID, RATE, SHALLOW_GRID
+from fvsolve.kernels.records import RATE
 
 
 @njit(forceinline=True)
 def on_grid(basin):
     """Whether scalars of a basin are carried over a grid."""
-    return basin["kind"] == SHALLOW_GRID or basin["kind"] == CARRIED_GRID
+    return basin["carried"] >= 0 and basin["nx"] > 0
 
 
 @njit(forceinline=True)

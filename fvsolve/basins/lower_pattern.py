@@ -64,7 +64,7 @@ def neighbours(basin) -> csr_array:
     """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
     found, reach = csr_array(eye_array(basin.n, dtype=bool)), SCHEMES[basin.scheme].reach.behind
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
-    if reach < WIDE or basin.row["kind"] <= rec.SHALLOW_FACES or not basin.row["outer_given"]:
+    if reach < WIDE or not basin.far_ends or not basin.row["outer_given"]:
         edge = edge[:0]
     beside = csr_array(coo_array((np.ones(edge.size, dtype=bool), (edge, edge)), shape=found.shape))
     for ring in rings(basin):

@@ -1,23 +1,20 @@
-"""Power and stored energy of basins under the linear law. Knows the tables; adds nothing up over time.
+"""Power and stored energy of water with a free surface. Knows the tables; adds nothing up over time.
 
-Water with a free surface stores rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)) per area, a liquid per volume
-P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho), P its potential at rest; squares are those of a cell's mean. Rows of
-`power`, last of all, a basin: what comes in by patches at their potential, what is lost there (water that enters has
-no speed, water that leaves takes its own along and is not paid for it), friction, rate of storage [W]; of `stored`:
-its change since the profile [J].
+It stores rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)) per area. Rows: see `basins.energy`.
 """
 
 from math import sqrt
 
+from fvsolve.basins.behind import counted, weight
+from fvsolve.basins.energy import at_rest, row_of
 from fvsolve.basins.free_surface.friction import FASTEST
 from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.kinds import kind_of
 from fvsolve.jit import njit
-from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane.behind import counted, weight
-from fvsolve.kernels.records import CARRIED_GRID, MANNING, NO_DRAG, SHALLOW_FACES
+from fvsolve.kernels.records import MANNING, NO_DRAG
 
-ROWS = 4  # of `power` a basin
+MINE = kind_of(__package__)
 
 
 @njit(forceinline=True)
@@ -27,31 +24,20 @@ def per_flow(depth):
     return 2.0 * depth / (depth * depth + wet * wet)
 
 
-@njit(forceinline=True)
-def at_rest(st, basin):
-    """Potential of the profile [Pa]."""
-    return basin["rest"] - st["rho"] * st["gravity"] * st["datum"]
-
-
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Rows of all basins."""
+    """Rows of its basins."""
     tables = open_tables(handle)
-    st, basins, patches = tables.settings[0], tables.basins, tables.patches
-    first = power.size - ROWS * basins.size
-    for b in range(basins.size):
-        rows = power[first + ROWS * b : first + ROWS * (b + 1)]
-        rows[0] = rows[1] = rows[2] = rows[3] = 0.0
-        if basins[b]["kind"] <= SHALLOW_FACES:
-            water_power(st, basins[b], tables.plane, y, dydt, rows)
-        elif basins[b]["kind"] < CARRIED_GRID:
-            liquid_power(st, basins[b], tables.plane, y, dydt, rows)
+    patches, layout = tables.patches, tables.layout[0]
+    for b in range(tables.basins.size):
+        if tables.basins[b]["kind"] == MINE:
+            rows = power[row_of(tables, power, b) :]
+            water_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
     for k in range(patches.size):
         patch, node = patches[k], patches[k]["node"]
-        flow = out[tables.layout[0]["net"] + node] + out[tables.layout[0]["supply"] + node]
-        power[first + ROWS * patch["basin"]] += potential(tables, out, node) * flow / st["rho"]
-        if basins[patch["basin"]]["kind"] <= SHALLOW_FACES:
-            power[first + ROWS * patch["basin"] + 1] += patch_loss(tables, patch, flow, y)
+        if tables.basins[patch["basin"]]["kind"] == MINE:
+            flow = out[layout["net"] + node] + out[layout["supply"] + node]
+            power[row_of(tables, power, patch["basin"]) + 1] += patch_loss(tables, patch, flow, y)
 
 
 @njit
@@ -82,17 +68,6 @@ def drag_power(st, basin, depth, square):
     if basin["friction"] == MANNING:
         rate = st["gravity"] * basin["roughness"] ** 2 * sqrt(square) / wet ** (4.0 / 3.0)
     return st["rho"] * depth * square * rate / (1.0 + rate / FASTEST)
-
-
-@njit
-def liquid_power(st, basin, plane, y, dydt, rows):
-    """Rate of storage of a liquid."""
-    n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
-    rate, square = 0.0, basin["speed"] * basin["speed"]
-    for i in range(n):
-        moves = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]
-        rate += area[i] * ((rest + square * y[o + i]) * dydt[o + i] + moves)
-    rows[3] = basin["thickness"] * rate / st["rho"]
 
 
 @njit
@@ -128,24 +103,19 @@ def patch_loss(tables, patch, flow, y):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Rows of all basins."""
+    """Rows of its basins."""
     tables = open_tables(handle)
     st, basins, plane = tables.settings[0], tables.basins, tables.plane
-    first = stored.size - basins.size
+    weight = st["rho"] * st["gravity"]
     for b in range(basins.size):
         basin, total = basins[b], 0.0
+        if basin["kind"] != MINE:
+            continue
         n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
-        if basin["kind"] <= SHALLOW_FACES:
-            depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
-            weight = st["rho"] * st["gravity"]
-            for i in range(n):
-                d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
-                share = per_flow(max(depths[i] + d, 0.0))
-                height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
-                total += area[i] * (height + 0.5 * st["rho"] * share * square)
-        elif basin["kind"] < CARRIED_GRID:
-            for i in range(n):
-                r, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
-                total += area[i] * (rest * r + 0.5 * (basin["speed"] ** 2 * r * r + square))
-            total *= basin["thickness"] / st["rho"]
-        stored[first + b] = total
+        depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
+        for i in range(n):
+            d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+            share = per_flow(max(depths[i] + d, 0.0))
+            height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
+            total += area[i] * (height + 0.5 * st["rho"] * share * square)
+        stored[stored.size - basins.size + b] = total

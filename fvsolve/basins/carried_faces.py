@@ -1,11 +1,11 @@
 """Scalars in basins on meshes of any cells as a room of a scene. Knows the tables; the rest is as in `carried`."""
 
+from fvsolve.basins.advection_faces import advection_rates
+from fvsolve.basins.behind import is_given
+from fvsolve.basins.carried import deep, made_ready, turned
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.plane.advection_faces import advection_rates
-from fvsolve.kernels.plane.behind import is_given
-from fvsolve.kernels.plane.carried import deep, made_ready, turned
-from fvsolve.kernels.records import CARRIED_FACES, RATE, SHALLOW_FACES
+from fvsolve.kernels.records import RATE
 
 
 @njit
@@ -15,7 +15,7 @@ def carry_on_meshes(t, y, dydt, out, handle):
     plane, work, scalars, integers = tables.plane, tables.work, tables.scalars, tables.integers
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
-        if basin["kind"] != SHALLOW_FACES and basin["kind"] != CARRIED_FACES:
+        if basin["carried"] < 0 or basin["nx"] > 0:
             continue
         n, flows = basin["n"], plane if is_given(basin) else work
         flow = flows[basin["flows"] : basin["flows"] + basin["faces"]]
