@@ -13,7 +13,7 @@ from fvsolve.kernels import records as rec
 def lower_basins(draft) -> None:
     """Fill the tables of basins and their patches, and states for their cells."""
     case = draft.case
-    draft.basins = [physics_of(case.nodes[name])(case, name) for name in case.meshes]
+    draft.basins = [lowered_by(case.nodes[name].own)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
     for basin, row in zip(draft.basins, draft.basin_table, strict=True):
         basin.lower_common(draft, row)
@@ -24,9 +24,9 @@ def lower_basins(draft) -> None:
         draft.basins[row["basin"]].lower_patch(draft, place.patch, row)
 
 
-def physics_of(part) -> type:
-    """What lowers a basin: the class of its physics in the module `lower` beside what declares this."""
-    home = part.own.__module__.rpartition(".")[0]
+def lowered_by(physics: type) -> type:
+    """The class by which a physics lowers its basins: of the module `lower` beside what declares it."""
+    home = physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
     return import_module("fvsolve.basins.lower_basin").Basin.physics[home]
 

@@ -65,19 +65,19 @@ class Basin:
 
     def scales(self) -> list[float]:
         """What counts as a small deviation of each quantity."""
-        raise NotImplementedError
+        return [1.0] * len(self.quantities)
 
     def start(self) -> np.ndarray:
         """Deviations at the start : float64[quantities, n]."""
-        raise NotImplementedError
+        return np.zeros((len(self.quantities), self.n))
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """What cells hold at deviations float64[quantities, n], SI."""
-        raise NotImplementedError
+        return {}
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Least and greatest of what tells of its waves at the start, SI."""
-        raise NotImplementedError
+        return {}
 
     def pace(self, y: np.ndarray) -> tuple[float, float]:
         """Greatest rate [1/s] of its waves, or of what it carries, at a model's state y, and the share of x in it."""
@@ -120,7 +120,7 @@ class Basin:
 
     def mass(self) -> tuple[float, np.ndarray]:
         """Mass of the start's profile [kg], and mass per deviation of the first quantity : float64[n]."""
-        raise NotImplementedError
+        return 0.0, np.zeros(self.n)
 
     def weights(self, y: np.ndarray) -> np.ndarray:
         """Weights w of small deviations d from y that store w d^2 : float64[quantities, n]."""
@@ -301,7 +301,7 @@ class Basin:
 
     def held(self) -> np.ndarray:
         """Mass that holds a scalar, per depth : float64[n] [kg/m]."""
-        raise NotImplementedError
+        return np.zeros(self.n)
 
     def lower_patch(self, draft, patch: str, row) -> None:
         """Fill the row of a patch that links may join."""

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.basins.free_surface import faces as shallow_faces
-from fvsolve.basins.free_surface import grid as shallow
+from fvsolve.basins.free_surface import faces, grid
 from fvsolve.basins.free_surface.lower_dispersion import notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
@@ -71,7 +70,7 @@ class FreeSurface(Basin):
         return [SCALE, flow, flow]
 
     def lower(self, draft, row) -> None:
-        plan = np.zeros((shallow.PLANS, self.n))
+        plan = np.zeros((grid.PLANS, self.n))
         plan[0], plan[1] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
         part, weight = self.part, self.case.properties.density * self.case.gravity
         row["rest"] = weight * (part.level + (part.elevation or 0.0))
@@ -87,11 +86,11 @@ class FreeSurface(Basin):
     def lower_grid(self, draft, row) -> None:
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
         row["unsplit"] = SHORES if dry and self.fifth else UNSPLIT
-        row["work"] = draft.to_work(shallow.WORK)
+        row["work"] = draft.to_work(grid.WORK)
 
     def lower_faces(self, draft, row) -> None:
         row["unsplit"] = UNSPLIT
-        row["work"] = draft.to_work(shallow_faces.work_size(self.integers))
+        row["work"] = draft.to_work(faces.work_size(self.integers))
 
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start

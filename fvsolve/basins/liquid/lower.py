@@ -7,9 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.basins.liquid import faces as liquid_faces
-from fvsolve.basins.liquid import grid as liquid
-from fvsolve.basins.liquid import grid_full as liquid_log
+from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.liquid.observe import PRESSURE
 from fvsolve.basins.lower_basin import Basin
 from fvsolve.basins.lower_pieces import MARKED
@@ -76,10 +74,10 @@ class Liquid(Basin):
         if self.waves is not None:
             self.lower_waves(draft, row)
         if self.is_grid:
-            size = (liquid if self.linear else liquid_log).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
+            size = (grid if self.linear else grid_full).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
             row["work"] = draft.to_work(size)
         else:
-            row["work"] = draft.to_work(liquid_faces.work_size(self.integers))
+            row["work"] = draft.to_work(faces.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
         """The table of its waves; a wall cannot make them quicker than the fluid's own."""
@@ -145,6 +143,3 @@ class Liquid(Basin):
         rest = self.part.pressure - self.case.ambient_pressure + rho * self.case.gravity * height
         square = (rest + self.speed**2 * y[0]) ** 2 / self.speed**2 + y[1] ** 2 + y[2] ** 2
         return float(0.5 * self.part.thickness / rho * np.sum(self.mesh.area * square))
-
-    def held(self) -> np.ndarray:
-        return np.zeros(self.n)

@@ -79,26 +79,8 @@ class Transport(Basin):
             draft.check()
             raise
 
-    def scales(self) -> list[float]:
-        return []
-
-    def start(self) -> np.ndarray:
-        return np.zeros((0, self.n))
-
     def pace(self, y: np.ndarray) -> tuple[float, float]:
         return float(self.row["fastest"]), self.share
-
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        return {}
-
-    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
-        raise NotImplementedError(field)  # there are scalars alone
-
-    def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
-        return {}
-
-    def mass(self) -> tuple[float, np.ndarray]:
-        return 0.0, np.zeros(self.n)
 
     def held(self) -> np.ndarray:
         return self.row["density"] * self.row["thickness"] * self.mesh.area
