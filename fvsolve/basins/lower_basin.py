@@ -75,6 +75,10 @@ class Basin:
         """What cells hold at deviations float64[quantities, n], SI."""
         return {}
 
+    def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Height of what lies below it at points [m]."""
+        return np.full(x.shape, self.part.elevation or 0.0)
+
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Least and greatest of what tells of its waves at the start, SI."""
         return {}

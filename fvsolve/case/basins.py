@@ -160,27 +160,12 @@ def means(found: np.ndarray) -> np.ndarray:
     return np.where(np.ptp(found, axis=0) > 0.0, mean, found[0])
 
 
-def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
-    """Height of the bed above the elevation, its mean over each cell : float64[n] [m]."""
-    return means(samples(basin.bed, mesh))
-
-
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
-    """Patches as places, at the mean height of the bed behind them that is under water, or of the lowest of it."""
-    found, bed = {}, bed_of(basin, mesh)
+    """Patches as places, at rest."""
+    found = {}
     for patch in patch_names(mesh):
-        cells = behind(mesh, patch)
-        level = np.inf if basin.level is None else basin.level
-        cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(level, -np.inf))]  # with water, or the lowest
-        height = float(np.average(bed[cells], weights=mesh.area[cells]))
-        depth = None
-        if basin.level is not None:
-            depth = float(np.average(np.maximum(basin.level - bed[cells], 0.0), weights=mesh.area[cells]))
-        stated = basin.elevation is not None or basin.bed is not None
-        found[f"{name}.{patch}"] = Place.model_construct(
-            elevation=(basin.elevation or 0.0) + height if stated else None, position=None, basin=name, patch=patch,
-            depth=depth, pressure=basin.pressure,
-        )  # fmt: skip
+        rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), behind(mesh, patch), mesh.area)
+        found[f"{name}.{patch}"] = Place.model_construct(position=None, basin=name, patch=patch, **rest)
     return found
 
 
@@ -215,22 +200,16 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
                 yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
             if one.impedance is not None and not own.echoes:
                 yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
-        shapes = {("bed",): basin.bed}
+        shapes = [*own.shapes(basin, meshes[name])]
         if basin.start is not None:
-            shapes |= {("start", what): getattr(basin.start, what) for what in Start.model_fields}
+            shapes += [(("start", what), getattr(basin.start, what), None) for what in Start.model_fields]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
-        shapes |= {("scalars", scalar): shape for scalar, shape in basin.scalars.items()}
-        if basin.velocity is not None:
-            given = basin.velocity.given.items()
-            shapes |= {("velocity", what): shape for what, shape in given if isinstance(shape, Formula)}
-        for below, shape in shapes.items():
+        shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
+        for below, shape, points in shapes:
             try:
-                if shape is None:
-                    continue
-                elif below[0] == "velocity":
-                    taken = meshes[name].points if below[1] == "stream" else meshes[name].middle
-                    shape.at(*np.ascontiguousarray(taken.T))
+                if points is not None:
+                    shape.at(*np.ascontiguousarray(points.T))
                 else:
                     samples(shape, meshes[name])
             except ValueError as error:

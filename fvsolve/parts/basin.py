@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from copy import copy
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
+
+import numpy as np
 
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.formula import Formula, Shaped, even
@@ -166,6 +169,23 @@ class Physics(Table):
         Physics.kinds[cls.name] = cls
         grow(Start, cls.starts)
         grow(Basin, cls)
+
+    @classmethod
+    def rest(
+        cls, basin: Basin, mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
+    ) -> dict[str, Any]:
+        """A patch at rest: its elevation [m], and depth of water [m] or pressure [Pa] in the cells behind it.
+
+        mean : of a formula, over all cells; cells : numbers of those behind; area : of all cells
+        """
+        return {"elevation": basin.elevation, "depth": None, "pressure": None}
+
+    @classmethod
+    def shapes(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
+        """Formulas of its own keys: (keys, formula, points where it is taken), None for all of cells."""
+        for key in cls.model_fields:
+            if isinstance(shape := getattr(basin, key), Formula):
+                yield (key,), shape, None
 
     @classmethod
     def own_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:

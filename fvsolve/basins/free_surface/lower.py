@@ -12,7 +12,7 @@ from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import Basin
 from fvsolve.basins.lower_pieces import MARKED
-from fvsolve.case.basins import bed_of, means, samples
+from fvsolve.case.basins import means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces
@@ -55,7 +55,7 @@ class FreeSurface(Basin):
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
-        self.bed = bed_of(self.part, self.mesh)
+        self.bed = self.formula(self.part.bed)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
 
     def pieces(self, valves: bool) -> Iterator[Pieces]:
@@ -111,6 +111,9 @@ class FreeSurface(Basin):
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.fields(y)["velocity"], np.sqrt(self.case.gravity * self.depth_of(y))
+
+    def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return super().ground(x, y) + (0.0 if self.part.bed is None else self.part.bed.at(x, y))
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         depth = self.depth + self.start()[0]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
 
 from fvsolve.parts.basin import MOVES, Moving, Physics
 from fvsolve.parts.formula import Formula, Shaped
@@ -46,3 +48,16 @@ class FreeSurface(Physics, name="free-surface"):
             Usual(0.002, 3.0, "glass to boulders"), VALUE,
         ),
     ] = None  # fmt: skip
+
+    @classmethod
+    def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
+        """At the mean height of the bed that is under water, or of the lowest of it."""
+        bed = mean(basin.bed)
+        cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(basin.level, -np.inf))]
+        height = float(np.average(bed[cells], weights=area[cells]))
+        stated = basin.elevation is not None or basin.bed is not None
+        return {
+            "elevation": (basin.elevation or 0.0) + height if stated else None,
+            "depth": float(np.average(np.maximum(basin.level - bed[cells], 0.0), weights=area[cells])),
+            "pressure": None,
+        }

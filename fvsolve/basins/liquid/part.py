@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.basin import MOVES, Moving, Physics
 from fvsolve.parts.formula import Formula, Shaped
@@ -28,3 +28,7 @@ class Liquid(Physics, name="liquid"):
     pressure: Annotated[float, Quantity("pressure", positive, "at rest [Pa]; liquid, needed there")]
     thickness: Annotated[float, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")]
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "of a liquid [m/s]; the fluid's own if left out")] = None
+
+    @classmethod
+    def rest(cls, basin, *behind: Any) -> dict[str, Any]:
+        return super().rest(basin, *behind) | {"pressure": basin.pressure}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from fvsolve.errors import listing
 from fvsolve.parts.basin import File, Physics
-from fvsolve.parts.formula import Shaped
+from fvsolve.parts.formula import Formula, Shaped
 from fvsolve.parts.table import read_keys
 from fvsolve.parts.value import PROFILE, Misfit, Quantity, Rows, Setting, Text, Value, positive
 from fvsolve.units import show
@@ -84,3 +87,9 @@ class Transport(Physics, name="transport"):
 
     velocity: Annotated[Any, Flowing()]
     thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")] = None
+
+    @classmethod
+    def shapes(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], Formula, np.ndarray]]:
+        for what, shape in basin.velocity.given.items():
+            if isinstance(shape, Formula):
+                yield ("velocity", what), shape, mesh.points if what == "stream" else mesh.middle
