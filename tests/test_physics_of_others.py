@@ -7,6 +7,7 @@ import subprocess
 import sys
 from math import exp, factorial
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 from pytest import approx
@@ -15,8 +16,10 @@ from truth.scenes import WATER
 import fvsolve
 from fvsolve.basins.lower import lowered_by
 from fvsolve.basins.lower_basin import Basin as Lowered
+from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
 from fvsolve.parts.basin import Physics, Start
+from fvsolve.parts.value import Quantity
 
 SOURCES = {
     "part.py": '''
@@ -185,3 +188,16 @@ def test_every_physics_is_a_folder_that_lowers_itself():
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields) and set(one.starts.model_fields) <= set(Start.keys())
         assert issubclass(lowered_by(one), Lowered) and lowered_by(one) is not Lowered
+
+
+@pytest.mark.parametrize("key", ["pressure", "size"])  # of a liquid, of all basins
+def test_a_key_that_is_there_keeps_its_meaning(key):
+    keys = {"__annotations__": {key: Annotated[float, Quantity("time")]}, "__module__": __name__}
+    with pytest.raises(FvsolveError, match=f'"clock" declares {key} otherwise than a basin has it already'):
+        type(Physics)("Clock", (Physics,), keys, name="clock")
+    assert "clock" not in Physics.kinds and Basin.keys().count(key) == 1
+
+
+def test_a_name_that_is_there_is_taken():
+    with pytest.raises(FvsolveError, match='a physics "liquid" is there already'):
+        type(Physics)("Other", (Physics,), {"__module__": __name__}, name="liquid")

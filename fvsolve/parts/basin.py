@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic.fields import FieldInfo
 
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.formula import Formula, Shaped, even
@@ -137,9 +138,10 @@ class Place(Node):
 class Physics(Table):
     """What the cells of basins hold: its name in the file, keys of its own, and what goes with it.
 
-    One without a default must be given. Its folder has `lower.py` beside `part.py`, which see.
-    states : quantities of cells -> their units, the first is what is stored; fields : what can be read at a point
-    alike : keys of which one at most is given; starts : keys of `start`
+    A key without a default must be given; one that several physics have is the same in all. `lower.py` beside what
+    declares it turns it into rows of tables.
+    states : quantities of cells -> their units, the first is what is stored; fields : what can be read at a point, as
+    dimensions; starts : keys of `start`
     laws : of density that it goes with, all if left out; but : what that law meets, in words
     joined : whether links may join its patches; a given velocity passes others
     carries : whether it carries scalars; echoes : whether its boundary may have an impedance
@@ -150,7 +152,7 @@ class Physics(Table):
     name: ClassVar[str] = ""
     states: ClassVar[dict[str, str]] = {}
     fields: ClassVar[dict[str, str]] = {}
-    starts: ClassVar[type[Table]] = Start
+    starts: ClassVar[type[Table]] = Table
     laws: ClassVar[tuple[str, ...]] = ()
     but: ClassVar[str] = "basins"
     joined: ClassVar[bool] = True
@@ -166,9 +168,18 @@ class Physics(Table):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:
+        both = (Start, optional(cls.starts)), (Basin, optional(cls))
+        for table, keys in both:
+            for key in (key for key in keys if key in table.model_fields):
+                own, known = keys[key], table.model_fields[key]
+                if (own.metadata, own.default) != (known.metadata, known.default):
+                    said = f"physics {show(cls.name)} declares {key} otherwise than a basin has it already"
+                    raise FvsolveError(f"{said}; wanted the same, or another name")
+        for table, keys in both:
+            table.model_fields.update(keys)
+            table.model_rebuild(force=True)
         Physics.kinds[cls.name] = cls
-        grow(Start, cls.starts)
-        grow(Basin, cls)
+        Basin.__doc__ = "\n".join([ABOUT, "", *(f"{name}: {one.__doc__}" for name, one in Physics.kinds.items())])
 
     @classmethod
     def rest(
@@ -205,10 +216,7 @@ class Physics(Table):
 
 
 class Basin(Node, kind="basin"):
-    """Fields in the plane between walls, joined to the network by patches.
-
-    What its cells hold, and by which keys it says so, its physics declares.
-    """
+    """Fields in the plane between walls, joined to the network by patches."""
 
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
@@ -270,12 +278,15 @@ class Basin(Node, kind="basin"):
         return tuple(patches) if isinstance(patches, dict) else ()
 
 
-def grow(table: type[Table], other: type[Table]) -> None:
-    """Give a table the keys of another, which it may leave out."""
-    for key, info in other.model_fields.items():
-        table.model_fields[key] = found = copy(info)
-        found.default = None if info.is_required() else info.default
-    table.model_rebuild(force=True)
+ABOUT = Basin.__doc__  # to which every physics adds a line
+
+
+def optional(table: type[Table]) -> dict[str, FieldInfo]:
+    """The keys of a table, all of which may be left out."""
+    found = {key: copy(info) for key, info in table.model_fields.items()}
+    for info in found.values():
+        info.default = None if info.is_required() else info.default
+    return found
 
 
 for folder in sorted(Path(__file__).parents[1].glob("basins/*/part.py")):

@@ -18,7 +18,7 @@ class Surface(Moving):
 
 
 class FreeSurface(Physics, name="free-surface"):
-    """Shallow water: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
+    """h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
 
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **MOVES}

@@ -16,7 +16,7 @@ class Pushed(Moving):
 
 
 class Liquid(Physics, name="liquid"):
-    """Pressure waves: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0, under law linear without the product."""
+    """r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0."""
 
     states: ClassVar[dict[str, str]] = {"density": "kg/m3", "flow_x": "kg/(m2 s)", "flow_y": "kg/(m2 s)"}
     fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **MOVES}
