@@ -189,6 +189,13 @@ def carrying(velocity, mesh=None, **more) -> dict:
     return scene({"pool": pool}, {}, 0.1, MUSCL, [], 0.1) | {"scalars": {"dye": {}}}
 
 
+@pytest.mark.parametrize("key", ["u", "level"])
+def test_what_is_carried_starts_from_no_flow_of_its_own(key):
+    case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
+    with pytest.raises(CaseError, match=f'start.{key}: means nothing to physics "transport"'):
+        fvsolve.load(case)
+
+
 @pytest.mark.parametrize("length", [1.0, 6.0, 8.0, 10.0, 1000.0])
 @pytest.mark.parametrize("velocity", [
     {"stream": "0.1*sin(pi*x)*sin(pi*y)"},
