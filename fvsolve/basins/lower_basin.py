@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -137,6 +137,10 @@ class Basin:
     def notices(self, y: np.ndarray) -> list[Notice]:
         """What there is to know of deviations at the start."""
         return []
+
+    def watch(self, y: np.ndarray) -> Any:
+        """What watches a run from deviations y: it can `look` at (t, state), has `kept` numbers, makes `notices`."""
+        return None
 
     # ----------------------------------------------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.basins.free_surface import faces, grid
-from fvsolve.basins.free_surface.lower_dispersion import notices
+from fvsolve.basins.free_surface.lower_dispersion import Watch, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import Basin
@@ -145,6 +145,9 @@ class FreeSurface(Basin):
 
     def notices(self, y: np.ndarray) -> list[Notice]:
         return notices(self, y)
+
+    def watch(self, y: np.ndarray) -> Watch | None:
+        return None if self.notices(y) else Watch(self)
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

@@ -102,31 +102,23 @@ def notices(basin, y: np.ndarray) -> list[Notice]:
     return [notice(basin, found)] if found is not None and found.wrong > WRONG else []
 
 
-def surfaces(basins) -> list:
-    """Basins with a free surface."""
-    return [basin for basin in basins if basin.part.physics == "free-surface"]
-
-
 class Watch:
-    """The shortest waves of a run that matter, beside those that its start has been warned of."""
+    """The shortest waves of a run that matter, of one basin.
 
-    def __init__(self, model) -> None:
-        self.basins = surfaces(model.basins)
-        start = {basin.name: waves(basin, basin.of(model.start)) for basin in self.basins}
-        known = {name for name, one in start.items() if one is not None and one.wrong > WRONG}
-        self.basins = [basin for basin in self.basins if basin.name not in known]
-        self.found: dict[str, tuple[float, Waves]] = {}
+    kept : float64[4]  when they were seen, and what they were; nan where none were
+    """
+
+    def __init__(self, basin) -> None:
+        self.basin, self.kept = basin, np.full(4, np.nan)
 
     def look(self, t: float, y: np.ndarray) -> None:
-        """At a state."""
-        for basin in self.basins:
-            one = waves(basin, basin.of(y))
-            if one is None or not one.size > MATTERS:
-                continue
-            if basin.name not in self.found or one.wrong > self.found[basin.name][1].wrong:
-                self.found[basin.name] = t, one
+        """At a model's state."""
+        one = waves(self.basin, self.basin.of(y))
+        if one is not None and one.size > MATTERS and not one.wrong <= Waves(*self.kept[1:]).wrong:
+            self.kept[:] = t, *one
 
-    def warnings(self) -> list[Notice]:
-        """One for each basin where they are too short."""
-        found = [(basin, *self.found[basin.name]) for basin in self.basins if basin.name in self.found]
-        return [notice(basin, one, f", at {t:.4g} s") for basin, t, one in found if one.wrong > WRONG]
+    def notices(self) -> list[Notice]:
+        """That they are too short, where they are."""
+        t, *found = self.kept.tolist()
+        one = Waves(*found)
+        return [notice(self.basin, one, f", at {t:.4g} s")] if one.wrong > WRONG else []
