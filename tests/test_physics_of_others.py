@@ -18,14 +18,14 @@ from fvsolve.basins.lower import lowered_by
 from fvsolve.basins.lower_basin import Basin as Lowered
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import Physics, Start
+from fvsolve.parts.basin.part import Physics, Start
 from fvsolve.parts.value import Quantity
 
 SOURCES = {
     "part.py": '''
 """Heat on a belt. Knows its keys."""
 from typing import Annotated, ClassVar
-from fvsolve.parts.basin import Physics
+from fvsolve.parts.basin.part import Physics
 from fvsolve.parts.formula import Formula, Shaped
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, positive

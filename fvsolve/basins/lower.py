@@ -6,7 +6,6 @@ from importlib import import_module
 
 import numpy as np
 
-from fvsolve.basins.lower_place import Patch  # noqa: F401  (to be found among the kinds of places)
 from fvsolve.kernels import records as rec
 
 

@@ -17,7 +17,7 @@ from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import Place, Start
+from fvsolve.parts.basin.part import Place, Start
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show

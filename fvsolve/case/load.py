@@ -20,7 +20,7 @@ from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
-from fvsolve.parts.basin import Place
+from fvsolve.parts.basin.part import Place
 from fvsolve.parts.meant import MEANT
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled

@@ -10,7 +10,7 @@ from fvsolve.case.size import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, named
 from fvsolve.parts import KINDS, Basin
-from fvsolve.parts.basin import MOVES, Physics
+from fvsolve.parts.basin.part import MOVES, Physics
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]

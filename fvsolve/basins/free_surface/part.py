@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.basin import MOVES, Moving, Physics
+from fvsolve.parts.basin.part import MOVES, Moving, Physics
 from fvsolve.parts.formula import Formula, Shaped
 from fvsolve.parts.value import VALUE, Quantity, Usual, anything, nonnegative
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.basin import MOVES, Moving, Physics
+from fvsolve.parts.basin.part import MOVES, Moving, Physics
 from fvsolve.parts.formula import Formula, Shaped
 from fvsolve.parts.value import Quantity, positive
 

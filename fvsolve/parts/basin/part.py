@@ -289,5 +289,5 @@ def optional(table: type[Table]) -> dict[str, FieldInfo]:
     return found
 
 
-for folder in sorted(Path(__file__).parents[1].glob("basins/*/part.py")):
+for folder in sorted(Path(__file__).parents[2].glob("basins/*/part.py")):
     import_module(f"fvsolve.basins.{folder.parent.name}.part")
