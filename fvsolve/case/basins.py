@@ -186,7 +186,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         own = basin.own
         if fluid is not None and not own.goes(fluid.law):
             wanted = named(lambda law, own=own: own.goes(law.name))
-            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.but}; wanted {wanted}"
+            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.described}; wanted {wanted}"
         if name not in meshes:
             continue
         known = patch_names(meshes[name])

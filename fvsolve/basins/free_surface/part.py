@@ -25,7 +25,7 @@ class FreeSurface(Physics, name="free-surface"):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
     starts: ClassVar[type[Moving]] = Surface
     laws: ClassVar[tuple[str, ...]] = ("linear",)
-    but: ClassVar[str] = "a free surface, whose water has one density"
+    described: ClassVar[str] = "a free surface, whose water has one density"
     steep: ClassVar[bool] = True
 
     level: Annotated[

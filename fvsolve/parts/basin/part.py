@@ -142,7 +142,7 @@ class Physics(Table):
     declares it turns it into rows of tables.
     states : quantities of cells -> their units, the first is what is stored; fields : what can be read at a point, as
     dimensions; starts : keys of `start`
-    laws : of density that it goes with, all if left out; but : what that law meets, in words
+    laws : of density that it goes with, all if left out; described : what other laws do not go with, in words
     joined : whether links may join its patches; a given velocity passes others
     carries : whether it carries scalars; echoes : whether its boundary may have an impedance
     steep : whether its fronts steepen into jumps that keep, and smooth flow in the plane is of second order at most
@@ -154,7 +154,7 @@ class Physics(Table):
     fields: ClassVar[dict[str, str]] = {}
     starts: ClassVar[type[Table]] = Table
     laws: ClassVar[tuple[str, ...]] = ()
-    but: ClassVar[str] = "basins"
+    described: ClassVar[str] = "basins"
     joined: ClassVar[bool] = True
     carries: ClassVar[bool] = True
     echoes: ClassVar[bool] = False
@@ -257,9 +257,8 @@ class Basin(Node, kind="basin"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         physics = given.get("physics", cls.model_fields["physics"].default)
-        faults = (
-            Physics.kinds[physics].own_faults(given) if isinstance(physics, str) and physics in Physics.kinds else []
-        )
+        known = isinstance(physics, str) and physics in Physics.kinds
+        faults = Physics.kinds[physics].own_faults(given) if known else []
         if "mesh" in given:
             faults += [((key,), "goes with rectangles; the basin has a mesh") for key in OUTLINE if key in given]
         else:
