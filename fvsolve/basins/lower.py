@@ -27,7 +27,7 @@ def lowered_by(physics: type) -> type:
     """The class by which a physics lowers its basins: of the module `lower` beside what declares it."""
     home = physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
-    return import_module("fvsolve.basins.lower_basin").Basin.physics[home]
+    return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 
 
 def at_start(basins: list, size: int) -> np.ndarray:

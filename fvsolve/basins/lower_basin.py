@@ -31,10 +31,10 @@ ROUNDING = 1e-12  # of rates
 VELOCITIES = {"u": U, "v": V, "speed": SPEED}
 
 
-class Basin:
+class BasinRows:
     """A basin of a model: its part, its mesh, and its row once it is lowered."""
 
-    physics: ClassVar[dict[str, type[Basin]]] = {}  # by the package that declares it
+    physics: ClassVar[dict[str, type[BasinRows]]] = {}  # by the package that declares it
     units: ClassVar[dict[str, str]] = {}  # of fields
     deep: ClassVar[bool] = False  # whether its first quantity is a depth, over that in `plan`, that holds scalars
     given: ClassVar[bool] = False  # whether flows through its faces are those of a given velocity
@@ -42,7 +42,7 @@ class Basin:
     gathers: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls) -> None:
-        Basin.physics[cls.__module__.rpartition(".")[0]] = cls
+        BasinRows.physics[cls.__module__.rpartition(".")[0]] = cls
 
     def __init__(self, case, name: str) -> None:
         self.case, self.name, self.part, self.mesh = case, name, case.nodes[name], case.meshes[name]
@@ -143,6 +143,11 @@ class Basin:
         return None
 
     # ----------------------------------------------------------------------------------------------------------
+
+    @property
+    def reach(self) -> int:
+        """Cells either way that the rates of one look at."""
+        return SCHEMES[self.scheme].reach.behind
 
     @property
     def fifth(self) -> bool:

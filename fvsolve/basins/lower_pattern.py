@@ -6,7 +6,6 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array, kron
 
 from fvsolve.kernels import records as rec
-from fvsolve.schemes import SCHEMES
 
 WIDE = 3  # cells either way that the fifth order looks at
 
@@ -62,7 +61,7 @@ def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndar
 
 def neighbours(basin) -> csr_array:
     """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
-    found, reach = csr_array(eye_array(basin.n, dtype=bool)), SCHEMES[basin.scheme].reach.behind
+    found, reach = csr_array(eye_array(basin.n, dtype=bool)), basin.reach
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
     if reach < WIDE or not basin.far_ends or not basin.row["outer_given"]:
         edge = edge[:0]

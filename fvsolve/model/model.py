@@ -19,7 +19,7 @@ from fvsolve.shown import Shown
 from fvsolve.units import show
 
 if TYPE_CHECKING:
-    from fvsolve.basins.lower_basin import Basin
+    from fvsolve.basins.lower_basin import BasinRows
     from fvsolve.case import Case
 
 
@@ -127,7 +127,7 @@ class Model(Shown):
     laws: list[str]  # modules of compiled laws of parts, as rows of `hooks` lie
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
-    basins: list[Basin]  # as their table has them
+    basins: list[BasinRows]  # as their table has them
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
 
     picture = "fvsolve.draw.objects:model_figure"

@@ -10,7 +10,7 @@ from fvsolve.basins.free_surface import faces, grid
 from fvsolve.basins.free_surface.lower_dispersion import Watch, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
-from fvsolve.basins.lower_basin import Basin
+from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.lower_pieces import MARKED
 from fvsolve.case.basins import means, samples
 from fvsolve.errors import Notice
@@ -47,7 +47,7 @@ def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
     return np.maximum(still + (means(deep) - there) - follows * (still - there), 0.0)
 
 
-class FreeSurface(Basin):
+class FreeSurfaceRows(BasinRows):
     """Shallow water, states depth [m] and flows per width [m2/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}

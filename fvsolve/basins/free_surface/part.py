@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.basin.part import MOVES, Moving, Physics
+from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
 from fvsolve.parts.formula import Formula, Shaped
 from fvsolve.parts.value import VALUE, Quantity, Usual, anything, nonnegative
 
 
-class Surface(Moving):
+class SurfaceStart(MovingStart):
     """What it starts from where that is not rest."""
 
     level: Annotated[Formula | None, Shaped("length", "of the free surface above the elevation [m]")] = None
@@ -23,7 +23,7 @@ class FreeSurface(Physics, name="free-surface"):
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
     fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **MOVES}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
-    starts: ClassVar[type[Moving]] = Surface
+    starts: ClassVar[type[MovingStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     described: ClassVar[str] = "a free surface, whose water has one density"
     steep: ClassVar[bool] = True

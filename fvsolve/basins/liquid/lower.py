@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.liquid.observe import PRESSURE
-from fvsolve.basins.lower_basin import Basin
+from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.lower_pieces import MARKED
 from fvsolve.kernels.phases import Pieces
 
@@ -22,7 +22,7 @@ SCALE = 1e5  # [Pa]
 SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
 
 
-class Liquid(Basin):
+class LiquidRows(BasinRows):
     """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
 
     law linear: p = a^2 (rho - rho0); laws log, p = K ln(rho / rho0), and table with the full momentum flux.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.basin.part import MOVES, Moving, Physics
+from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
 from fvsolve.parts.formula import Formula, Shaped
 from fvsolve.parts.value import Quantity, positive
 
 
-class Pushed(Moving):
+class LiquidStart(MovingStart):
     """What it starts from where that is not rest."""
 
     pressure: Annotated[Formula | None, Shaped("pressure_drop", "of a liquid above that at rest [Pa]")] = None
@@ -20,7 +20,7 @@ class Liquid(Physics, name="liquid"):
 
     states: ClassVar[dict[str, str]] = {"density": "kg/m3", "flow_x": "kg/(m2 s)", "flow_y": "kg/(m2 s)"}
     fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **MOVES}
-    starts: ClassVar[type[Moving]] = Pushed
+    starts: ClassVar[type[MovingStart]] = LiquidStart
     laws: ClassVar[tuple[str, ...]] = ("linear", "log", "table")
     carries: ClassVar[bool] = False
     echoes: ClassVar[bool] = True

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.basins.lower_basin import Basin
+from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces
 
 
-class Transport(Basin):
+class TransportRows(BasinRows):
     """Nothing moves but what is carried; depth 1."""
 
     given = True

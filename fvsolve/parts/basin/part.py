@@ -111,7 +111,7 @@ class MeshFile(Table):
     unit: Annotated[str, Text("of its coordinates")] = "m"
 
 
-class Moving(Table):
+class MovingStart(Table):
     """What starts with a velocity."""
 
     u: Annotated[Formula, Shaped("velocity", "velocity along x [m/s]")] = even(0.0)

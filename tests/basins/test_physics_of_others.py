@@ -15,7 +15,7 @@ from truth.scenes import WATER
 
 import fvsolve
 from fvsolve.basins.lower import lowered_by
-from fvsolve.basins.lower_basin import Basin as Lowered
+from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
 from fvsolve.parts.basin.part import Physics, Start
@@ -81,10 +81,10 @@ def read(t, y, out, handle, values):
     "lower.py": '''
 """A belt lowered to rows of tables."""
 import numpy as np
-from fvsolve.basins.lower_basin import Basin
+from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.kernels.phases import Pieces
 
-class Belt(Basin):
+class BeltRows(BasinRows):
     """One state a cell."""
     units = {"heat": "K"}
 
@@ -187,7 +187,7 @@ def test_every_physics_is_a_folder_that_lowers_itself():
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields) and set(one.starts.model_fields) <= set(Start.keys())
-        assert issubclass(lowered_by(one), Lowered) and lowered_by(one) is not Lowered
+        assert issubclass(lowered_by(one), BasinRows) and lowered_by(one) is not BasinRows
 
 
 @pytest.mark.parametrize("key", ["pressure", "size"])  # of a liquid, of all basins
