@@ -26,8 +26,12 @@ class Liquid(Physics, name="liquid"):
     echoes: ClassVar[bool] = True
 
     pressure: Annotated[float, Quantity("pressure", positive, "at rest [Pa]; liquid, needed there")]
-    thickness: Annotated[float, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")]
-    wave_speed: Annotated[float | None, Quantity("velocity", positive, "of a liquid [m/s]; the fluid's own if left out")] = None
+    thickness: Annotated[
+        float, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
+    ]
+    wave_speed: Annotated[
+        float | None, Quantity("velocity", positive, "of a liquid [m/s]; the fluid's own if left out")
+    ] = None
 
     @classmethod
     def rest(cls, basin, *behind: Any) -> dict[str, Any]:

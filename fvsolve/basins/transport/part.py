@@ -86,7 +86,9 @@ class Transport(Physics, name="transport"):
     joined: ClassVar[bool] = False
 
     velocity: Annotated[Any, Flowing()]
-    thickness: Annotated[float | None, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")] = None
+    thickness: Annotated[
+        float | None, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
+    ] = None
 
     @classmethod
     def shapes(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], Formula, np.ndarray]]:
