@@ -29,8 +29,10 @@ DIGEST = hashlib.sha256().digest_size
 KEPT = 3  # generations of compiled code kept beside the present one
 
 PACKAGE = Path(__file__).resolve().parent
-# What compiled code can depend on: the laws of parts, the rooms that compile and, by contract, all they may import.
+# What compiled code can depend on: the rooms that compile and, by contract, all they may import; of parts the laws, of
+# basins all but declarations and what lowers them.
 ROOMS = ("kernels", "steppers", "jit", "units", "errors")
+PYTHON = ("part", "lower")  # what names of files of basins begin with that compile nothing
 OUTSIDE: dict[Path, str] = {}  # folders whose sources may be compiled and cached too, and where below the code folder
 MAKING = threading.RLock()  # held while compiled functions are made
 SETTING = threading.Lock()  # held while numba is told of a folder
@@ -164,7 +166,8 @@ def beside(code: str, cached: str):
 def _sources() -> tuple[Path, ...]:
     rooms = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")]
     modules = [path for room in ROOMS if (path := PACKAGE / f"{room}.py").is_file()]
-    return tuple(sorted([*rooms, *modules, *(PACKAGE / "parts").rglob("law*.py")]))
+    basins = [path for path in (PACKAGE / "basins").rglob("*.py") if not path.name.startswith(PYTHON)]
+    return tuple(sorted([*rooms, *modules, *(PACKAGE / "parts").rglob("law*.py"), *basins]))
 
 
 @functools.cache

@@ -15,9 +15,9 @@ import numpy as np
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
-from fvsolve.fluid.laws import LAWS, named
+from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
-from fvsolve.parts.basin import Place
+from fvsolve.parts.basin.part import Place, Start
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show
@@ -160,27 +160,12 @@ def means(found: np.ndarray) -> np.ndarray:
     return np.where(np.ptp(found, axis=0) > 0.0, mean, found[0])
 
 
-def bed_of(basin: Basin, mesh: Mesh) -> np.ndarray:
-    """Height of the bed above the elevation, its mean over each cell : float64[n] [m]."""
-    return means(samples(basin.bed, mesh))
-
-
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
-    """Patches as places, at the mean height of the bed behind them that is under water, or of the lowest of it."""
-    found, bed = {}, bed_of(basin, mesh)
+    """Patches as places, at rest."""
+    found = {}
     for patch in patch_names(mesh):
-        cells = behind(mesh, patch)
-        level = np.inf if basin.level is None else basin.level
-        cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(level, -np.inf))]  # with water, or the lowest
-        height = float(np.average(bed[cells], weights=mesh.area[cells]))
-        depth = None
-        if basin.level is not None:
-            depth = float(np.average(np.maximum(basin.level - bed[cells], 0.0), weights=mesh.area[cells]))
-        stated = basin.elevation is not None or basin.bed is not None
-        found[f"{name}.{patch}"] = Place.model_construct(
-            elevation=(basin.elevation or 0.0) + height if stated else None, position=None, basin=name, patch=patch,
-            depth=depth, pressure=basin.pressure,
-        )  # fmt: skip
+        rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), behind(mesh, patch), mesh.area)
+        found[f"{name}.{patch}"] = Place.model_construct(position=None, basin=name, patch=patch, **rest)
     return found
 
 
@@ -198,40 +183,33 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
         key = ("nodes", name)
-        if fluid is not None and basin.physics not in LAWS[fluid.law].basins:
-            what = {"free-surface": "a free surface, whose water has one density"}.get(basin.physics, "basins")
-            wanted = named(lambda law, physics=basin.physics: physics in law.basins)
-            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {what}; wanted {wanted}"
+        own = basin.own
+        if fluid is not None and not own.goes(fluid.law):
+            wanted = named(lambda law, own=own: own.goes(law.name))
+            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.described}; wanted {wanted}"
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"
-            elif f"{name}.{patch}" in joined and basin.physics == "transport":
+            elif f"{name}.{patch}" in joined and not own.joined:
                 yield (*key, "patches", patch), "a link joins here, but what flows is given by velocity"
             elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:
                 what = "boundary" if one.boundary else "impedance"
                 yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
-            if one.impedance is not None and basin.physics != "liquid":
+            if one.impedance is not None and not own.echoes:
                 yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
-        shapes = {("bed",): basin.bed}
+        shapes = [*own.shapes(basin, meshes[name])]
         if basin.start is not None:
-            shapes |= {("start", what): getattr(basin.start, what) for what in ("level", "pressure", "u", "v")}
-            other = {"free-surface": "pressure", "liquid": "level", "transport": "u"}[basin.physics]
-            if getattr(basin.start, other) is not None:
+            shapes += [(("start", what), getattr(basin.start, what), None) for what in Start.model_fields]
+            for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
-        shapes |= {("scalars", scalar): shape for scalar, shape in basin.scalars.items()}
-        if basin.velocity is not None:
-            given = basin.velocity.given.items()
-            shapes |= {("velocity", what): shape for what, shape in given if isinstance(shape, Formula)}
-        for below, shape in shapes.items():
+        shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
+        for below, shape, points in shapes:
             try:
-                if shape is None:
-                    continue
-                elif below[0] == "velocity":
-                    taken = meshes[name].points if below[1] == "stream" else meshes[name].middle
-                    shape.at(*np.ascontiguousarray(taken.T))
+                if points is not None:
+                    shape.at(*np.ascontiguousarray(points.T))
                 else:
                     samples(shape, meshes[name])
             except ValueError as error:

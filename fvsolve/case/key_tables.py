@@ -16,7 +16,7 @@ from fvsolve.case.sections import FluidSpec, Line, Numerics, Output
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
-from fvsolve.parts.basin import Patch, Start
+from fvsolve.parts.basin.part import Patch, Start
 from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort

@@ -20,7 +20,7 @@ from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
-from fvsolve.parts.basin import Place
+from fvsolve.parts.basin.part import Place
 from fvsolve.parts.meant import MEANT
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
@@ -119,8 +119,8 @@ class _Reader:
                 kinds["nodes"][name] = None  # at fault itself
             if name in meshes:
                 pool = parts["nodes"][name]
-                own = {} if pool.physics == "liquid" else dict.fromkeys(carried, "number")
-                kinds["nodes"][name] = basins.Pool(pool.fields() | own, meshes[name])
+                own = dict.fromkeys(carried, "number") if pool.own.carries else {}
+                kinds["nodes"][name] = basins.Pool(pool.own.fields | own, meshes[name])
                 kinds["nodes"] |= {f"{name}.{patch}": Place for patch in basins.patch_names(meshes[name])}
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
@@ -133,7 +133,7 @@ class _Reader:
             self.add(check.cavities(numerics, has_cells, properties))
             self.add(basins.misfits(*parts.values(), meshes, properties))
             self.add(check.claims(expect, numerics))
-            carries = bool(carried) and any(parts["nodes"][name].physics != "liquid" for name in meshes)
+            carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
             numerics = numerics.filled(has_cells, carries)
         self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)

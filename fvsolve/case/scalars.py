@@ -10,18 +10,19 @@ from fvsolve.case.size import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, named
 from fvsolve.parts import KINDS, Basin
+from fvsolve.parts.basin.part import MOVES, Physics
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
 
-TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure", "depth", "bed",
-         "surface"}  # fmt: skip
+TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure"}
 
 
 def taken() -> set[str]:
-    """Names with a meaning of their own: what is written, and quantities of parts."""
+    """Names with a meaning of their own: what is written, quantities of parts, and fields of basins but velocities."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
-    return TAKEN | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
+    fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in MOVES}
+    return TAKEN | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
 def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
@@ -38,14 +39,15 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
             for scalar, value in getattr(part, "scalars", {}).items():
                 if (said := _wrong(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), said
-            if scalars and getattr(part, "physics", "") == "liquid":
-                yield (group, name), "is a basin of liquid, whose waves carry no scalars; wanted a free surface"
+            if scalars and isinstance(part, Basin) and not part.own.carries:
+                said = f"is a basin of {part.physics}, whose waves carry no scalars; wanted a free surface"
+                yield (group, name), said
             for patch, one in getattr(part, "patches", {}).items():
                 for scalar in one.scalars:
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown(scalar, scalars)
-                    elif part.physics != "transport" and one.boundary != "open":
+                    elif part.own.joined and one.boundary != "open":
                         yield place, 'comes with what links bring; it goes with a given velocity or boundary = "open"'
             if scalars and part.no_scalars:
                 article = "an" if part.kind[0] in "aeiou" else "a"

@@ -1,7 +1,7 @@
 """Density laws: what each can carry, and how density, head and mass hang on pressure. Knows one fluid; knows no scene.
 
 A law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their own
-(`model.basins.liquid`). What is asked of a law elsewhere is asked by these names, never by its own.
+(`basins.liquid.lower`). What is asked of a law elsewhere is asked by these names, never by its own.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Law:
 
     name, code : as case files and as kernels say it
     linear : waves add up: no state changes their speed or what they carry; pressure is linear in mass and in head
-    scalars : whether its flows carry any; basins : physics that it goes with
+    scalars : whether its flows carry any
     tabulated : whether it reads CoolProp's own density; keys : of [fluid] that no other law knows
     """
 
@@ -39,7 +39,6 @@ class Law:
     code: ClassVar[int]
     linear: ClassVar[bool] = False
     scalars: ClassVar[bool] = False
-    basins: ClassVar[tuple[str, ...]] = ("transport",)
     tabulated: ClassVar[bool] = False
     keys: ClassVar[tuple[str, ...]] = ()
 
@@ -108,7 +107,7 @@ class Law:
 class LinearLaw(Law, name="linear"):
     """One density, but that mass and pressure of what is squeezed are linear in each other."""
 
-    code, linear, scalars, basins = rec.LAW_LINEAR, True, True, ("free-surface", "liquid", "transport")
+    code, linear, scalars = rec.LAW_LINEAR, True, True
 
     def density(self, pressure):
         """Density [kg/m3] of what flows, at pressures."""
@@ -210,13 +209,13 @@ class DenseLaw(Law):
 class LogLaw(DenseLaw, name="log"):
     """p = p_ref + beta ln(rho / rho_ref): one bulk modulus."""
 
-    code, basins = rec.LAW_LOG, ("liquid", "transport")
+    code = rec.LAW_LOG
 
 
 class TableLaw(DenseLaw, name="table"):
     """CoolProp's own density along the isentrope through the reference state."""
 
-    code, tabulated, basins = rec.LAW_TABLE, True, ("liquid", "transport")
+    code, tabulated = rec.LAW_TABLE, True
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:

@@ -6,7 +6,7 @@ from fvsolve.jit import beside, njit, once
 from fvsolve.kernels import calls
 from fvsolve.kernels.phases import CLOSING, PHASES, Cast
 
-READERS = "from fvsolve.kernels.functions import Cast, compile_readers; "
+READERS = "from fvsolve.kernels.phases import Cast, Pieces; from fvsolve.kernels.functions import compile_readers; "
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
 MOVING, READING = ("set", "move", "step", "slope", "lift"), ("value", "outside", "events", "bends")
 ENERGIES = ("power", "stored")
@@ -24,7 +24,7 @@ class Functions:
         self.cast, rates = cast, cast.functions(*PHASES)
         self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
         self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
-        others = "" if all(name.startswith("fvsolve.") for name in cast.laws) else "import fvsolve.parts; "
+        others = "" if all(name.startswith("fvsolve.") for name in cast.homes()) else "import fvsolve.parts; "
         with beside(f"{others}{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
             self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
             self.hang(*MOVING, *["lead"] * cast.columns)

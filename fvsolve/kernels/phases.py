@@ -11,24 +11,16 @@ from dataclasses import dataclass, fields
 from importlib import import_module
 
 from fvsolve.kernels.calls import hook_of
-from fvsolve.kernels.records import (
-    ACOUSTIC_GRID,
-    CARRIED_FACES,
-    CARRIED_GRID,
-    LIQUID_FACES,
-    LIQUID_GRID,
-    SHALLOW_FACES,
-    SHALLOW_GRID,
-    TABLE_FACES,
-    TABLE_GRID,
-)
 
 HOME = "fvsolve.kernels"
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """What one member of a scene adds: functions as `module: function`, "" for none; the phases first, in order."""
+    """What one member of a scene adds: functions as `module: function`, "" for none; the phases first, in order.
+
+    home : package of the modules
+    """
 
     prepare: str = ""  # what (t, y) alone tell: conductances, speeds, pressures of vessels
     offer: str = ""  # what pipes say of their ends
@@ -41,6 +33,7 @@ class Pieces:
     brake: str = ""  # rates that steps have to see; so far nodes are closed, which events ask for
     move: str = ""  # rates of what stands between nodes: columns, bodies, devices
     rates: str = ""  # of cells, in pipes and basins
+    enter: str = ""  # what comes into these by patches
     leave: str = ""  # values of scalars with which water leaves pipes and cells
     mix: str = ""  # and their values at nodes
     carry: str = ""  # rates of what is carried in cells
@@ -50,9 +43,10 @@ class Pieces:
     events: str = ""  # event functions
     power: str = ""
     stored: str = ""
+    home: str = HOME
 
 
-JOBS = tuple(field.name for field in fields(Pieces))
+JOBS = tuple(field.name for field in fields(Pieces) if field.name != "home")
 PHASES = JOBS[: JOBS.index("carry") + 1]
 CLOSING = PHASES[: PHASES.index("brake") + 1]
 
@@ -103,44 +97,12 @@ MEMBERS = {
         events="devices: device_events",
         power="devices: power_devices", stored="devices: stored_devices",
     ),
-    "basins": Pieces(
-        observe="plane.observe: observe_basins", power="plane.energy: add_power", stored="plane.energy: add_stored",
-    ),
-    "patches": Pieces(
-        prepare="plane.patches: patch_pressures", rates="plane.patches: patch_flows",
-        record="plane.patches: record_patches",
-    ),
-    "inflows": Pieces(brake="plane.patches: quickest_inflow"),
-    "patches, barotropic": Pieces(observe="plane.observe: observe_dense_flows"),
-    "patches, table": Pieces(
-        prepare="plane.table_rooms: table_pressures", observe="plane.table_rooms: observe_pressures"
-    ),
-    "values": Pieces(leave="plane.carried: patch_values", observe="plane.carried: observe_values"),
     "scalars": Pieces(leave="scalars: clear_losses", observe="scalars: observe_scalars"),
-    "mixed": Pieces(mix="scalars: mix_scalars"),
     "carried": Pieces(leave="scalars: leave_pipes", carry="scalars: carry_in_pipes"),
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
-GRIDS, MESHES = (SHALLOW_GRID, CARRIED_GRID), (SHALLOW_FACES, CARRIED_FACES)
-CARRIED = {  # scalars in basins: on grids, what fifth order adds there, and what spreads; on other meshes
-    "grids": Pieces(carry="plane.carried_grids: carry_on_grids"),
-    "fifth": Pieces(carry="plane.carried_grids: add_on_grids"),
-    "spread": Pieces(carry="plane.carried_grids: spread_on_grids"),
-    "meshes": Pieces(carry="plane.carried_faces: carry_on_meshes"),
-    "all": Pieces(carry="plane.carried: settle_amounts"),
-}  # fmt: skip
-BASINS = {  # kind of basin
-    SHALLOW_GRID: Pieces(rates="plane.rooms: shallow_grids"),
-    SHALLOW_FACES: Pieces(rates="plane.rooms: shallow_meshes"),
-    ACOUSTIC_GRID: Pieces(rates="plane.rooms: acoustic_grids"),
-    LIQUID_GRID: Pieces(rates="plane.rooms: liquid_grids"),
-    LIQUID_FACES: Pieces(rates="plane.rooms: liquid_meshes"),
-    TABLE_GRID: Pieces(rates="plane.table_rooms: table_grids"),
-    TABLE_FACES: Pieces(rates="plane.table_rooms: table_meshes"),
-    CARRIED_GRID: Pieces(observe="plane.carried: observe_given_flows"),
-    CARRIED_FACES: Pieces(observe="plane.carried: observe_given_flows"),
-}
+MIXED = Pieces(mix="scalars: mix_scalars")
 ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
 
 
@@ -148,9 +110,9 @@ ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
 class Cast:
     """What decides which functions a scene is made of.
 
-    family : of kernels that the density law runs on, "linear", "barotropic" or "cavitating"; basins : codes of the
-    kinds that there are; laws : modules of the laws of parts, as rows of `hooks` lie
-    fifth : order of what carries scalars on grids; spread : whether any scalar does
+    family : of kernels that the density law runs on, "linear", "barotropic" or "cavitating"; laws : modules of the laws
+    of parts, as rows of `hooks` lie
+    basins : of what basins consist, and with scalars of what carries these there; see `basins.lower_pieces`
     alone : whether there is nothing but basins, and no link
     """
 
@@ -162,10 +124,9 @@ class Cast:
     memory: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
-    basins: tuple[int, ...] = ()
+    basins: tuple[Pieces, ...] = ()
+    carried: tuple[Pieces, ...] = ()
     scalars: bool = False
-    fifth: bool = False
-    spread: bool = False
     valves: bool = False
     alone: bool = False
 
@@ -194,61 +155,33 @@ class Cast:
             yield MEMBERS["devices"]
         if self.memory:
             yield MEMBERS["memory" if linear else "memory, barotropic"]
-        yield from self.basin_members(linear)
-        if self.scalars:
-            yield from self.scalar_members()
+        yield from self.basins
+        if self.scalars:  # which the flow carries that rates of waves now have
+            yield MEMBERS["scalars"]
+            if not self.alone:
+                yield MIXED
+            if self.pipes:
+                yield MEMBERS["carried"]
+        yield from self.carried
         if self.pipes:
             yield MEMBERS["pipes"]
         yield ALWAYS
-
-    @property
-    def flowing(self) -> bool:
-        """Whether there is a basin whose flow is not given."""
-        return any(kind not in (CARRIED_GRID, CARRIED_FACES) for kind in self.basins)
-
-    def basin_members(self, linear: bool) -> Iterator[Pieces]:
-        """Of what its basins consist."""
-        for kind in self.basins:
-            yield BASINS[kind]
-        if self.basins:
-            yield MEMBERS["basins"]
-        if self.basins and not linear:
-            yield MEMBERS["patches, barotropic"]
-        if self.flowing:
-            yield MEMBERS["patches"]
-        if self.flowing and self.valves:
-            yield MEMBERS["inflows"]
-        if any(kind in (TABLE_GRID, TABLE_FACES) for kind in self.basins):
-            yield MEMBERS["patches, table"]
-
-    def scalar_members(self) -> Iterator[Pieces]:
-        """Of what carries its scalars: by the flow that rates of waves now have."""
-        if self.basins:
-            yield MEMBERS["values"]
-        yield MEMBERS["scalars"]
-        if self.flowing or not self.alone:
-            yield MEMBERS["mixed"]
-        if self.pipes:
-            yield MEMBERS["carried"]
-        if any(kind in GRIDS for kind in self.basins):
-            yield CARRIED["grids"]
-            yield CARRIED["fifth"] if self.fifth else Pieces()
-            yield CARRIED["spread"] if self.spread else Pieces()
-        if any(kind in MESHES for kind in self.basins):
-            yield CARRIED["meshes"]
-        if self.basins:
-            yield CARRIED["all"]
 
     def modules(self) -> list:
         """The laws of its parts."""
         return [import_module(name) for name in self.laws]
 
+    def homes(self) -> list[str]:
+        """The modules and packages that it names."""
+        return [*self.laws, *(member.home for member in self.basins)]
+
     def functions(self, *jobs: str) -> list:
         """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""
-        return [found(name) for job in jobs for member in self.members() if (name := getattr(member, job))]
+        members = dict.fromkeys(self.members())  # those that several basins ask for, once
+        return [found(member.home, name) for job in jobs for member in members if (name := getattr(member, job))]
 
 
-def found(name: str):
+def found(home: str, name: str):
     """The function of a name."""
     module, function = name.split(": ")
-    return getattr(import_module(module if module.startswith(HOME) else f"{HOME}.{module}"), function)
+    return getattr(import_module(f"{home}.{module}"), function)

@@ -307,7 +307,7 @@ PROBE = np.dtype(
     [
         ("kind", "i8"),
         ("index", "i8"),  # of the node, pipe, valve, column, body, push, piston or basin
-        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside; CELL_STATE: which of a basin's quantities
+        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside; CELL_FIELD: which, as its physics numbers them
         ("cell", "i8"),  # first of the cells that are read; of a basin, offset of their numbers in `integers`
         ("count", "i8"),  # how many
         ("weights", "i8"),  # offset of their weights in `floats`
@@ -322,21 +322,19 @@ PROBE = np.dtype(
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 NODE_SCALAR, PIPE_SCALAR = 13, 14
-CELL_STATE, CELL_DEPTH, CELL_U, CELL_V, CELL_SPEED, PATCH_FLOW, CELL_SCALAR = 15, 16, 17, 18, 19, 20, 21  # of basins
-GIVEN_FLOW = 22  # of a patch that a given velocity passes
-
-SHALLOW_GRID, SHALLOW_FACES, ACOUSTIC_GRID, LIQUID_GRID, LIQUID_FACES = range(5)
-TABLE_GRID, TABLE_FACES, CARRIED_GRID, CARRIED_FACES = range(5, 9)
-# kinds of basins: physics, and of a liquid law linear (on grids), log or table; grids or meshes of any cells
+CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
+GIVEN_FLOW = 18  # of a patch that a given velocity passes
 
 BASIN = np.dtype(
     [
-        ("kind", "i8"),
+        ("kind", "i8"),  # code of its physics, see `basins.kinds`
+        ("deep", "i8"),  # 1: its first quantity is a depth over that in `plan`, in which amounts of scalars are spread
+        ("given", "i8"),  # 1: flows through its faces are those of a given velocity, in `plane`; others are in `work`
         ("scheme", "i8"),
         ("limiter", "i8"),  # on rectangles
         ("wide", "f8"),  # on any mesh: how far values at sides of cells may go beyond those around
         ("n", "i8"),  # cells
-        ("nx", "i8"),
+        ("nx", "i8"),  # of a rectangle's columns and rows; 0 on any other mesh
         ("ny", "i8"),
         ("faces", "i8"),  # of a mesh, the last ones the boundary's
         ("outer", "i8"),  # how many of them these are

@@ -172,7 +172,7 @@ def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
             limit = plane_limit(scheme, method, share, basin.waving)
         else:
             limit = advection_limit(scheme, method).limit
-        fixed = basin.is_grid and basin.part.physics == "liquid" and model.case.law.linear
+        fixed = basin.is_grid and basin.even_paced
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
         if grows >= GROWS:
             rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from fvsolve.basins.lower import at_start, lower_basins
 from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import at_start, dispersion, lower_basins
 from fvsolve.model.bodies import lower_bodies
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
@@ -168,7 +168,8 @@ def model_of(draft: Draft) -> Model:
     inside = sorted(
         (t, jump) for t, jump in draft.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
     )
-    draft.warnings += [*dispersion.warnings(draft.basins, start), *coarse_for_cavities(draft), *flow_notices(draft)]
+    of_basins = [one for basin in draft.basins for one in basin.notices(basin.of(start))]
+    draft.warnings += [*of_basins, *coarse_for_cavities(draft), *flow_notices(draft)]
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,

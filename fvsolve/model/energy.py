@@ -9,7 +9,6 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins.energy import weights as basin_weights
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.scalars import bounds
 from fvsolve.model.unsteady import memory_shares
@@ -82,7 +81,7 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a body m v^2 / 2,
     a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
     its excess at y. Exact under `linear` about a profile at rest. Devices store what their `squares` say, cells of
-    basins what `model.basins.energy` says. A scalar stores nothing; a deviation of its amount, over the greatest value
+    basins what `basins.lower_energy` says. A scalar stores nothing; a deviation of its amount, over the greatest value
     that there can be, counts as 1e-6 of what so much mass would store, for nothing else hangs on it. Positions that
     nothing holds, one by one or together, store nothing: idle.
     """
@@ -160,7 +159,7 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         kept = slice(row["memory"], row["memory"] + shares.size * row["cells"])
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
     for basin in model.basins:
-        basin.of(found)[:] = basin_weights(basin, basin.of(y))
+        basin.of(found)[:] = basin.weights(basin.of(y))
         for q, amount in enumerate(basin.amounts(found) if basin.scalars else ()):
             amount[:] = CARRIED * 0.5 * basin.mesh.area / typical(model, q) ** 2
     for row in tables.nodes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins.energy import above as basin_above
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.model import Model
 from fvsolve.model.unsteady import memory_shares
@@ -42,7 +41,7 @@ def available(model: Model) -> dict[str, float]:
         if row["y"] >= 0:
             found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:
-        found[basin.name] = basin_above(basin, basin.of(model.start), datum)
+        found[basin.name] = basin.above(basin.of(model.start), datum)
     for (name, *_), row in zip(rows_in(model.case, "brace"), tables.braces, strict=True):
         if row["stiffness"] > 0.0:
             found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]

@@ -15,13 +15,12 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
-from fvsolve.schemes import SCHEMES
 from fvsolve.shown import Shown
 from fvsolve.units import show
 
 if TYPE_CHECKING:
+    from fvsolve.basins.lower_basin import BasinRows
     from fvsolve.case import Case
-    from fvsolve.model.basins.basin import Basin
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ class Model(Shown):
     laws: list[str]  # modules of compiled laws of parts, as rows of `hooks` lie
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
-    basins: list[Basin]  # as their table has them
+    basins: list[BasinRows]  # as their table has them
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
 
     picture = "fvsolve.draw.objects:model_figure"
@@ -186,18 +185,17 @@ class Model(Shown):
     @cached_property
     def functions(self):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
+        from fvsolve.basins.lower_pieces import of_basins, of_scalars
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.phases import Cast
 
         many = rec.Tables(*(len(table) > 0 for table in self.tables))
         there = [many.clusters, many.columns, many.bodies]
-        basins = tuple(int(kind) for kind in np.unique(self.tables.basins["kind"]))
-        spread, valves = bool(self.tables.scalars["diffusivity"].any()), many.valves
+        basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
-        alone = bool(basins and patches) and not (self.cells or valves or many.devices or any(there))
-        fifth = SCHEMES[self.case.numerics.scheme].on(True).order > 2
+        alone = bool(self.basins and patches) and not (self.cells or valves or many.devices or any(there))
         cast = Cast(self.case.law.family, self.cells > 0, *there, self.unsteady, many.devices, tuple(self.laws),
-                    basins, many.scalars, fifth, spread, valves, alone)  # fmt: skip
+                    basins, carried, many.scalars, valves, alone)  # fmt: skip
         return functions(cast)
 
     @property

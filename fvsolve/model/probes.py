@@ -46,13 +46,14 @@ def lower_point(draft, row, probe) -> None:
     if probe.quantity in draft.case.scalars:
         row["kind"], row["scalar"] = rec.CELL_SCALAR, list(draft.case.scalars).index(probe.quantity)
     else:
+        row["kind"] = rec.CELL_FIELD
         basin.lower_probe(row, probe.quantity, cells, weights)
 
 
 def probe_offsets(draft, start) -> None:
     """Scale and offset of every probe, once the profile is known."""
     for row, probe in zip(draft.probe_table, draft.case.probes, strict=True):
-        if row["kind"] >= rec.CELL_STATE:  # their profile is known to basins
+        if row["kind"] >= rec.CELL_FIELD:  # their profile is known to basins
             continue
         if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)

@@ -4,7 +4,7 @@ A pipe's cells depend on their neighbours as far as the scheme reaches. Where a 
 (its edge cells) is read by the node, and what the node makes of all offers together is read by the cells that look
 beyond the end. Tanks, chambers and given pressures part one group of nodes from the next: their pressure is their own,
 but for chambers of cylinders, whose pressure is that of their bodies too. Cells of a basin depend on those about them
-(`model.basins.pattern`), and a patch is a node whose pressure the cells behind it set.
+(`basins.lower_pattern`), and a patch is a node whose pressure the cells behind it set.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.basins import lower_pattern as pattern
 from fvsolve.kernels import records as rec
-from fvsolve.model.basins import pattern
 from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
 

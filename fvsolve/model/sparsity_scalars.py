@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.model.basins import pattern
+from fvsolve.basins import lower_pattern as pattern
 from fvsolve.model.scalars import STORES
 from fvsolve.model.sparsity import Pairs, ends_of, every, states
 from fvsolve.steady import union

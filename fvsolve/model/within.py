@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
 from fvsolve.model.scalars import STORES
 
 NOBODY = -1
@@ -27,14 +26,10 @@ def table(states, first, second, base, gain, least, most) -> tuple[np.ndarray, n
     return at, np.column_stack(np.broadcast_arrays(base, gain, least, most, np.zeros(len(at)))[:4])
 
 
-def water(basin) -> bool:
-    return int(basin.row["kind"]) <= rec.SHALLOW_FACES
-
-
 def depths(model):
     """The depth of water in cells is no less than none."""
     for basin in model.basins:
-        if water(basin):
+        if basin.deep:
             states = int(basin.row["y"]) + np.arange(basin.n)
             yield table(states, NOBODY, NOBODY, basin.depth, 0.0, -1.0, np.inf)
 
@@ -65,5 +60,5 @@ def in_basins(model, q: int):
         if basin.row["carried"] < 0:
             continue
         states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)
-        of = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if water(basin) else (NOBODY, 1.0)
+        of = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NOBODY, 1.0)
         yield table(states, of[0], NOBODY, of[1], 1.0, row["least"], row["greatest"])

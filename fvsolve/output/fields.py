@@ -134,10 +134,9 @@ def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
 
 def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
     """Corners float64[p, 3] [m] of a basin's cells, on their bed, and blocks of cells of a kind, in their order."""
-    mesh, part = basin.mesh, basin.part
+    mesh = basin.mesh
     x, y = np.ascontiguousarray(mesh.points.T)
-    bed = (part.elevation or 0.0) + (0.0 if part.bed is None else part.bed.at(x, y))
-    points = np.column_stack([origin[0] + x, origin[1] + y, np.broadcast_to(bed, x.shape)])
+    points = np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
     three = mesh.cells[:, 3] < 0
     ends = np.flatnonzero(np.diff(three)) + 1
     blocks = np.split(np.arange(len(three)), ends)

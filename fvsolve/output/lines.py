@@ -50,7 +50,7 @@ class LineReading:
     """Points on a line, and which cells are read there; nothing is in holes."""
 
     def __init__(self, said, basin, case) -> None:
-        self.basin, fields = said.basin, basin.part.fields()
+        self.basin, fields = said.basin, basin.part.own.fields
         share = np.linspace(0.0, 1.0, said.points)
         start, end = np.array(said.from_), np.array(said.to)
         points = start + share[:, None] * (end - start)

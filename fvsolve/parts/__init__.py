@@ -3,7 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
-from fvsolve.parts.basin import Basin
+from fvsolve.parts.basin.part import Basin
 from fvsolve.parts.chamber.part import Chamber
 from fvsolve.parts.cylinder.part import Cylinder
 from fvsolve.parts.damper.part import Damper

@@ -244,7 +244,7 @@ class Result(Shown):
         if field is None:
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
             basins = [node for node in self.case.nodes.values() if node.kind == "basin"]
-            field = "pressure" if pipes or not basins else next(iter(basins[0].fields()), "pressure")
+            field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
         out = Path(path) if path else self.directory / f"{field}{suffix}"
         frames, what = self._frames(), f"{self.summary['title']}\n{field.replace('_', ' ')}"
         view(

@@ -9,7 +9,6 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
-from fvsolve.model.basins.dispersion import Watch, Waves
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.solve.soundness import Soundness, parted
@@ -31,11 +30,6 @@ CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
 FEW = 16.0  # steps at a time where they are beyond a limit, so that growth is seen early
 PERSISTENT = ("extremes", "envelope", "marks", "armed")
-
-
-def flat(found: tuple[float, Waves] | None) -> list[float]:
-    """When the shortest waves of a basin were seen, and what they were; nan where none were."""
-    return [np.nan] * 4 if found is None else [found[0], *found[1]]
 
 
 class MemoryMisfit(RunError):
@@ -91,7 +85,8 @@ class Run:
         self.loop.now[:] = state.y
         self.loop.memory[slots.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.waves, self.soundness = Watch(model), Soundness(self.slate)
+        self.watches = [one for basin in model.basins if (one := basin.watch(basin.of(model.start)))]
+        self.soundness = Soundness(self.slate)
         if self.soundness.predicted:
             self.budget = FEW
         self.processor = 0.0  # seconds of CPU time of the steps of this process
@@ -114,7 +109,7 @@ class Run:
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
         crowd = self.loop.crowd
         own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
-        own += [x for one in self.waves.basins for x in flat(self.waves.found.get(one.name))]
+        own += [x for one in self.watches for x in one.kept]
         own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
         views = (view.ravel() for view in self.loop.stepper.memories())
         return np.concatenate([own, *views, *kept, self.soundness.halves.kept])
@@ -132,10 +127,8 @@ class Run:
         crowd, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.crowd.extend(crowd.tolist())
         self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
-        for basin in self.waves.basins:
-            (t, *one), memory = memory[:4].tolist(), memory[4:]
-            if t == t:
-                self.waves.found[basin.name] = t, Waves(*one)
+        for one in self.watches:
+            one.kept[:], memory = memory[: one.kept.size], memory[one.kept.size :]
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
         seen = self.soundness.halves.kept
@@ -177,8 +170,13 @@ class Run:
             if high[k + 1] > greatest[k]:
                 greatest[k], t_greatest[k] = high[k + 1], high[0]
 
+    def look(self, t: float, y: np.ndarray) -> None:
+        """Let what watches basins see a state."""
+        for one in self.watches:
+            one.look(t, y)
+
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
-        self.waves.look(t, y)
+        self.look(t, y)
         self.sink.field(t, self.slate.fields(y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
@@ -347,11 +345,12 @@ class Run:
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
         if reason == "finished":
-            self.waves.look(loop.t, loop.now)
+            self.look(loop.t, loop.now)
         ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
-        warnings = [*self.waves.warnings(), *self.soundness.warnings(ledgers), *run_downs(self.slate)]
+        told = [notice for one in self.watches for notice in one.notices()]
+        warnings = [*told, *self.soundness.warnings(ledgers), *run_downs(self.slate)]
         warnings += parted(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(

@@ -10,9 +10,9 @@ from pytest import approx
 from scipy.special import erfc
 from truth.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 
-from fvsolve.kernels.plane import diffusion
+from fvsolve.basins import diffusion
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
 from fvsolve.mesh import rectangle
-from fvsolve.model.velocity import face_flows, grid_flows
 
 TURN = {"expression": "rotation", "centre": (0.5, 0.5), "angular_velocity": 2.0 * np.pi}
 SWIRL = {"expression": "swirl"}

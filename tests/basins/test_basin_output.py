@@ -16,10 +16,11 @@ from truth.meshes import delaunay, shaken, write
 from truth.scenes import AMBIENT, GRAVITY, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.basins.liquid.observe import observe_liquid
+from fvsolve.basins.observe import observe_dense_flows, observe_flows
 from fvsolve.draw import view
 from fvsolve.draw.view import LABELS, digits, span
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.kernels.plane.observe import observe_basins, observe_dense_flows
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.points import MeshPoints
 from fvsolve.model import Slate
@@ -130,7 +131,7 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
     y = random_state(model, 1e-3)
     found = np.zeros(len(probes))
     slate = Slate(model)
-    observe_basins(0.0, y, model.new_out(), slate.handle, found)
+    observe_liquid(0.0, y, model.new_out(), slate.handle, found)
     frame = model.fields(y, model.new_out())["block"]
     for k, values in zip(cells, found.reshape(-1, 4), strict=True):
         u, v, _ = frame["velocity"][k]
@@ -165,7 +166,7 @@ def test_the_flow_of_a_patch_has_the_density_of_its_place():
     out[int(model.layout["net"]) + node] = -3.0
     out[int(model.layout["pressure"]) + node] = 3e7 - model.tables.nodes[node]["pressure"]
     slate = Slate(model)
-    observe_basins(0.0, model.start, out, slate.handle, found)
+    observe_flows(0.0, model.start, out, slate.handle, found)
     assert found[0] == approx(-3.0 / RHO, rel=1e-14)
     observe_dense_flows(0.0, model.start, out, slate.handle, found)
     assert found[0] == approx(-3.0 / (RHO * np.exp((3e7 - AMBIENT) / 2.2e9)), rel=1e-9)

@@ -12,10 +12,10 @@ from truth.folders import CASES
 from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
+from fvsolve.basins.free_surface.lower import FreeSurfaceRows
+from fvsolve.basins.free_surface.lower_dispersion import on_grid, on_mesh, waves
 from fvsolve.errors import FvsolveError
 from fvsolve.model import Slate
-from fvsolve.model.basins.dispersion import on_grid, on_mesh, waves
-from fvsolve.model.basins.free_surface import FreeSurface
 from fvsolve.model.dependence import sparsity
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
@@ -94,7 +94,7 @@ def test_what_a_basin_holds_is_the_same_on_coarser_cells():
     """Averages keep contents to rounding, graded and holed too, and are those of the function to high order."""
     for more in ({}, {"grading": [3.0, 0.5]}, {"holes": [[2.5, 1.25, 5.0, 2.5]]}):
         cases = [fvsolve.load(alone(pool(cells, **more), 1.0)) for cells in ((48, 32), (24, 16))]
-        fine, coarse = (FreeSurface(case, "pool") for case in cases)
+        fine, coarse = (FreeSurfaceRows(case, "pool") for case in cases)
         value = np.cos(0.3 * fine.x) * np.exp(0.2 * fine.y)
         found = lowered(fine, value[None], coarse)[0]
         assert found @ coarse.mesh.area == approx(value @ fine.mesh.area, rel=1e-14)

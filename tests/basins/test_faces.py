@@ -14,10 +14,12 @@ from truth.log_law import LogFluid, Riemann
 from truth.meshes import corner_lists, shaken, write
 from truth.orders import observed_order
 
-from fvsolve.kernels.plane import advection_faces, liquid_faces, shallow_faces
+from fvsolve.basins import advection_faces
+from fvsolve.basins.free_surface import faces as shallow_faces
+from fvsolve.basins.liquid import faces as liquid_faces
+from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.kernels.records import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle
-from fvsolve.model.face_mesh import lower_mesh
 
 G, C, RHO = 9.8, 10.0, 1000.0
 NONE, FREE = np.zeros(0), (-math.inf, math.inf)

@@ -17,7 +17,8 @@ from truth.orders import mean_error, observed_order
 from truth.scenes import NO_FRICTION, junction, reservoir, scene, stiff_pipe
 
 import fvsolve
-from fvsolve.kernels.plane import liquid, liquid_log
+from fvsolve.basins.liquid import grid as liquid
+from fvsolve.basins.liquid import grid_full as liquid_log
 from fvsolve.kernels.records import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}

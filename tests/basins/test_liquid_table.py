@@ -13,12 +13,12 @@ from truth.plain import boundary, triangles
 from truth.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
+from fvsolve.basins.liquid import waves
+from fvsolve.basins.liquid.lower_waves import Waves
 from fvsolve.errors import CaseError
 from fvsolve.fluid import Fluid, FluidTable
 from fvsolve.kernels import density as law
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import waves
-from fvsolve.model.basins.waves import Waves
 
 REST = 6e6
 FLUID = {"name": "CO2", "temperature": 280.0, "pressure": REST, "law": "table"}  # 519 m/s, at 300 bar 697 m/s

@@ -9,9 +9,9 @@ import pytest
 from pytest import approx
 from scipy.optimize import brentq
 
-from fvsolve.kernels.plane.friction import add_friction
-from fvsolve.kernels.plane.shallow import PLANS, WORK, grid_rates
-from fvsolve.kernels.plane.shallow_smooth import put_push
+from fvsolve.basins.free_surface.friction import add_friction
+from fvsolve.basins.free_surface.grid import PLANS, WORK, grid_rates
+from fvsolve.basins.free_surface.smooth import put_push
 from fvsolve.kernels.records import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665

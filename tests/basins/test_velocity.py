@@ -12,9 +12,9 @@ from truth.plain import triangles, write_msh
 from truth.scenes import scene
 
 import fvsolve
+from fvsolve.basins.transport.lower_velocity import EXPRESSIONS, face_flows, grid_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import read, rectangle
-from fvsolve.model.velocity import EXPRESSIONS, face_flows, grid_flows
 
 PI = np.pi
 BUMP = "exp(-50*((x - 0.4)**2 + (y - 0.5)**2))"
@@ -187,6 +187,13 @@ def carrying(velocity, mesh=None, **more) -> dict:
     pool = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": "where(x < 1, 1, 0)"}}
     pool |= {"mesh": {"file": str(mesh)}} if mesh else more
     return scene({"pool": pool}, {}, 0.1, MUSCL, [], 0.1) | {"scalars": {"dye": {}}}
+
+
+@pytest.mark.parametrize("key", ["u", "level"])
+def test_what_is_carried_starts_from_no_flow_of_its_own(key):
+    case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
+    with pytest.raises(CaseError, match=f'start.{key}: means nothing to physics "transport"'):
+        fvsolve.load(case)
 
 
 @pytest.mark.parametrize("length", [1.0, 6.0, 8.0, 10.0, 1000.0])

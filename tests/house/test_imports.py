@@ -12,10 +12,17 @@ import pytest
 
 import fvsolve
 
-FLOORS = {  # roles -> rooms that they may import
-    "part": {"parts", "units", "errors", "names", "steppers"},
-    "law": {"kernels", "jit"},
-    "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes"},
+FLOORS = {  # room -> role -> rooms that it may import beside files of its own role
+    "parts": {
+        "part": {"parts", "units", "errors", "names", "steppers"},
+        "law": {"kernels", "jit"},
+        "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes"},
+    },
+    "basins": {
+        "part": {"parts", "units", "errors"},
+        "law": {"kernels", "jit"},
+        "lower": {"basins", "parts", "case", "model", "kernels", "errors", "fluid", "mesh", "schemes", "steppers"},
+    },
 }
 
 
@@ -41,15 +48,20 @@ def test_a_circle_is_seen(arrows, found):
     assert len(circle(arrows)) == found
 
 
-def role(module: str) -> str | None:
-    """`part`, `law` or `lower` of a file in the folder of a part; None of others."""
-    names = module.split(".")
-    if names[:2] != ["fvsolve", "parts"] or len(names) < 4:
+def role(module: str) -> tuple[str, str] | None:
+    """Room and role of a file in the folder of a part, or anywhere in that of basins; None of others.
+
+    What has none of the others' names declares a part, and of a basin is compiled.
+    """
+    _, room, *names = module.split(".") + [""]
+    if room not in FLOORS or len(names) < (3 if room == "parts" else 2):
         return None
-    return next((one for one in ("law", "lower") if names[3].startswith(one)), "part")
+    file = names[-2]
+    other = "part" if room == "parts" else "law"
+    return room, next((one for one in ("part", "law", "lower") if file.startswith(one)), other)
 
 
-def test_each_file_of_a_part_imports_what_its_floor_may():
+def test_each_file_of_a_part_or_a_basin_imports_what_its_floor_may():
     """A declaration imports no compiled function, a law no declaration, and neither what lowers it."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
     seen = set()
@@ -59,10 +71,10 @@ def test_each_file_of_a_part_imports_what_its_floor_may():
         seen.add(own)
         for other in graph.find_modules_directly_imported_by(module):
             theirs = role(other)
-            assert other.split(".")[1] in FLOORS[own] or theirs == own, f"{module} imports {other}"
-            if own != "lower":
-                assert theirs in (None, own), f"{module} imports {other}"
-    assert seen == set(FLOORS)
+            assert theirs == own or other.split(".")[1] in FLOORS[own[0]][own[1]], f"{module} imports {other}"
+            if own[1] != "lower":
+                assert theirs is None or theirs[1] == own[1], f"{module} imports {other}"
+    assert seen == {(room, one) for room, roles in FLOORS.items() for one in roles}
 
 
 def test_parts_are_declared_without_numba():
@@ -70,6 +82,7 @@ def test_parts_are_declared_without_numba():
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
-def test_every_folder_of_parts_has_a_declaration():
-    folders = [path for path in (Path(fvsolve.__file__).parent / "parts").iterdir() if (path / "__init__.py").is_file()]
+@pytest.mark.parametrize("room", FLOORS)
+def test_every_folder_of_parts_and_basins_has_a_declaration(room):
+    folders = [path for path in (Path(fvsolve.__file__).parent / room).iterdir() if (path / "__init__.py").is_file()]
     assert folders and all((folder / "part.py").is_file() for folder in folders)

@@ -138,3 +138,11 @@ def test_cache_folder_falls_back_when_the_stated_one_is_not_writable(package, tm
 def test_only_rooms_that_are_hashed_compile():
     users = {path for path in jit.PACKAGE.rglob("*.py") if "njit" in path.read_text(encoding="utf-8")}
     assert users <= set(jit._sources()), "njit outside of jit.ROOMS would never be cached"
+
+
+def test_what_declares_or_lowers_compiles_nothing():
+    """So an edit there leaves compiled code as it is: of parts laws alone are hashed, of basins all that compiles."""
+    hashed = {path.relative_to(jit.PACKAGE) for path in jit._sources()}
+    assert Path("basins/liquid/grid.py") in hashed and Path("basins/carried.py") in hashed
+    assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
+    assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")

@@ -8,7 +8,7 @@ from truth import folders
 
 import fvsolve
 
-OF_TESTS = {"basins", "house", "restated", "truth"}  # what joins rooms of the package, or none has
+OF_TESTS = {"house", "restated", "truth"}  # what joins rooms of the package, or none has
 
 
 def test_every_test_stands_in_a_room_of_the_package_or_one_of_the_tests_own():

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from fvsolve.basins import second_order
+from fvsolve.basins.free_surface import rows as shallow_rows
+from fvsolve.basins.liquid import grid as liquid
+from fvsolve.basins.liquid import grid_full as liquid_log
 from fvsolve.kernels import limiters, reconstruction, scalars
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.limiters import by_limiter, limited
-from fvsolve.kernels.plane import liquid, liquid_log, second_order, shallow_rows
 from fvsolve.model.schemes import CODES
 
 CELLS, NONE = 40, 99

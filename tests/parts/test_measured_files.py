@@ -8,9 +8,9 @@ from pytest import approx
 from truth.scenes import lake, scene, tank, valve
 
 import fvsolve
+from fvsolve.basins.transport.lower_velocity import face_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import rectangle
-from fvsolve.model.velocity import face_flows
 from fvsolve.parts.formula import Shaped
 from fvsolve.parts.series import read_columns
 from fvsolve.parts.value import Setting

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.basins import advection, diffusion
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.plane import advection, diffusion
 from fvsolve.mesh import rectangle
-from fvsolve.model.velocity import face_flows, grid_flows
 
 SCHEMES = {
     "upwind": (rec.UPWIND, 0),

@@ -109,7 +109,7 @@ def space_order(case) -> int:
 def order_varies(case) -> bool:
     """Whether that is an upper bound: water in the plane comes down to second order, along one axis it does not."""
     fifth = space_order(case) > PLANE_ORDER
-    return fifth and any(basin.physics == "free-surface" for basin in basins(case).values())
+    return fifth and any(basin.own.steep for basin in basins(case).values())
 
 
 def starts_with_jump(case, coarse: Mapping, fine: Mapping) -> bool:

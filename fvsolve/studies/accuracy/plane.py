@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.model.basins import units
-
 NEAR = 1e-9  # of its length: how near an edge of coarser cells must be to one of finer ones to be the same
 DEGREE = 5  # of the spline through contents, where it is not
 
@@ -31,7 +29,7 @@ def unit_of(case, variable: str) -> str | None:
     node = case.nodes.get(name)
     if not quantity or node is None or node.kind != "basin":
         return None
-    return units.unit_of(node.physics, quantity)
+    return node.own.states.get(quantity, "-")
 
 
 def lowered(fine, values, coarse) -> np.ndarray:

@@ -10,7 +10,6 @@ import numpy as np
 from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.kernels.schedules import value_until
-from fvsolve.model.basins.units import unit_of
 from fvsolve.model.inputs import PRESSURE, Input, inputs_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
@@ -56,9 +55,9 @@ class Linear:
     @property
     def state_units(self) -> list[str]:
         """Units of x."""
-        names, basins = set(self.states), {basin.name: basin.part.physics for basin in self.at.model.basins}
+        names, basins = set(self.states), {basin.name: basin.part.own.states for basin in self.at.model.basins}
         return [
-            unit_of(basins[part], quantity.split("[")[0]) if part in basins
+            basins[part].get(quantity.split("[")[0], "-") if part in basins
             else state_unit(name, f"{part}.opening" in names)
             for name in self.states for part, quantity in [name.rsplit(".", 1)]
         ]  # fmt: skip

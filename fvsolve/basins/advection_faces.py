@@ -1,0 +1,211 @@
+"""Scalars carried by given flows through the faces of any mesh, and diffusing. Knows not what makes the flows.
+
+s_t + div(F c) = div(D depth grad c) for amounts s = depth c per area. Rates of a uniform c are c times the divergence
+of F, to the bit. Euler steps up to one over the rate that is returned keep all values between two bounds: a side
+differs from its cell by no more than this does from the nearer bound, so what leaves is at most twice as far from a
+bound as the cell. Up to two thirds of that `minmod` keeps them between those around. Other limiters have second order
+on any mesh. Diffusion goes from cell to cell, and what the line between their centres leans away from the normal by the
+mean of their gradients: second order, bounds not kept where cells lean. Nothing diffuses through walls and where the
+flow leaves; where it enters, the value outside holds at the face.
+"""
+
+import numpy as np
+
+from fvsolve.basins.faces import (
+    BLOCK,
+    CELL,
+    DISTANCES,
+    GAP,
+    HEAD,
+    INDICES,
+    LEAN_X,
+    LEAN_Y,
+    MEASURES,
+    REACH,
+    SHARE,
+    SIDE,
+    TINY,
+    WX,
+    WY,
+    blocks,
+    edges_before,
+    gather,
+    place,
+    put_sides,
+)
+from fvsolve.jit import njit
+from fvsolve.kernels.records import UPWIND
+
+THIN = 1e-6  # depth below which values fade [m]
+
+# rows of BLOCK in the scratch of a block: four for `put_sides`, of which value and depth beyond, gradients beyond; then
+# value beyond the side, outward flow, rate, divergence, sum for the step
+_DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _GONE, _TOP, _FREE = (k * BLOCK for k in range(1, 11))
+_REACH, _WX, _WY, _GAP, _LX, _LY = REACH * BLOCK, WX * BLOCK, WY * BLOCK, GAP * BLOCK, LEAN_X * BLOCK, LEAN_Y * BLOCK
+ROWS = 11
+
+
+@njit
+def put_values(s, depth, c, d):
+    """Values c = s / depth of a block of cells, and their depths, 1 where none are given."""
+    if depth.size == 0:
+        for i in range(s.size):
+            c[i], d[i] = s[i], 1.0
+    else:
+        for i in range(s.size):
+            c[i], d[i] = s[i] / max(depth[i], THIN), depth[i]
+
+
+@njit
+def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
+    """Gradients by least squares of block j."""
+    slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
+    c, gx, gy = values[at:], gx[at:], gy[at:]
+    for i in range(BLOCK):
+        gx[i], gy[i] = 0.0, 0.0
+    for k in range(slots):
+        slot = j * slots + k
+        gather(values, places[(slot * INDICES + CELL) * BLOCK :], w)
+        for q in range(edges.size):
+            if edges[q] // BLOCK == 4 * j + k:
+                w[edges[q] % BLOCK] = shown[q]
+        geo = floats[slot * MEASURES * BLOCK :]
+        for i in range(BLOCK):
+            gx[i] += geo[_WX + i] * (w[i] - c[i])
+            gy[i] += geo[_WY + i] * (w[i] - c[i])
+
+
+@njit
+def gather_flows(faces, factor, flow, out):
+    """Outward flows through one side of each cell of a block."""
+    for i in range(BLOCK):
+        f = faces[i]
+        out[i] = factor * (flow[f] if f >= 0 else -flow[~f])
+
+
+@njit
+def put_room(c, least, most, room):
+    """How far sides of a block of cells may differ from these: to the nearer bound."""
+    for i in range(BLOCK):
+        room[i] = max(min(c[i] - least, most - c[i]), 0.0)
+
+
+@njit
+def carry(count, c, d, cl, far, w):
+    """Take from the rates of a block of cells what flows out through one side of each, beyond that of a uniform c.
+
+    count : what counts as rate over what leaves
+    """
+    for i in range(BLOCK):
+        q = far[SHARE * BLOCK + i] * w[_FLOW + i]
+        w[_RATE + i] -= q * ((cl[i] if q > 0.0 else w[_VALUE + i]) - c[i])
+        w[_DIVERGENCE + i] += q
+        w[_GONE + i] += count * max(q, 0.0) / max(d[i], THIN)
+
+
+@njit
+def diffuse(diffusivity, c, d, gx, gy, geo, far, w):
+    """Add to the rates of a block of cells what diffuses in through one side of each."""
+    for i in range(BLOCK):
+        a, b = d[i], w[_DEPTH + i]
+        k = diffusivity * geo[_REACH + i] * (2.0 * a * b / (a + b + TINY))
+        lean = far[_LX + i] * (gx[i] + w[_GX + i]) + far[_LY + i] * (gy[i] + w[_GY + i])
+        w[_RATE + i] += k * (far[_GAP + i] * (w[i] - c[i]) + 0.5 * lean)
+        w[_GONE + i] += k * far[_GAP + i] / max(a, THIN)
+
+
+@njit
+def clear(w):
+    """No rates and no sums yet."""
+    for i in range(BLOCK):
+        w[_RATE + i], w[_DIVERGENCE + i], w[_GONE + i] = 0.0, 0.0, 0.0
+
+
+@njit
+def put_rates(c, w, rate):
+    """Rates of a block of cells, and the greatest sum so far in each lane."""
+    for i in range(BLOCK):
+        w[_TOP + i] = max(w[_TOP + i], w[_GONE + i])
+    for i in range(rate.size):
+        rate[i] = w[_RATE + i] - c[i] * w[_DIVERGENCE + i]
+
+
+def work_size(integers):
+    """Floats that `advection_rates` works in."""
+    return 8 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
+
+
+@njit
+def advection_rates(
+    scheme, wide_by, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
+):
+    """Rates of the amounts `s`; returns one over the step that keeps bounds, which diffusion shortens [1/s].
+
+    That is the greatest share of a cell that leaves it, by `muscl` twice that.
+
+    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
+    diffusivity : [m2/s], 0 for none; factor : on all flows
+    flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty where s is the
+    value; outside : float64[b]  values that come in with the flow; least, most : bounds, infinite for none
+    work : float64[work_size(integers)]
+    """
+    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
+    count, limited, spreads = blocks(integers), scheme != UPWIND, diffusivity > 0.0
+    m = count * slots * BLOCK
+    at, to = HEAD + INDICES * m // 2, MEASURES * m + 2 * b + f
+    need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
+    faces, distances = integers[at + count + 2 * b :], floats[to:]
+    places = integers[HEAD:].view(np.int32)
+    near, wide = ring * BLOCK, 4 * ring * BLOCK
+    c, d, gx, gy = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
+    cs = work[4 * near : 4 * near + wide] if limited else c
+    shown, w = work[4 * near + wide :][: 2 * b], work[4 * near + wide + 2 * b :]
+    free = w[_FREE:]
+    for i in range(BLOCK):
+        w[_TOP + i] = 0.0
+    twice = 2.0 if limited else 1.0
+    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
+    for j in range(count):
+        while sided < need[j]:
+            while known < need[sided]:
+                i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
+                put_values(s[i:k], depth[i:k], c[o:], d[o:])
+                known += 1
+            k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
+            here, bounds, ends = edges[k:wall], shown[k:], shown[b + k :]
+            for q in range(k, wall):
+                value, face = c[place(edges[q], ring)], f - b + number[q]
+                enters = factor * flow[face] < 0.0
+                shown[q] = outside[number[q]] if enters else value
+                shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
+            if limited:
+                put_room(c[sided % ring * BLOCK :], least, most, free)
+                put_sides(sided, floats, integers, c, wide_by, free, bounds, here, w, cs)
+            if spreads:
+                put_gradients(sided, floats, integers, c, ends, here, w, gx, gy)
+            sided += 1
+        clear(w)
+        first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
+        for k in range(slots):
+            slot = j * slots + k
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            far, own = distances[slot * DISTANCES * BLOCK :], 4 * o + k * BLOCK if limited else o
+            gather(cs, where[SIDE * BLOCK :] if limited else where, w[_VALUE:])
+            gather_flows(faces[slot * BLOCK :], factor, flow, w[_FLOW:])
+            i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
+            for q in range(i, edge):
+                w[_VALUE + edges[q] % BLOCK] = outside[number[q]]
+            carry(twice, c[o:], d[o:], cs[own:], far, w)
+            if spreads:
+                gather(c, where, w)
+                gather(d, where, w[_DEPTH:])
+                gather(gx, where, w[_GX:])
+                gather(gy, where, w[_GY:])
+                for q in range(i, edge):
+                    w[edges[q] % BLOCK] = shown[b + q]
+                diffuse(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
+        put_rates(c[o:], w, rate[first:last])
+    quickest = 0.0
+    for i in range(BLOCK):
+        quickest = max(quickest, w[_TOP + i])
+    return quickest

@@ -1,0 +1,178 @@
+"""Scalars in basins as rooms of a scene: what patches have of them, and rates of their amounts. Knows the tables.
+
+Amounts are per area, s = depth c; a basin with a given velocity has depth 1.
+"""
+
+from math import cos, pi
+
+from fvsolve.basins.advection import THIN
+from fvsolve.basins.behind import counted, is_given, weight
+from fvsolve.basins.diffusion import add_decay
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mixing import lose
+from fvsolve.kernels.records import CELL_SCALAR
+from fvsolve.kernels.schedules import schedule_value
+
+LEAST = 1e-12  # what a dry cell counts by in the value at a patch [m]
+
+
+@njit
+def depth_at(tables, basin, y, i):
+    """Depth of a cell that an amount is spread over."""
+    if basin["deep"] == 0:
+        return 1.0
+    return max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+
+
+@njit
+def cell_value(tables, basin, q, y, i):
+    """Value of scalar q in a cell."""
+    return y[basin["carried"] + q * basin["n"] + i] / max(depth_at(tables, basin, y, i), THIN)
+
+
+@njit
+def patch_values(t, y, dydt, out, handle):
+    """Value of every scalar at every patch: the mean of what leaves the cells behind it, or of dry ones by area."""
+    tables = open_tables(handle)
+    nodes, value = tables.nodes.size, tables.layout[0]["value"]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        for q in range(tables.scalars.size):
+            deep, total, held = basin["deep"] == 1, 0.0, 0.0
+            for m in range(patch["count"]):
+                i = tables.integers[patch["first"] + m]
+                part = tables.plane[basin["area"] + i]
+                part *= max(weight(tables.plane, basin, True, i, y), LEAST) if deep else 1.0
+                total, held = total + part, held + part * cell_value(tables, basin, q, y, i)
+            out[value + q * nodes + patch["node"]] = held / total
+
+
+@njit
+def observe_values(t, y, out, handle, values):
+    """values[k] of every probe of a scalar at a point of a basin."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_SCALAR:
+            values[k] = 0.0
+            for m in range(probe["count"]):
+                i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+                values[k] += weight * cell_value(tables, tables.basins[probe["index"]], probe["scalar"], y, i)
+
+
+@njit
+def put_outside(t, tables, patch, basin, q):
+    """Fill the values of a scalar beyond the faces of a patch, its initial one where nothing is said."""
+    schedule = tables.integers[patch["values"] + q]
+    value = tables.scalars[q]["initial"]
+    if schedule >= 0:
+        value = schedule_value(tables, schedule, t)
+    for m in range(patch["faces"]):
+        k = tables.integers[patch["ring"] + m]
+        tables.work[basin["outside"] + q * basin["outer"] + k] = value
+
+
+@njit
+def made_ready(t, tables, b, y):
+    """Depths and values beyond the boundary of a basin, for its scalars."""
+    plane, basin, patches = tables.plane, tables.basins[b], tables.patches
+    n, o, at = basin["n"], basin["y"], basin["plan"]
+    if basin["deep"] == 1:
+        depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
+        for i in range(n):
+            depth[i] = max(rest[i] + change[i], 0.0)
+    for p in range(patches.size):
+        for q in range(tables.scalars.size if patches[p]["basin"] == b else 0):
+            put_outside(t, tables, patches[p], basin, q)
+
+
+@njit
+def turned(t, basin):
+    """The factor on the flows of a basin, which may turn back and forth."""
+    return cos(pi * t / basin["period"]) if basin["period"] > 0.0 else 1.0
+
+
+@njit
+def deep(basin):
+    """Number of depths that were made ready: none where it is 1."""
+    return basin["n"] if basin["deep"] == 1 else 0
+
+
+@njit
+def settle_amounts(t, y, dydt, out, handle):
+    """Add what decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
+    tables = open_tables(handle)
+    work = tables.work
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
+        n, depth = basin["n"], work[basin["toil"] : basin["toil"] + deep(basin)]
+        per = tables.settings[0]["rho"]
+        if basin["deep"] == 0:
+            per = basin["density"] * basin["thickness"]
+        for q in range(tables.scalars.size if basin["carried"] >= 0 else 0):
+            at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
+            outside, s, rate = work[ring : ring + basin["outer"]], y[at : at + n], dydt[at : at + n]
+            settle(tables, b, basin, q, turned(t, basin), per, depth, outside, y, s, rate, out)
+
+
+@njit
+def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
+    """Add to rates what decays and what links bring; book these, and what passes the boundary."""
+    scalar, patches, n = tables.scalars[q], tables.patches, basin["n"]
+    if basin["through"] >= 0:
+        book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
+    if scalar["decay"] > 0.0:
+        area = tables.plane[basin["area"] : basin["area"] + n]
+        for i in range(n):
+            high = depth[i] if depth.size > 0 else 1.0
+            lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
+        add_decay(scalar["decay"], scalar["ambient"], depth, s, rate)
+    for p in range(0 if is_given(basin) else patches.size):
+        if patches[p]["basin"] == b and patches[p]["open"] == 0:
+            bring(tables, patches[p], basin, q, y, rate, out)
+
+
+@njit
+def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
+    """What a given velocity brings in is booked to its patches; what it takes out, all else that cells gain, to one."""
+    plane, patches, nodes = tables.plane, tables.patches, tables.nodes.size
+    flows = plane if is_given(basin) else tables.work
+    lies, gained = tables.layout[0]["gain"] + q * nodes, 0.0
+    for i in range(basin["n"]):
+        gained += plane[basin["area"] + i] * rate[i]
+    last, most = -1, -1.0
+    for p in range(patches.size):
+        if patches[p]["basin"] != b or patches[p]["open"] == 0:
+            continue
+        into, away = 0.0, 0.0
+        for m in range(patches[p]["faces"]):
+            k = tables.integers[patches[p]["ring"] + m]
+            flow = factor * flows[basin["through"] + k]
+            into += max(flow, 0.0) * outside[k]
+            away -= min(flow, 0.0)
+        out[lies + patches[p]["node"]] = per * into
+        gained -= into
+        if away > most:
+            last, most = patches[p]["node"], away
+    out[lies + last] += per * gained
+
+
+@njit
+def bring(tables, patch, basin, q, y, rate, out):
+    """What the network brings through a patch into the cells behind it; each gives of its own where water leaves."""
+    layout, nodes, rho = tables.layout[0], tables.nodes.size, tables.settings[0]["rho"]
+    node = patch["node"]
+    made_up = out[layout["gain"] + q * nodes + node]
+    flow = min(out[layout["net"] + node] + out[layout["supply"] + node], 0.0) / (rho * counted(tables, patch, True, y))
+    brought, plane = (out[layout["brought"] + q * nodes + node] + made_up) / rho, tables.plane
+    for m in range(patch["count"] if flow < 0.0 else 0):
+        i = tables.integers[patch["first"] + m]
+        gone = flow * weight(plane, basin, True, i, y) * cell_value(tables, basin, q, y, i)
+        rate[i] += gone
+        brought -= plane[basin["area"] + i] * gone
+    brought /= counted(tables, patch, False, y)
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        rate[i] += brought * weight(plane, basin, False, i, y)

@@ -1,0 +1,33 @@
+"""Scalars in basins on meshes of any cells as a room of a scene. Knows the tables; the rest is as in `carried`."""
+
+from fvsolve.basins.advection_faces import advection_rates
+from fvsolve.basins.behind import is_given
+from fvsolve.basins.carried import deep, made_ready, turned
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import RATE
+
+
+@njit
+def carry_on_meshes(t, y, dydt, out, handle):
+    """Rates of all amounts, carried and spread."""
+    tables = open_tables(handle)
+    plane, work, scalars, integers = tables.plane, tables.work, tables.scalars, tables.integers
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
+        if basin["carried"] < 0 or basin["nx"] > 0:
+            continue
+        n, flows = basin["n"], plane if is_given(basin) else work
+        flow = flows[basin["flows"] : basin["flows"] + basin["faces"]]
+        made_ready(t, tables, b, y)
+        factor, depth = turned(t, basin), work[basin["toil"] : basin["toil"] + deep(basin)]
+        for q in range(scalars.size):
+            o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
+            quickest = advection_rates(
+                basin["scheme"], basin["wide"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
+                integers[basin["links"] :],
+                flow, depth, work[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
+                y[o : o + n], work[basin["toil"] + n :], dydt[o : o + n],
+            )  # fmt: skip
+            still = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]  # which will be at full speed
+            out[RATE] = max(out[RATE], quickest + still + scalars[q]["decay"])

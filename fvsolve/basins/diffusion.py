@@ -1,0 +1,93 @@
+"""What scalars do beside being carried: spread and decay. Knows cells of a grid; adds to rates.
+
+s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
+"""
+
+from fvsolve.basins.advection import THIN, put_values
+from fvsolve.jit import inner, njit
+
+
+@njit
+def between(a, b):
+    """Harmonic mean, of depths or of cells per length: none where there is nothing on one side."""
+    return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
+
+
+@inner
+def conduct(across, a, b, to):
+    """What a row of faces conducts: across times the depth between a and b, which are empty where it is 1."""
+    if a.size == 0:
+        for i in range(to.size):
+            to[i] = across
+    else:
+        for i in range(to.size):
+            to[i] = across * between(max(a[i], 0.0), max(b[i], 0.0))
+
+
+@inner
+def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
+    """Add to the rates of a row; p : its values, with one beyond either end; top : greatest rate by column so far."""
+    w, e, ww, we = p, p[2:], wx, wx[1:]
+    for i in range(rate.size):
+        x = kx[i] * (we[i] * (e[i] - here[i]) - ww[i] * (here[i] - w[i]))
+        y = ky * (wn[i] * (north[i] - here[i]) - ws[i] * (here[i] - south[i]))
+        rate[i] += x + y
+        quick = kx[i] * (ww[i] + we[i]) + ky * (ws[i] + wn[i])
+        quick = quick / max(depth[i], THIN) if depth.size > 0 else quick
+        top[i] = quick if quick > top[i] else top[i]
+
+
+def diffusion_work(nx, ny):
+    """Floats that `grid_diffusion` works in."""
+    return nx * ny + 8 * nx + 3
+
+
+@njit
+def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
+    """Add the rates of diffusion [m2/s], and return the greatest rate 2 D (kx^2 + ky^2) of a cell [1/s].
+
+    No flux at the boundary but where factor times a given flow comes in: there the value `outside` holds on the face.
+    (That of water, with depths, may hardly move there: a value held at one sign and not at the other would be a jump.)
+    Arguments as of `grid_advection`; work : float64[diffusion_work(nx, ny)]
+    """
+    c, rest = s, work[nx * ny :]
+    if depth.size > 0:
+        put_values(s, depth, work[: nx * ny])
+        c = work[: nx * ny]
+    p, wx, rest = rest[: nx + 2], rest[nx + 2 : 2 * nx + 3], rest[2 * nx + 3 :]
+    rows, beyond, top = rest[: 2 * nx], rest[2 * nx : 4 * nx], rest[4 * nx : 5 * nx]
+    below, above, most = beyond[:nx], beyond[nx:], 0.0
+    held = 2.0 * diffusivity if depth.size == 0 else 0.0
+    for i in range(nx):
+        below[i], rows[i] = outside[2 * ny + i], ky[0] * held if factor * flow_y[i] > 0.0 else 0.0
+        above[i], top[i] = outside[2 * ny + nx + i], 0.0
+    for j in range(ny):
+        a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
+        h, hn = depth[a:], depth[z:]
+        inner_p, row, inner_w = p[1:], c[a:], wx[1:nx]
+        for i in range(nx):
+            inner_p[i] = row[i]
+        p[0], p[nx + 1] = outside[j], outside[ny + j]
+        conduct(1.0, h, h[1:], inner_w)
+        for i in range(nx - 1):
+            inner_w[i] *= diffusivity * between(kx[i], kx[i + 1])
+        wx[0] = kx[0] * held if factor * flow_x[f] > 0.0 else 0.0
+        wx[nx] = kx[nx - 1] * held if factor * flow_x[f + nx] < 0.0 else 0.0
+        ws, wn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx : ((j + 1) % 2 + 1) * nx]
+        south, north = c[a - nx : a] if j > 0 else below, c[z : z + nx] if j < ny - 1 else above
+        if j < ny - 1:
+            conduct(diffusivity * between(ky[j], ky[j + 1]), h, hn, wn)
+        else:
+            for i in range(nx):
+                wn[i] = ky[j] * held if factor * flow_y[z + i] < 0.0 else 0.0
+        spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
+    for i in range(nx):
+        most = max(most, top[i])
+    return most
+
+
+@njit
+def add_decay(decay, ambient, depth, s, rate):
+    """Add decay [1/s] towards an ambient value."""
+    for i in range(s.size):
+        rate[i] -= decay * (s[i] - (depth[i] if depth.size > 0 else 1.0) * ambient)

@@ -1,0 +1,121 @@
+"""Power and stored energy of water with a free surface. Knows the tables; adds nothing up over time.
+
+It stores rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)) per area. Rows: see `basins.energy`.
+"""
+
+from math import sqrt
+
+from fvsolve.basins.behind import counted, weight
+from fvsolve.basins.energy import at_rest, row_of
+from fvsolve.basins.free_surface.friction import FASTEST
+from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.kinds import kind_of
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import MANNING, NO_DRAG
+
+MINE = kind_of(__package__)
+
+
+@njit(forceinline=True)
+def per_flow(depth):
+    """Velocity over flow of water so deep [1/m]."""
+    wet = max(depth, THIN)
+    return 2.0 * depth / (depth * depth + wet * wet)
+
+
+@njit
+def add_power(t, y, dydt, out, handle, power):
+    """Rows of its basins."""
+    tables = open_tables(handle)
+    patches, layout = tables.patches, tables.layout[0]
+    for b in range(tables.basins.size):
+        if tables.basins[b]["kind"] == MINE:
+            rows = power[row_of(tables, power, b) :]
+            water_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
+    for k in range(patches.size):
+        patch, node = patches[k], patches[k]["node"]
+        if tables.basins[patch["basin"]]["kind"] == MINE:
+            flow = out[layout["net"] + node] + out[layout["supply"] + node]
+            power[row_of(tables, power, patch["basin"]) + 1] += patch_loss(tables, patch, flow, y)
+
+
+@njit
+def water_power(st, basin, plane, y, dydt, rows):
+    """Friction, held to FASTEST as in the rates, and rate of storage of water with a free surface."""
+    n, o = basin["n"], basin["y"]
+    depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
+    weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
+    friction, rate = 0.0, 0.0
+    for i in range(n):
+        d, qx, qy = y[o + i], y[o + n + i], y[o + 2 * n + i]
+        depth = max(depths[i] + d, 0.0)
+        share = per_flow(depth)
+        u, v = share * qx, share * qy
+        level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
+        moves = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
+        rate += area[i] * (level * dydt[o + i] + st["rho"] * moves)
+        friction += area[i] * drag_power(st, basin, depth, u * u + v * v)
+    rows[2], rows[3] = friction, rate
+
+
+@njit
+def drag_power(st, basin, depth, square):
+    """What the bed takes of water that runs over it, per area [W/m2]; square : of its velocity."""
+    if basin["friction"] == NO_DRAG or square == 0.0:
+        return 0.0
+    rate, wet = 0.125 * basin["roughness"] * sqrt(square) / max(depth, THIN), max(depth, THIN)
+    if basin["friction"] == MANNING:
+        rate = st["gravity"] * basin["roughness"] ** 2 * sqrt(square) / wet ** (4.0 / 3.0)
+    return st["rho"] * depth * square * rate / (1.0 + rate / FASTEST)
+
+
+@njit
+def patch_loss(tables, patch, flow, y):
+    """What speed is lost where `flow` [kg/s] enters the cells behind a patch, or leaves them [W]; see `patches`."""
+    st, basin, plane, integers = (
+        tables.settings[0],
+        tables.basins[patch["basin"]],
+        tables.plane,
+        tables.integers,
+    )
+    n, o, lost, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
+    depths, area = plane[basin["plan"] :], plane[basin["area"] :]
+    each = flow / counted(tables, patch, leaves, y)
+    for m in range(patch["count"]):
+        i = integers[patch["first"] + m]
+        share = per_flow(max(depths[i] + y[o + i], 0.0))
+        square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
+        lost += 0.5 * area[i] * square * each * weight(plane, basin, leaves, i, y)
+    for m in range(patch["faces"]):
+        i, at, many = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
+        depth = max(depths[i] + y[o + i], 0.0)
+        share, wide = per_flow(depth), plane[at + 2 * many + m] * area[i]
+        u, v = share * y[o + n + i], share * y[o + 2 * n + i]
+        away = -each * weight(plane, basin, leaves, i, y) * patch["area"] / patch["length"]
+        along = u * plane[at + m] + v * plane[at + many + m]
+        held = away - st["rho"] * depth * along  # against a wall all that runs into it is lost
+        lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * held
+        if away > 0.0:
+            lost += wide * away * (u * u + v * v - along * along)
+    return lost
+
+
+@njit
+def add_stored(t, y, dydt, out, handle, stored):
+    """Rows of its basins."""
+    tables = open_tables(handle)
+    st, basins, plane = tables.settings[0], tables.basins, tables.plane
+    weight = st["rho"] * st["gravity"]
+    for b in range(basins.size):
+        basin, total = basins[b], 0.0
+        if basin["kind"] != MINE:
+            continue
+        n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
+        depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
+        for i in range(n):
+            d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+            share = per_flow(max(depths[i] + d, 0.0))
+            height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
+            total += area[i] * (height + 0.5 * st["rho"] * share * square)
+        stored[stored.size - basins.size + b] = total

@@ -1,0 +1,215 @@
+"""Shallow water on any mesh: rates of depth and flow. Knows cells and their sides; knows no patch and no network.
+
+The scheme is that of the grid (see `shallow`), with slopes by least squares and one limiter over all sides of a cell.
+Pressures count from the cell's own, and the bed's push from its own surface, so that where the surface is level every
+term is zero: a lake at rest stays at rest, with dry islands too.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.basins.faces import (
+    BLOCK,
+    HEAD,
+    HUGE,
+    INDICES,
+    MEASURES,
+    NX,
+    NY,
+    REACH,
+    SIDE,
+    TINY,
+    blocks,
+    edges_before,
+    gather,
+    place,
+    put_inward,
+    put_sides,
+)
+from fvsolve.jit import njit
+from fvsolve.kernels.records import UPWIND
+
+DEPTH, SURFACE, PLANS = 0, 1, 2  # rows of plan: the profile's depth, its surface less the level
+THIN = 1e-6  # depth below which velocities fade [m]
+
+# rows of BLOCK in the scratch of `settle`: what lies beyond, rates, sums for the step, flow through the side
+_E, _U, _V, _C, _RH, _RX, _RY, _FAST, _GONE, _MASS = (k * BLOCK for k in range(1, 11))
+_NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
+ROWS = 13
+
+
+@njit
+def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
+    """Depth, surface, both velocities and wave speed of cells."""
+    for i in range(dh.size):
+        depth = max(depth0[i] + dh[i], 0.0)
+        wet = max(depth, THIN)
+        part = 2.0 * depth / (depth * depth + wet * wet)
+        h[i], e[i], c[i] = depth, surface0[i] + dh[i], sqrt(g * depth)
+        u[i], v[i] = qx[i] * part, qy[i] * part
+
+
+@njit
+def mirror(edges, ring, nx, ny, number, reflect, u, v, shown_u, shown_v):
+    """Velocities that the boundary shows of the cells inside."""
+    for q in range(edges.size):
+        i = place(edges[q], ring)
+        r = reflect[number[q]] if reflect.size > 0 else 1.0
+        turn = 2.0 * r * (u[i] * nx[q] + v[i] * ny[q])
+        shown_u[q], shown_v[q] = u[i] - turn * nx[q], v[i] - turn * ny[q]
+
+
+@njit
+def mirror_sides(edges, nx, ny, number, reflect, ul, vl, w):
+    """Put beyond sides of the boundary what it shows of the values inside."""
+    for q in range(edges.size):
+        i = edges[q] % BLOCK
+        r = reflect[number[q]] if reflect.size > 0 else 1.0
+        turn = 2.0 * r * (ul[i] * nx[q] + vl[i] * ny[q])
+        w[_U + i], w[_V + i] = ul[i] - turn * nx[q], vl[i] - turn * ny[q]
+
+
+@njit
+def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w):
+    """Take from the rates of a block of cells what leaves through one side of each, from the values inside it."""
+    half = 0.5 * g
+    for i in range(BLOCK):
+        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        bed = max(el[i] - hl[i], w[_E + i] - w[i])
+        a, b, c = max(0.0, el[i] - bed), max(0.0, w[_E + i] - bed), max(c0[i], w[_C + i])
+        na, nb = ul[i] * nx + vl[i] * ny, w[_U + i] * nx + w[_V + i] * ny
+        ta, tb = vl[i] * nx - ul[i] * ny, w[_V + i] * nx - w[_U + i] * ny
+        low, high = min(min(na, nb) - c, 0.0), max(max(na, nb) + c, 0.0)
+        both = 1.0 / (high - low + TINY)
+        qa, qb = a * na, b * nb
+        mass = both * (high * qa - low * qb + high * low * (b - a))
+        flow = both * (high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa))
+        flow += half * (hl[i] + h0[i]) * (el[i] - e0[i])
+        along = mass * (ta if mass > 0.0 else tb)
+        w[_RH + i] -= reach * mass
+        w[_RX + i] -= reach * (flow * nx - along * ny)
+        w[_RY + i] -= reach * (flow * ny + along * nx)
+        w[_FAST + i] += reach * max(high, -low)
+        w[_GONE + i] += reach * (high * (na - low) * both)
+        w[_MASS + i] = mass
+
+
+@njit
+def clear(w):
+    """No rates and no sums yet."""
+    for i in range(BLOCK):
+        w[_RH + i], w[_RX + i], w[_RY + i], w[_FAST + i], w[_GONE + i] = 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@njit
+def put_shores(h, shore):
+    """How much the surface may differ at the sides of a block of cells: not at all where the bed is dry."""
+    for i in range(BLOCK):
+        shore[i] = HUGE if h[i] > 0.0 else 0.0
+
+
+@njit
+def quickest(w, top):
+    """The greatest rate so far in each lane: half of what waves pass, or all that leaves."""
+    for i in range(BLOCK):
+        top[i] = max(top[i], max(0.5 * w[_FAST + i], w[_GONE + i]))
+
+
+@njit
+def put_rates(w, rate_h, rate_x, rate_y):
+    """Rates of a block of cells."""
+    for i in range(rate_h.size):
+        rate_h[i], rate_x[i], rate_y[i] = w[_RH + i], w[_RX + i], w[_RY + i]
+
+
+@njit
+def put_flow(where, w, length, flow):
+    """Flows through the faces whose normal points outwards from these cells."""
+    for i in range(BLOCK):
+        if where[i] >= 0:
+            flow[where[i]] = w[_MASS + i] * length[where[i]]
+
+
+@njit
+def work_size(integers):
+    """Floats that `shallow_rates` works in."""
+    return 21 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
+
+
+@njit
+def shallow_rates(
+    g, scheme, wide_by, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y
+):
+    """Rates of all cells; returns the greatest of sum L (|u| + c) / (2 A) and of the share that leaves a cell [1/s].
+
+    Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
+    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
+    reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
+    flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
+    through : float64[b]  volumes inward through the boundary [m3/s], or empty
+    """
+    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
+    count, first_order = blocks(integers), scheme == UPWIND
+    m = count * slots * BLOCK
+    at, to = HEAD + INDICES * m // 2, MEASURES * m
+    need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
+    faces = integers[at + count + 2 * b :]
+    bx, by, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
+    places = integers[HEAD:].view(np.int32)
+    near, wide = ring * BLOCK, 4 * ring * BLOCK
+    h, e, u, v = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
+    c, rest = work[4 * near : 5 * near], work[5 * near :]
+    hs, es, us, vs = rest[:wide], rest[wide : 2 * wide], rest[2 * wide : 3 * wide], rest[3 * wide : 4 * wide]
+    if first_order:
+        hs, es, us, vs = h, e, u, v
+    shown, w = rest[4 * wide : 4 * wide + 2 * b], rest[4 * wide + 2 * b :]
+    top, shore = w[11 * BLOCK :], w[12 * BLOCK :]
+    for i in range(BLOCK):
+        top[i] = 0.0
+    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
+    for j in range(count):
+        while sided < need[j]:
+            while known < need[sided]:
+                i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
+                put_primitives(g, plan[DEPTH, i:k], plan[SURFACE, i:k], dh[i:k], qx[i:k], qy[i:k],
+                               h[o:], e[o:], u[o:], v[o:], c[o:])  # fmt: skip
+                known += 1
+            if not first_order:
+                k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
+                here, su, sv = edges[k:wall], shown[k:wall], shown[b + k : b + wall]
+                mirror(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, u, v, su, sv)
+                o = (sided % ring) * BLOCK
+                put_sides(
+                    sided, floats, integers, h, wide_by, h[o:], su, edges[:0], w, hs
+                )  # from zero to twice the depth
+                put_shores(h[o:], shore)
+                put_sides(sided, floats, integers, e, wide_by, shore, su, edges[:0], w, es)
+                # velocities by no more than waves run: beside a thin cell that runs away a linear field turns back
+                put_sides(sided, floats, integers, u, wide_by, c[o:], su, here, w, us)
+                put_sides(sided, floats, integers, v, wide_by, c[o:], sv, here, w, vs)
+            sided += 1
+        clear(w)
+        first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
+        for k in range(slots):
+            slot = j * slots + k
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            beyond, own = (where, o) if first_order else (where[SIDE * BLOCK :], 4 * o + k * BLOCK)
+            gather(hs, beyond, w)
+            gather(es, beyond, w[_E:])
+            gather(us, beyond, w[_U:])
+            gather(vs, beyond, w[_V:])
+            gather(c, where, w[_C:])
+            i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
+            mirror_sides(edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, us[own:], vs[own:], w)
+            settle(g, h[o:], e[o:], c[o:], hs[own:], es[own:], us[own:], vs[own:], geo, w)
+            if flow.size > 0:
+                put_flow(faces[slot * BLOCK :], w, lengths, flow)
+            if through.size > 0:
+                put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
+        quickest(w, top)
+        put_rates(w, rate_h[first:last], rate_x[first:last], rate_y[first:last])
+    most = 0.0
+    for i in range(BLOCK):
+        most = max(most, top[i])
+    return most

@@ -1,0 +1,156 @@
+"""A free surface over a bed: the lake at rest about which its states deviate. Knows no network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fvsolve.basins.free_surface import faces, grid
+from fvsolve.basins.free_surface.lower_dispersion import Watch, notices
+from fvsolve.basins.free_surface.observe import DEPTH
+from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.basins.lower_pieces import MARKED
+from fvsolve.case.basins import means, samples
+from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.phases import Pieces
+
+HOME = __package__
+WATER = Pieces(
+    home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_water",
+    power="energy: add_power", stored="energy: add_stored",
+)  # fmt: skip
+SCALE = 0.1  # [m] of depth
+ROUNDING = 1e-12  # of levels and beds, less than which is no water
+TINY = 1e-300
+UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one,
+SHORES = 6.0  # and sixths of cells under fifth order where there is a shore
+
+
+def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
+    """Mean depth of water over cells whose bed is its mean, from `samples` of both : float64[n] [m].
+
+    The mean of max(level - bed, 0). Water of one level that a bank cuts off in the cell stands at that level over the
+    mean of the bed in its place, for so it rests; the less, the more the level follows the bed.
+    """
+    deep = level - bed
+    wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))
+    deep, flooded = np.where(wet, deep, 0.0), wet.any(axis=0)
+    low, high = np.where(wet, level, np.inf).min(axis=0), np.where(wet, level, -np.inf).max(axis=0)
+    middle = means(np.where(wet, level, 0.0)) / np.where(flooded, means(1.0 * wet), 1.0)
+    middle = np.where(flooded, np.where(high > low, middle, low), -np.inf)
+    still, there = np.maximum(middle - means(bed), 0.0), means(np.maximum(middle - bed, 0.0))
+    rise = np.where(flooded, high - low, 0.0)
+    follows = np.minimum(rise / np.maximum(np.ptp(bed, axis=0), TINY), 1.0)
+    return np.maximum(still + (means(deep) - there) - follows * (still - there), 0.0)
+
+
+class FreeSurfaceRows(BasinRows):
+    """Shallow water, states depth [m] and flows per width [m2/s]."""
+
+    units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
+    deep, far_ends = True, False
+
+    def __init__(self, case, name: str) -> None:
+        super().__init__(case, name)
+        self.bed = self.formula(self.part.bed)
+        self.depth = np.maximum(self.part.level - self.bed, 0.0)
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        yield Pieces(home=HOME, rates="rates: rates_on_grids" if self.is_grid else "rates: rates_on_meshes")
+        yield WATER
+        yield MARKED
+        if valves:
+            yield Pieces(home=HOME, brake="patches: quickest_inflow")
+
+    def scales(self) -> list[float]:
+        flow = SCALE * np.sqrt(self.case.gravity * SCALE)
+        return [SCALE, flow, flow]
+
+    def lower(self, draft, row) -> None:
+        plan = np.zeros((grid.PLANS, self.n))
+        plan[0], plan[1] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
+        part, weight = self.part, self.case.properties.density * self.case.gravity
+        row["rest"] = weight * (part.level + (part.elevation or 0.0))
+        if part.manning is not None or part.factor is not None:
+            row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
+            row["roughness"] = part.factor if part.manning is None else part.manning
+        if self.is_grid:
+            self.lower_grid(draft, row)
+        else:
+            self.lower_faces(draft, row)
+        row["plan"] = draft.to_plane(plan)
+
+    def lower_grid(self, draft, row) -> None:
+        dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
+        row["unsplit"] = SHORES if dry and self.fifth else UNSPLIT
+        row["work"] = draft.to_work(grid.WORK)
+
+    def lower_faces(self, draft, row) -> None:
+        row["unsplit"] = UNSPLIT
+        row["work"] = draft.to_work(faces.work_size(self.integers))
+
+    def start(self) -> np.ndarray:
+        found, given = np.zeros((3, self.n)), self.part.start
+        depth = self.depth
+        if given is not None and given.level is not None:
+            depth = depth_at_start(samples(given.level, self.mesh), samples(self.part.bed, self.mesh))
+            found[0] = depth - self.depth
+        if given is not None:
+            found[1], found[2] = depth * self.formula(given.u), depth * self.formula(given.v)
+        return found
+
+    def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
+        depth = np.maximum(self.depth + y[0], 0.0)
+        bed, wet = self.bed + (self.part.elevation or 0.0), np.maximum(depth, THIN)
+        share = 2.0 * depth / (depth * depth + wet * wet)
+        velocity = np.column_stack([share * y[1], share * y[2], np.zeros(self.n)])
+        return {"depth": depth, "bed": bed, "surface": bed + depth, "velocity": velocity}
+
+    def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.fields(y)["velocity"], np.sqrt(self.case.gravity * self.depth_of(y))
+
+    def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return super().ground(x, y) + (0.0 if self.part.bed is None else self.part.bed.at(x, y))
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        depth = self.depth + self.start()[0]
+        low, high = float(depth.min()), float(depth.max())
+        speeds = np.sqrt(self.case.gravity * np.array([low, high]))
+        return {"depth": (low, high), "wave_speed": (float(speeds[0]), float(speeds[1]))}
+
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field not in ("depth", "surface", "bed"):
+            return super().lower_probe(row, field, cells, weights)
+        row["side"], row["scale"] = DEPTH, float(field != "bed")
+        if field != "depth":
+            row["offset"] = weights @ self.bed[cells] + (self.part.elevation or 0.0)
+
+    def mass(self) -> tuple[float, np.ndarray]:
+        per = self.case.properties.density * self.mesh.area
+        return float(np.sum(per * self.depth)), per
+
+    def weights(self, y: np.ndarray) -> np.ndarray:
+        per, depth = self.case.properties.density * self.mesh.area, np.maximum(self.depth + y[0], THIN)
+        return np.array([0.5 * self.case.gravity * per, 0.5 * per / depth, 0.5 * per / depth])
+
+    def above(self, y: np.ndarray, datum: float) -> float:
+        depth, bed = np.maximum(self.depth + y[0], 0.0), self.bed + (self.part.elevation or 0.0) - datum
+        height = 0.5 * self.case.gravity * ((bed + depth) ** 2 - np.maximum(bed, 0.0) ** 2)
+        wet = np.maximum(depth, THIN)
+        moves = depth / (depth**2 + wet**2) * (y[1] ** 2 + y[2] ** 2)
+        return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
+
+    def notices(self, y: np.ndarray) -> list[Notice]:
+        return notices(self, y)
+
+    def watch(self, y: np.ndarray) -> Watch | None:
+        return None if self.notices(y) else Watch(self)
+
+    def depth_of(self, y: np.ndarray) -> np.ndarray:
+        return np.maximum(self.depth + y[0], 0.0)
+
+    def held(self) -> np.ndarray:
+        return self.case.properties.density * self.mesh.area

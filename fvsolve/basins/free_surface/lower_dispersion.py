@@ -1,0 +1,124 @@
+"""Whether the waves of a free surface are long: shallow water knows no others. Knows surfaces; knows no run.
+
+Waves of wavenumber k run at sqrt(g tanh(k h) / k), in shallow water at sqrt(g h). Of a surface e over that at rest,
+less its mean, k is that of a single wave with the same ratio of e^2 to |grad psi|^2, -div grad psi = e and no slope at
+walls: the mean of 1 / k^2 over its waves, each as its square counts, so that a steep front is no short wave.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.errors import Notice
+
+WRONG = 0.01  # share of the speed from which a word is due
+SEEN, MATTERS = 1e-6, 1e-3  # of the depth, root mean square of a surface: given at the start, come about in a run
+
+
+class Waves(NamedTuple):
+    """Of a surface: wavenumber [1/m], mean depth of wet cells [m], root mean square of the surface over that depth."""
+
+    k: float
+    depth: float
+    size: float
+
+    @property
+    def wrong(self) -> float:
+        """Share by which real waves run slower than shallow water has them."""
+        kh = self.k * self.depth
+        return 1.0 - math.sqrt(math.tanh(kh) / kh)
+
+
+def waves(basin, y: np.ndarray) -> Waves | None:
+    """The waves of a basin at deviations y; None without any."""
+    depth, area = basin.depth + y[0], basin.mesh.area
+    wet = depth > 0.0
+    if not wet.any():
+        return None
+    mean, reached = float(np.average(depth[wet], weights=area[wet])), wet | (basin.depth > 0.0)
+    surface = np.where(reached, y[0] - np.average(y[0][reached], weights=area[reached]), 0.0)
+    with np.errstate(over="ignore"):  # of a run that blows up
+        square = float(np.average(surface**2, weights=area))
+    if not SEEN * mean < math.sqrt(square) < math.inf:
+        return None
+    inverse = on_grid(basin, surface) if is_even(basin) else on_mesh(basin, surface)
+    return Waves(math.sqrt(square / inverse), mean, math.sqrt(square) / mean)
+
+
+def is_even(basin) -> bool:
+    """Whether its cells are a grid of equal rectangles."""
+    grid = basin.mesh.grid
+    return basin.is_grid and all(np.ptp(np.diff(one)) < 1e-9 * (one[-1] - one[0]) for one in (grid.x, grid.y))
+
+
+def on_grid(basin, surface: np.ndarray) -> float:
+    """Mean of |grad psi|^2, by cosines."""
+    from scipy.fft import dctn
+
+    grid = basin.mesh.grid
+    square = dctn(surface.reshape(grid.ny, grid.nx), norm="ortho") ** 2 / surface.size
+    kx, ky = (np.pi * np.arange(n) / (one[-1] - one[0]) for n, one in ((grid.nx, grid.x), (grid.ny, grid.y)))
+    k = kx**2 + ky[:, None] ** 2
+    square[0, 0], k[0, 0] = 0.0, 1.0
+    return float(np.sum(square / k))
+
+
+def on_mesh(basin, surface: np.ndarray) -> float:
+    """The same on any mesh, by differences across faces."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import spsolve
+
+    mesh, inner = basin.mesh, basin.mesh.inner
+    left, right, n = mesh.left[:inner], mesh.right[:inner], basin.n
+    apart = np.abs(np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1))
+    per = mesh.length[:inner] / apart
+    rows, columns = np.concatenate([left, right, left, right]), np.concatenate([left, right, right, left])
+    matrix = coo_array((np.concatenate([per, per, -per, -per]), (rows, columns)), shape=(n, n)).tocsc()
+    own = mesh.area * (surface - np.average(surface, weights=mesh.area))
+    psi = np.zeros(n)
+    psi[1:] = spsolve(matrix[1:, 1:], own[1:])
+    return float(own @ psi / mesh.area.sum())
+
+
+def said(basin, found: Waves) -> str:
+    """What a reader has to know."""
+    return (
+        f"{basin.name}: waves about {2.0 * math.pi / found.k:.3g} m long in {found.depth:.3g} m of water (k h = "
+        f"{found.k * found.depth:.2g}): real ones run {100.0 * found.wrong:.2g} % slower than shallow water has them"
+    )
+
+
+def notice(basin, found: Waves, when: str = "") -> Notice:
+    """That they are too short, and when."""
+    return Notice("dispersion", f"nodes.{basin.name}", said(basin, found) + when, None, float(found.wrong), WRONG)
+
+
+def notices(basin, y: np.ndarray) -> list[Notice]:
+    """That waves of a basin are too short at deviations y, where they are."""
+    found = waves(basin, y)
+    return [notice(basin, found)] if found is not None and found.wrong > WRONG else []
+
+
+class Watch:
+    """The shortest waves of a run that matter, of one basin.
+
+    kept : float64[4]  when they were seen, and what they were; nan where none were
+    """
+
+    def __init__(self, basin) -> None:
+        self.basin, self.kept = basin, np.full(4, np.nan)
+
+    def look(self, t: float, y: np.ndarray) -> None:
+        """At a model's state."""
+        one = waves(self.basin, self.basin.of(y))
+        if one is not None and one.size > MATTERS and not one.wrong <= Waves(*self.kept[1:]).wrong:
+            self.kept[:] = t, *one
+
+    def notices(self) -> list[Notice]:
+        """That they are too short, where they are."""
+        t, *found = self.kept.tolist()
+        one = Waves(*found)
+        return [notice(self.basin, one, f", at {t:.4g} s")] if one.wrong > WRONG else []

@@ -1,0 +1,39 @@
+"""What probes read of water with a free surface. Knows the tables; changes no state."""
+
+from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.observe import OWN, of_velocity
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import CELL_FIELD
+
+MINE = kind_of(__package__)
+DEPTH = OWN
+
+
+@njit
+def observe_water(t, y, out, handle, values):
+    """values[k] of the probes that read cells: scale * depth + offset, or velocities."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+            depth, u, v = read(tables, probe, y)
+            own = probe["side"] == DEPTH
+            values[k] = probe["scale"] * depth + probe["offset"] if own else of_velocity(probe["side"], u, v)
+
+
+@njit
+def read(tables, probe, y):
+    """Weighted sums of depths [m] and of velocities along x and y, which fade where water is thin [m/s]."""
+    basin, total, u, v = tables.basins[probe["index"]], 0.0, 0.0, 0.0
+    n, o = basin["n"], basin["y"]
+    for m in range(probe["count"]):
+        i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+        depth = max(tables.plane[basin["plan"] + i] + y[o + i], 0.0)
+        wet = max(depth, THIN)
+        share = 2.0 * depth / (depth * depth + wet * wet) * weight
+        total += weight * depth
+        u += share * y[o + n + i]
+        v += share * y[o + 2 * n + i]
+    return total, u, v

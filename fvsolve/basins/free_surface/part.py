@@ -1,0 +1,63 @@
+"""Water with a free surface. Knows its keys and what can be read of it; computes nothing."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
+from fvsolve.parts.formula import Formula, Shaped
+from fvsolve.parts.value import VALUE, Quantity, Usual, anything, nonnegative
+
+
+class SurfaceStart(MovingStart):
+    """What it starts from where that is not rest."""
+
+    level: Annotated[Formula | None, Shaped("length", "of the free surface above the elevation [m]")] = None
+
+
+class FreeSurface(Physics, name="free-surface"):
+    """h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
+
+    states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
+    fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **MOVES}
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
+    starts: ClassVar[type[MovingStart]] = SurfaceStart
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    described: ClassVar[str] = "a free surface, whose water has one density"
+    steep: ClassVar[bool] = True
+
+    level: Annotated[
+        float, Quantity("level", anything, "of the water at rest, above the elevation [m]; free surface, needed there")
+    ]
+    bed: Annotated[Formula | None, Shaped("length", "height above the elevation [m], free surface; 0 if left out")] = (
+        None
+    )
+    manning: Annotated[
+        float | None,
+        Quantity(
+            "number", nonnegative, "Manning's n [s/m^(1/3)], free surface; no friction if left out",
+            Usual(0.005, 0.5, "glass to dense brush"), VALUE,
+        ),
+    ] = None  # fmt: skip
+    factor: Annotated[
+        float | None,
+        Quantity(
+            "number", nonnegative, "Darcy's, in place of manning [-], free surface; no friction if left out",
+            Usual(0.002, 3.0, "glass to boulders"), VALUE,
+        ),
+    ] = None  # fmt: skip
+
+    @classmethod
+    def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
+        """At the mean height of the bed that is under water, or of the lowest of it."""
+        bed = mean(basin.bed)
+        cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(basin.level, -np.inf))]
+        height = float(np.average(bed[cells], weights=area[cells]))
+        stated = basin.elevation is not None or basin.bed is not None
+        return {
+            "elevation": (basin.elevation or 0.0) + height if stated else None,
+            "depth": float(np.average(np.maximum(basin.level - bed[cells], 0.0), weights=area[cells])),
+            "pressure": None,
+        }

@@ -1,0 +1,117 @@
+"""Patches of water with a free surface: what the network finds there, and what it brings or takes. Knows the tables."""
+
+from math import inf, sqrt
+
+from fvsolve.basins.behind import HARDLY, SHALLOW, counted, depth_behind, to_be_had, weight, weight_out
+from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.patches import give_way
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import PATCH, RATE
+from fvsolve.kernels.restrictions import head_drop
+
+MINE = kind_of(__package__)
+
+
+@njit
+def water_behind(tables, patch, y):
+    """(rise of the surface, depth, volume, sum of area times weight squared) of the cells behind a patch.
+
+    Cells count by their area times `weight_out`, so that a dry bank is no water; the volume is the sum. The rise is
+    from the surface at rest, where all is dry from the lowest bed.
+    """
+    basin, plane = tables.basins[patch["basin"]], tables.plane
+    n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
+        if bed < low:
+            low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
+    rest, rise, depth, volume, squares = max(low, 0.0), 0.0, 0.0, 0.0, 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        h = depth_behind(plane, basin, i, y)
+        part = plane[basin["area"] + i] * weight_out(h)
+        volume, squares = volume + part, squares + part * weight_out(h)
+        rise += part * (plane[plan + n + i] + y[basin["y"] + i] - rest)
+        depth += part * h
+    hardly = max(HARDLY * patch["area"] - volume, 0.0)
+    total = volume + hardly
+    return (rise + hardly * (lowest - rest)) / total, depth / total, volume, squares
+
+
+@njit
+def patch_pressures(t, y, dydt, out, handle):
+    """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
+    tables = open_tables(handle)
+    st, layout = tables.settings[0], tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        if tables.basins[patch["basin"]]["kind"] != MINE:
+            continue
+        node = tables.nodes[patch["node"]]
+        stored, depth, volume, squares = water_behind(tables, patch, y)
+        slope, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
+        spread = patch["area"] * squares / (volume * volume) if volume > HARDLY * patch["area"] else 1.0
+        out[layout["pressure"] + patch["node"]] = slope * stored
+        out[layout["supply"] + patch["node"]] = 0.0
+        out[layout["had"] + node["row"]] = to_be_had(depth)
+        out[layout["stiffness"] + node["row"]] = slope * spread / content
+
+
+@njit
+def patch_flows(t, y, dydt, out, handle):
+    """Add what the patches bring or take to the rates of the cells behind them."""
+    tables = open_tables(handle)
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        if tables.basins[patch["basin"]]["kind"] == MINE:
+            pass_patch(tables, patch, out[tables.layout[0]["net"] + patch["node"]], y, dydt, out)
+
+
+@njit
+def pass_patch(tables, patch, asked, y, dydt, out):
+    """What a patch brings or takes; where water is thin, what is asked may not be had."""
+    st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
+    basin, rho = tables.basins[patch["basin"]], st["rho"]
+    n, o, first = basin["n"], basin["y"], patch["first"]
+    _, depth, volume, _ = water_behind(tables, patch, y)
+    leaves, had = asked < 0.0, 1.0
+    total = counted(tables, patch, leaves, y)
+    if leaves:
+        had = to_be_had(depth)  # the rest comes from outside
+        slope = -2.0 * asked * had * min(depth / SHALLOW, 1.0) / (rho * total)  # 2, more than that of `weight_out`
+        out[RATE] = max(out[RATE], slope)
+        out[layout["supply"] + patch["node"]] += (had * volume / total - 1.0) * asked
+    flow = had * asked / (rho * total)  # of depth, over weights [1/s]
+    for m in range(patch["count"] if dydt.size > 0 else 0):
+        dydt[o + integers[first + m]] += flow * weight(plane, basin, leaves, integers[first + m], y)
+    per_width = -flow * patch["area"] / patch["length"]  # over weights [m/s]
+    for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
+        k = integers[patch["ring"] + patch["faces"] + m]
+        out_per_width = per_width * weight(plane, basin, leaves, k, y)
+        h = depth_behind(plane, basin, k, y)
+        i, at, many = o + k, patch["normals"], patch["faces"]
+        share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
+        along_x, along_y = plane[at + m], plane[at + many + m]
+        u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
+        give_way(plane, patch, m, (abs(u) + sqrt(st["gravity"] * h)) * out_per_width, dydt, i + n, i + 2 * n)
+        if out_per_width > 0.0:  # water that leaves takes along what it has across
+            across, taken = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * many + m]
+            dydt[i + n] += out_per_width * taken * across * along_y
+            dydt[i + 2 * n] -= out_per_width * taken * across * along_x
+
+
+@njit
+def quickest_inflow(t, y, dydt, out, handle):
+    """Let steps see what is about to come: waves as quick as the head before a gate makes them, over a dry bed too."""
+    tables = open_tables(handle)
+    st, valves, patches = tables.settings[0], tables.valves, tables.patches
+    for k in range(valves.size):
+        drop = head_drop(tables, out, k)[1]
+        taker = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
+        for p in range(patches.size if tables.nodes[taker]["kind"] == PATCH else 0):
+            if patches[p]["node"] == taker and tables.basins[patches[p]["basin"]]["kind"] == MINE:
+                wide = sqrt(patches[p]["area"] / patches[p]["count"])
+                out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)

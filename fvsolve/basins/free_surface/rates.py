@@ -1,0 +1,94 @@
+"""Rates of the cells of water with a free surface. Knows the tables; knows no flux."""
+
+from fvsolve.basins.free_surface import faces, grid
+from fvsolve.basins.free_surface.friction import FASTEST, add_friction
+from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.patches import book_open, wanted
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import NO_DRAG, RATE
+
+MINE = kind_of(__package__)
+
+
+@njit
+def through_faces(kx, ky, flow_x, flow_y):
+    """Make flows per width of faces, row by row, flows through them."""
+    nx = kx.size
+    for j in range(ky.size):
+        high = 1.0 / ky[j]
+        for i in range(nx + 1):
+            flow_x[j * (nx + 1) + i] *= high
+    for i in range(nx):
+        wide = 1.0 / kx[i]
+        for j in range(ky.size + 1):
+            flow_y[j * nx + i] *= wide
+
+
+@njit
+def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
+    """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
+    st, basin = tables.settings[0], tables.basins[b]
+    if basin["friction"] != NO_DRAG:
+        roughness = tables.basins["roughness"][b : b + 1]
+        fades = add_friction(
+            basin["friction"], st["gravity"], roughness, FASTEST, depth, dh, qx, qy, rate_x, rate_y
+        )  # fmt: skip
+        out[RATE] = max(out[RATE], fades)
+    book_open(tables, b, st["rho"], out)
+    out[RATE] = max(out[RATE], basin["unsplit"] * rate)
+
+
+@njit
+def rates_on_grids(t, y, dydt, out, handle):
+    """Rates of cells of rectangles."""
+    tables = open_tables(handle)
+    st, plane, work = tables.settings[0], tables.plane, tables.work
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["kind"] != MINE or basin["nx"] == 0 or not wanted(basin, dydt):
+            continue
+        n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
+        nx, ny, through = basin["nx"], basin["ny"], basin["through"]
+        plan, many = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), ny * (nx + 1)
+        flow_x, flow_y = work[:0], work[:0]
+        if f >= 0:  # scalars are carried by them
+            flow_x, flow_y = work[f : f + many], work[f + many : f + many + (ny + 1) * nx]
+        dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+        rates = to[first : first + 3 * n]
+        rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
+        rate = grid.grid_rates(
+            st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
+            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
+            work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
+        )  # fmt: skip
+        if f >= 0:
+            through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
+        finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+
+
+@njit
+def rates_on_meshes(t, y, dydt, out, handle):
+    """Rates of cells of any mesh."""
+    tables = open_tables(handle)
+    st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["kind"] != MINE or basin["nx"] > 0 or not wanted(basin, dydt):
+            continue
+        n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
+        plan = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n))
+        dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+        rates = to[first : first + 3 * n]
+        rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
+        flow = work[:0]
+        if f >= 0:  # scalars are carried by them
+            flow = work[f : f + basin["faces"]]
+        rate = faces.shallow_rates(
+            st["gravity"], basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
+            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
+            work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
+        )  # fmt: skip
+        finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)

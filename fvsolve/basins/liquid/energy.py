@@ -1,0 +1,48 @@
+"""Power and stored energy of a liquid under the linear law. Knows the tables; adds nothing up over time.
+
+It stores per volume P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho), P its potential at rest; rows: `basins.energy`.
+"""
+
+from fvsolve.basins.energy import at_rest, row_of
+from fvsolve.basins.kinds import kind_of
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+
+MINE = kind_of(__package__)
+
+
+@njit
+def add_power(t, y, dydt, out, handle, power):
+    """Rows of its basins."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if tables.basins[b]["kind"] == MINE:
+            rows = power[row_of(tables, power, b) :]
+            liquid_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
+
+
+@njit
+def liquid_power(st, basin, plane, y, dydt, rows):
+    """Rate of storage of a liquid."""
+    n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
+    rate, square = 0.0, basin["speed"] * basin["speed"]
+    for i in range(n):
+        moves = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]
+        rate += area[i] * ((rest + square * y[o + i]) * dydt[o + i] + moves)
+    rows[3] = basin["thickness"] * rate / st["rho"]
+
+
+@njit
+def add_stored(t, y, dydt, out, handle, stored):
+    """Rows of its basins."""
+    tables = open_tables(handle)
+    st, basins = tables.settings[0], tables.basins
+    for b in range(basins.size):
+        basin, total = basins[b], 0.0
+        if basin["kind"] != MINE:
+            continue
+        n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), tables.plane[basin["area"] :]
+        for i in range(n):
+            r, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+            total += area[i] * (rest * r + 0.5 * (basin["speed"] ** 2 * r * r + square))
+        stored[stored.size - basins.size + b] = total * (basin["thickness"] / st["rho"])

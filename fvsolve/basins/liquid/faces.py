@@ -1,0 +1,214 @@
+"""Pressure waves of a liquid on any mesh, under all its laws. Knows cells and their sides; knows no patch.
+
+States, waves and their fluxes are those of the grid (see `liquid` and `liquid_log`): across a side (w + u) / 2 comes
+from inside and (w - u) / 2 from beyond, with w = c r, u = m under `linear`, u = m / rho under `log`, where
+w = 2 (c0 - c), and `table`, where it is read.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.basins.faces import (
+    BLOCK,
+    HEAD,
+    HUGE,
+    INDICES,
+    MEASURES,
+    NX,
+    NY,
+    REACH,
+    SIDE,
+    blocks,
+    edges_before,
+    gather,
+    place,
+    put_inward,
+    put_sides,
+)
+from fvsolve.basins.liquid.grid_full import log_sum
+from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.jit import njit
+from fvsolve.kernels.records import LAW_LOG, UPWIND
+
+# rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step, flow through the side
+_U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
+_NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
+ROWS = 11
+
+
+@njit
+def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
+    """w, both velocities (mass-flow densities) and wave speed of a block of cells."""
+    if table is not None:
+        for i in range(r.size):
+            w[i], slope = invariant(table, r[i])
+            volume = 1.0 / (rho + r[i])
+            u[i], v[i], c[i] = volume * mx[i], volume * my[i], (rho + r[i]) * slope
+        return
+    if law == LAW_LOG:
+        per, twice = 1.0 / rho, 2.0 * c0
+        for i in range(r.size):
+            x = per * r[i]
+            s = sqrt(1.0 + x)
+            volume = per / (s * s)
+            w[i], u[i], v[i], c[i] = twice * (x / (s * (1.0 + s))), volume * mx[i], volume * my[i], c0 / s
+    else:
+        for i in range(r.size):
+            w[i], u[i], v[i], c[i] = c0 * r[i], mx[i], my[i], c0
+
+
+@njit
+def show(edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v):
+    """What the boundary shows of the cells inside: a mirror at 1 and -1, and the same again where waves leave, at 0."""
+    for q in range(edges.size):
+        i = place(edges[q], ring)
+        r = reflect[number[q]] if reflect.size > 0 else 1.0
+        across = (min(1.0, 1.0 - 2.0 * r) - 1.0) * (u[i] * nx[q] + v[i] * ny[q])
+        shown_w[q], shown_u[q], shown_v[q] = (
+            min(1.0, 1.0 + 2.0 * r) * w[i],
+            u[i] + across * nx[q],
+            v[i] + across * ny[q],
+        )
+
+
+@njit
+def show_sides(edges, nx, ny, number, reflect, wl, ul, vl, w):
+    """Put beyond sides of the boundary the wave that comes back: w - u beyond is `reflect` times w + u inside."""
+    for q in range(edges.size):
+        i = edges[q] % BLOCK
+        r = reflect[number[q]] if reflect.size > 0 else 1.0
+        across = -(1.0 + r) * (ul[i] * nx[q] + vl[i] * ny[q])
+        w[i], w[_U + i], w[_V + i] = r * wl[i], ul[i] + across * nx[q], vl[i] + across * ny[q]
+
+
+@njit
+def settle_linear(c0, wl, ul, vl, geo, w):
+    """Take from the rates of a block of cells what leaves through one side of each, from the values inside it."""
+    for i in range(BLOCK):
+        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
+        backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
+        push = reach * (c0 * (forward + backward))
+        w[_RR + i] -= reach * (forward - backward)
+        w[_MASS + i] = forward - backward
+        w[_RX + i] -= push * nx
+        w[_RY + i] -= push * ny
+        w[_FAST + i] += reach * c0
+
+
+@njit
+def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w):
+    """The same, the full momentum flux; u0, v0, c : of the cells, for the step."""
+    bulk, per = rho * c0 * c0, 0.5 / c0
+    for i in range(BLOCK):
+        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
+        backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
+        u = forward - backward
+        if table is not None:
+            r, p = state(table, forward + backward)
+            mass = (rho + r) * u
+            push = mass * u + p
+        else:
+            y = -per * (forward + backward)  # c = c0 (1 + y)
+            mass = rho * u / ((1.0 + y) * (1.0 + y))
+            push = mass * u - 2.0 * bulk * log_sum(y)
+        along = mass * (vl[i] * nx - ul[i] * ny if u > 0.0 else w[_V + i] * nx - w[_U + i] * ny)
+        w[_RR + i] -= reach * mass
+        w[_RX + i] -= reach * (push * nx - along * ny)
+        w[_RY + i] -= reach * (push * ny + along * nx)
+        w[_FAST + i] += reach * (abs(u0[i] * nx + v0[i] * ny) + c[i])
+        w[_MASS + i] = mass
+
+
+@njit
+def clear(w):
+    """No rates and no sum yet."""
+    for i in range(BLOCK):
+        w[_RR + i], w[_RX + i], w[_RY + i], w[_FAST + i] = 0.0, 0.0, 0.0, 0.0
+
+
+@njit
+def put_rates(w, rate_r, rate_x, rate_y):
+    """Rates of a block of cells, and the greatest sum so far in each lane."""
+    for i in range(BLOCK):
+        w[_TOP + i] = max(w[_TOP + i], w[_FAST + i])
+    for i in range(rate_r.size):
+        rate_r[i], rate_x[i], rate_y[i] = w[_RR + i], w[_RX + i], w[_RY + i]
+
+
+@njit
+def work_size(integers):
+    """Floats that `liquid_rates` works in."""
+    return 16 * integers[4] * BLOCK + 3 * integers[3] + ROWS * BLOCK
+
+
+@njit
+def liquid_rates(
+    law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
+):
+    """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
+
+    law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
+    table : of `waves` in place of a law, or None
+    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
+    reflect : float64[b]  share of a wave that comes back, -1 to 1, empty for walls
+    r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
+    through : float64[b]  what comes in through the boundary [kg/(m s)], or empty
+    work : float64[work_size(integers)]
+    """
+    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
+    count, first_order = blocks(integers), scheme == UPWIND
+    m = count * slots * BLOCK
+    at, to = HEAD + INDICES * m // 2, MEASURES * m
+    need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
+    bx, by, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
+    places = integers[HEAD:].view(np.int32)
+    near, wide = ring * BLOCK, 4 * ring * BLOCK
+    p, u, v, c = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
+    rest = work[4 * near :]
+    ps, us, vs = rest[:wide], rest[wide : 2 * wide], rest[2 * wide : 3 * wide]
+    if first_order:
+        ps, us, vs = p, u, v
+    shown, w = rest[3 * wide : 3 * wide + 3 * b], rest[3 * wide + 3 * b :]
+    free = w[_FREE:]
+    for i in range(BLOCK):
+        w[_TOP + i], free[i] = 0.0, HUGE
+    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
+    for j in range(count):
+        while sided < need[j]:
+            while known < need[sided]:
+                i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
+                put_primitives(law, c0, rho, table, r[i:k], mx[i:k], my[i:k], p[o:], u[o:], v[o:], c[o:])
+                known += 1
+            if not first_order:
+                k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
+                here, sp, su, sv = edges[k:wall], shown[k:], shown[b + k :], shown[2 * b + k :]
+                show(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, p, u, v, sp, su, sv)
+                put_sides(sided, floats, integers, p, wide_by, free, sp, here, w, ps)
+                put_sides(sided, floats, integers, u, wide_by, free, su, here, w, us)
+                put_sides(sided, floats, integers, v, wide_by, free, sv, here, w, vs)
+            sided += 1
+        clear(w)
+        first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
+        for k in range(slots):
+            slot = j * slots + k
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            beyond, own = (where, o) if first_order else (where[SIDE * BLOCK :], 4 * o + k * BLOCK)
+            gather(ps, beyond, w)
+            gather(us, beyond, w[_U:])
+            gather(vs, beyond, w[_V:])
+            i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
+            show_sides(edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, ps[own:], us[own:], vs[own:], w)
+            if table is not None or law == LAW_LOG:
+                settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w)
+            else:
+                settle_linear(c0, ps[own:], us[own:], vs[own:], geo, w)
+            if through.size > 0:
+                put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
+        put_rates(w, rate_r[first:last], rate_x[first:last], rate_y[first:last])
+    most = 0.0
+    for i in range(BLOCK):
+        most = max(most, w[_TOP + i])
+    return 0.5 * most

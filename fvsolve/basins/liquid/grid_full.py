@@ -1,0 +1,240 @@
+"""Pressure waves of a liquid on a grid, laws `log` and `table`: the full momentum flux. Knows rows of cells; no patch.
+
+r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho): deviation of
+density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is carried along u + c
+and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed from their own sides, and the state
+that both make at a face is the Riemann problem's with two simple waves (Osher and Solomon 1982), below the speed of
+sound; the velocity along a face comes from the side that the flow comes from. Fifth order is that of the waves:
+products of averages are of second order, with the Mach number for a factor. Sides, rows and slots: see `liquid`.
+
+Under `table` p, c and w = integral of c / rho are read (see `waves`). Whether a table is None is known when a kernel is
+compiled, so that neither law compiles or runs anything of the other's.
+"""
+
+from math import sqrt
+
+from fvsolve.basins.liquid.grid import (
+    BEYOND,
+    EDGE,
+    RING,
+    SPARE,
+    WALLS,
+    bears,
+    close_row,
+    close_side,
+    faces,
+    fold,
+    image,
+    mirror,
+    put_waves,
+    send_back,
+    side_of,
+    value_upwind5,
+)
+from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.basins.patches import put_inward
+from fvsolve.jit import inner, njit
+from fvsolve.kernels.limiters import by_limiter, slope
+from fvsolve.kernels.reconstruction import value_weno5
+from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
+
+
+@njit(forceinline=True)
+def log_sum(y):
+    """ln(1 + y) by its fourth root's artanh, to round-off for y from -1/2 to 1; no call, so that loops are vectors."""
+    s = sqrt(1.0 + y)
+    q = 1.0 + sqrt(s)
+    t = y / ((1.0 + s) * (q * q))
+    z = t * t
+    p = 1.0 / 11.0 + z * (1.0 / 13.0 + z * (1.0 / 15.0))
+    p = 1.0 / 5.0 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z * p))
+    return 8.0 * t * (1.0 + z * (1.0 / 3.0 + z * p))
+
+
+@inner
+def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
+    """w and both velocities of a row [m/s]; top[i] the greatest (|u| + c) kx + (|v| + c) ky so far."""
+    if table is not None:
+        for i in range(w.size):
+            w[i], slope = invariant(table, r[i])
+            c, volume = (rho + r[i]) * slope, 1.0 / (rho + r[i])
+            a, b = volume * mx[i], volume * my[i]
+            rate = (abs(a) + c) * kx[i] + (abs(b) + c) * ky
+            u[i], v[i] = a, b
+            top[i] = rate if rate > top[i] else top[i]
+        return
+    per, twice = 1.0 / rho, 2.0 * c0
+    for i in range(w.size):
+        x = per * r[i]
+        s = sqrt(1.0 + x)
+        change, volume = twice * (x / (s * (1.0 + s))), per / (s * s)
+        a, b = volume * mx[i], volume * my[i]
+        c = c0 - 0.5 * change
+        rate = (abs(a) + c) * kx[i] + (abs(b) + c) * ky
+        w[i], u[i], v[i] = change, a, b
+        top[i] = rate if rate > top[i] else top[i]
+
+
+@inner
+def carried_limited(limiter, forward, backward, b, c, d, e, f):
+    """`faces_carried` by a limiter."""
+    for i in range(f.size):
+        on, jump = forward[i] > backward[i], d[i] - c[i]
+        rise = c[i] - b[i] if on else e[i] - d[i]
+        s = 0.5 * slope(limiter, rise, jump)
+        f[i] = c[i] + s if on else d[i] - s
+
+
+@njit
+def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f):
+    """Values at faces between c and d from the side that the flow, forward less backward wave, comes from."""
+    if scheme == UPWIND:
+        for i in range(f.size):
+            f[i] = c[i] if forward[i] > backward[i] else d[i]
+    elif scheme == LINEAR:
+        for i in range(f.size):
+            on = forward[i] > backward[i]
+            first, low, here = a[i] if on else g[i], b[i] if on else e[i], c[i] if on else d[i]
+            f[i] = value_upwind5(first, low, here, d[i] if on else c[i], e[i] if on else b[i])
+    elif scheme == WENO5:
+        for i in range(f.size):
+            on = forward[i] > backward[i]
+            first, low, here = a[i] if on else g[i], b[i] if on else e[i], c[i] if on else d[i]
+            f[i] = value_weno5(first, low, here, d[i] if on else c[i], e[i] if on else b[i], small)
+    else:
+        by_limiter(carried_limited, limiter, forward, backward, b, c, d, e, f)
+
+
+@inner
+def fluxes(c0, rho, table, forward, backward, along):
+    """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them."""
+    if table is not None:
+        for i in range(forward.size):
+            r, p = state(table, forward[i] + backward[i])
+            u = forward[i] - backward[i]
+            mass = (rho + r) * u
+            forward[i], backward[i], along[i] = mass, mass * u + p, mass * along[i]
+        return
+    bulk, per = rho * c0 * c0, 0.5 / c0
+    for i in range(forward.size):
+        y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]  # c = c0 (1 + y)
+        mass = rho * u / ((1.0 + y) * (1.0 + y))
+        forward[i], backward[i] = mass, mass * u - 2.0 * bulk * log_sum(y)
+        along[i] = mass * along[i]
+
+
+@inner
+def settle_row(k, mass, push, along, rate_r, rate_m, rate_t):
+    """Rates of a row of cells from faces i and i + 1."""
+    m, p, t = mass[1:], push[1:], along[1:]
+    for i in range(rate_r.size):
+        rate_r[i] = k[i] * (mass[i] - m[i])
+        rate_m[i] = k[i] * (push[i] - p[i])
+        rate_t[i] = k[i] * (along[i] - t[i])
+
+
+@inner
+def settle_column(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
+    """The same, added, of a row of cells between two rows of faces."""
+    for i in range(rate_r.size):
+        rate_r[i] += k * (m0[i] - m1[i])
+        rate_m[i] += k * (p0[i] - p1[i])
+        rate_t[i] += k * (t0[i] - t1[i])
+
+
+@njit
+def work_size(nx, ny):
+    """Floats that `grid_rates` works in."""
+    return (3 * RING + 6 + 3) * nx + 3 * (nx + 2 * BEYOND) + 3 * (nx + 1) + SPARE
+
+
+@njit
+def grid_rates(
+    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
+):
+    """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+
+    c0, rho : wave speed [m/s] and density [kg/m3] at rest
+    table : of `waves`, or None for law `log`; small : a velocity too small to mean anything, squared
+    The others are those of `liquid.grid_rates`; work : float64[work_size(nx, ny)]
+    """
+    wide, f, size = nx + 2 * BEYOND, nx + 1, RING * nx
+    up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]
+    between, work = work[: 6 * nx], work[6 * nx :]
+    w, v, top, work = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx], work[3 * nx :]
+    east, west, over, work = work[:wide], work[wide : 2 * wide], work[2 * wide : 3 * wide], work[3 * wide :]
+    fe, fw, ft, spare = work[:f], work[f : 2 * f], work[2 * f : 3 * f], work[3 * f :]
+    rows = 0
+    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
+    to_w, to_e, to_s, to_n = side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
+    along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
+    for i in range(nx):
+        top[i] = 0.0
+    for j in range(ny + 1):  # faces between rows j - 1 and j
+        while rows < min(max(j + BEYOND, EDGE), ny):
+            a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
+            u, v = aside[at : at + nx], over[BEYOND : nx + BEYOND]
+            put_primitives(c0, rho, table, kx, ky[rows], r[a:z], mx[a:z], my[a:z], w, u, v, top)
+            put_waves(0.5, w, v, up[at : at + nx], down[at : at + nx])
+            put_waves(0.5, w, u, east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
+            mirror(nx, east, west)
+            mirror(nx, over, over)
+            if to_w != WALLS:
+                close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
+            if to_e != WALLS:
+                last = nx + BEYOND - 1
+                close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
+            faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
+            faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
+            if to_w != WALLS:
+                fe[0] = reflect[rows] * fw[0]
+            if to_e != WALLS:
+                fw[nx] = reflect[ny + rows] * fe[nx]
+            faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
+            fluxes(c0, rho, table, fe, fw, ft)
+            if through.size > 0:
+                through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
+            settle_row(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            rows += 1
+        for side in range(2):  # rows beyond the southern and the northern side
+            if (side == 0 and j > 0) or (side == 1 and j != max(ny - BEYOND + 1, 0)):
+                continue
+            for k in range(BEYOND):
+                row = ny + k if side == 1 else -1 - k
+                q, at = fold(row, ny), (row % RING) * nx
+                a, z, u = q * nx, (q + 1) * nx, aside[at : at + nx]
+                one, other = (down, up) if image(row, ny) else (up, down)
+                put_primitives(c0, rho, table, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
+                put_waves(0.5, w, v, one[at : at + nx], other[at : at + nx])
+            if side == 0 and to_s != WALLS:
+                close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
+            if side == 1 and to_n != WALLS:
+                close_row(to_n, across, limiter, small, north, ny, down, up, ny - 1, -1, spare)
+        now, before = 3 * nx * (j % 2), 3 * nx * (1 - j % 2)
+        gu, gd, gt = between[now : now + nx], between[now + nx : now + 2 * nx], between[now + 2 * nx : now + 3 * nx]
+        a, b, d = ((j - 3) % RING) * nx, ((j - 2) % RING) * nx, ((j - 1) % RING) * nx
+        e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
+        faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], gu)
+        faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], gd)
+        if j == 0 and to_s != WALLS:
+            send_back(south, gd, gu)
+        if j == ny and to_n != WALLS:
+            send_back(north, gu, gd)
+        faces_carried(
+            across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
+        )
+        fluxes(c0, rho, table, gu, gd, gt)
+        if through.size > 0 and j == 0:
+            put_inward(1.0, kx, gu, through[2 * ny : 2 * ny + nx])
+        if through.size > 0 and j == ny:
+            put_inward(-1.0, kx, gu, through[2 * ny + nx :])
+        if j > 0:
+            a, z = (j - 1) * nx, j * nx
+            settle_column(
+                ky[j - 1], between[before:], between[before + nx :], between[before + 2 * nx :], gu, gd, gt,
+                rate_r[a:z], rate_y[a:z], rate_x[a:z],
+            )  # fmt: skip
+    most = 0.0
+    for i in range(nx):
+        most = max(most, top[i])
+    return most

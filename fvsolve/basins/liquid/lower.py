@@ -1,0 +1,145 @@
+"""A liquid between two plates: waves about rest at a pressure. Knows no network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from fvsolve.basins.liquid import faces, grid, grid_full
+from fvsolve.basins.liquid.observe import PRESSURE
+from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.basins.lower_pieces import MARKED
+from fvsolve.kernels.phases import Pieces
+
+HOME = __package__
+LIQUID = Pieces(
+    home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_liquid",
+    power="energy: add_power", stored="energy: add_stored",
+)  # fmt: skip
+SCALE = 1e5  # [Pa]
+SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
+
+
+class LiquidRows(BasinRows):
+    """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
+
+    law linear: p = a^2 (rho - rho0); laws log, p = K ln(rho / rho0), and table with the full momentum flux.
+    """
+
+    units = {"pressure": "Pa", "velocity": "m/s"}
+
+    def __init__(self, case, name: str) -> None:
+        super().__init__(case, name)
+        fluid = case.properties
+        self.linear, self.waves = case.law.linear, None
+        if case.law.tabulated:
+            from fvsolve.basins.liquid.lower_waves import Waves
+
+            self.waves = Waves(fluid, self.part.pressure, self.part.wave_speed)
+            self.density, self.speed = self.waves.density, self.waves.speed
+            return
+        strain = (self.part.pressure - fluid.pressure) / fluid.bulk_modulus
+        self.density = fluid.density * (1.0 if self.linear else math.exp(strain))
+        self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        module = "table" if self.waves is not None else "rates"
+        on_grid = "waves_on_grids" if self.linear else "rates_on_grids"
+        yield Pieces(home=HOME, rates=f"{module}: {on_grid if self.is_grid else 'rates_on_meshes'}")
+        yield LIQUID
+        yield MARKED
+        if self.waves is not None:
+            yield Pieces(home=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
+
+    @property
+    def even_paced(self) -> bool:
+        return self.linear
+
+    def scales(self) -> list[float]:
+        return [SCALE / self.speed**2, SCALE / self.speed, SCALE / self.speed]
+
+    def reflection(self, patch) -> float:
+        if patch.impedance is None:
+            return super().reflection(patch)
+        own = self.density * self.speed
+        return (patch.impedance - own) / (patch.impedance + own)
+
+    def lower(self, draft, row) -> None:
+        row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
+        height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
+        row["rest"] = self.part.pressure - self.case.ambient_pressure + height
+        row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
+        if self.waves is not None:
+            self.lower_waves(draft, row)
+        if self.is_grid:
+            size = (grid if self.linear else grid_full).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
+            row["work"] = draft.to_work(size)
+        else:
+            row["work"] = draft.to_work(faces.work_size(self.integers))
+
+    def lower_waves(self, draft, row) -> None:
+        """The table of its waves; a wall cannot make them quicker than the fluid's own."""
+        if self.waves.speed > (1.0 + 1e-9) * self.waves.own_speed:
+            draft.fault(f"nodes.{self.name}.wave_speed", f"{self.speed:.6g} m/s is faster than sound in the fluid, "
+                        f"{self.waves.own_speed:.6g} m/s; wanted at most that, or another law")  # fmt: skip
+        row["table"] = draft.to_plane(self.waves.table())
+
+    def pressure(self, deviation: np.ndarray) -> np.ndarray:
+        """Pressure above that at rest [Pa], of deviations of the density."""
+        if self.linear:
+            return self.speed**2 * deviation
+        if self.waves is not None:
+            return self.waves.pressure(deviation) - self.part.pressure
+        return self.density * self.speed**2 * np.log1p(deviation / self.density)
+
+    def deviation(self, pressure: np.ndarray) -> np.ndarray:
+        """Deviations of the density, of pressures above that at rest [Pa]."""
+        if self.linear:
+            return pressure / self.speed**2
+        if self.waves is not None:
+            return self.waves.deviation(self.part.pressure + pressure)
+        return self.density * np.expm1(pressure / (self.density * self.speed**2))
+
+    def start(self) -> np.ndarray:
+        found, given = np.zeros((3, self.n)), self.part.start
+        if given is not None:
+            found[0] = self.deviation(self.formula(given.pressure))
+            density = self.density + (0.0 if self.linear else found[0])
+            found[1], found[2] = density * self.formula(given.u), density * self.formula(given.v)
+        return found
+
+    def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
+        density = self.density + (np.zeros(self.n) if self.linear else y[0])
+        velocity = np.column_stack([y[1] / density, y[2] / density, np.zeros(self.n)])
+        return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
+
+    def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        moved = 0.0 if self.linear else 1.0  # law linear has no velocity beside that of its waves
+        return moved * self.fields(y)["velocity"], np.full(self.n, self.speed)
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        return {"wave_speed": (self.speed, self.speed)}
+
+    def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
+        if field != "pressure":
+            return super().lower_probe(row, field, cells, weights)
+        row["side"], row["scale"], row["offset"] = PRESSURE, self.speed**2, self.part.pressure
+
+    def mass(self) -> tuple[float, np.ndarray]:
+        per, fluid = self.part.thickness * self.mesh.area, self.case.properties
+        density = self.density
+        if self.linear:
+            density *= 1.0 + (self.part.pressure - fluid.pressure) / (self.density * self.speed**2)
+        return float(np.sum(per)) * density, per
+
+    def weights(self, y: np.ndarray) -> np.ndarray:
+        per = 0.5 * self.part.thickness * self.mesh.area / self.density
+        return np.array([self.speed**2 * per, per, per])
+
+    def above(self, y: np.ndarray, datum: float) -> float:
+        rho, height = self.case.properties.density, (self.part.elevation or 0.0) - datum
+        rest = self.part.pressure - self.case.ambient_pressure + rho * self.case.gravity * height
+        square = (rest + self.speed**2 * y[0]) ** 2 / self.speed**2 + y[1] ** 2 + y[2] ** 2
+        return float(0.5 * self.part.thickness / rho * np.sum(self.mesh.area * square))

@@ -1,0 +1,41 @@
+"""What probes read of a liquid. Knows the tables; changes no state."""
+
+from math import log1p
+
+from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.observe import OWN, of_velocity
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import CELL_FIELD, LAW_LINEAR, LAW_LOG
+
+MINE = kind_of(__package__)
+PRESSURE = OWN
+
+
+@njit
+def observe_liquid(t, y, out, handle, values):
+    """values[k] of the probes that read cells: scale * pressure over its slope at rest + offset, or velocities."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+            dense, u, v = read(tables, probe, y)
+            own = probe["side"] == PRESSURE
+            values[k] = probe["scale"] * dense + probe["offset"] if own else of_velocity(probe["side"], u, v)
+
+
+@njit
+def read(tables, probe, y):
+    """Weighted sums of deviations of the density, as the law makes pressures of them, and of velocities [m/s]."""
+    basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
+    n, o = basin["n"], basin["y"]
+    for m in range(probe["count"]):
+        i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+        value = y[o + i]
+        share = 1.0 / (basin["density"] + (0.0 if law == LAW_LINEAR else value)) * weight
+        if law == LAW_LOG:
+            value = basin["density"] * log1p(value / basin["density"])
+        total += weight * value
+        u += share * y[o + n + i]
+        v += share * y[o + 2 * n + i]
+    return total, u, v

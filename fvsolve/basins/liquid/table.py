@@ -1,0 +1,66 @@
+"""Liquids under law `table`: rates, pressures of patches, probes. Knows the tables; knows no flux."""
+
+from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.liquid.observe import PRESSURE
+from fvsolve.basins.liquid.patches import mean_deviation
+from fvsolve.basins.liquid.rates import any_mesh, full_grid, on_grid, on_mesh
+from fvsolve.basins.liquid.waves import pressure
+from fvsolve.basins.patches import wanted
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import CELL_FIELD
+
+MINE = kind_of(__package__)
+
+
+@njit
+def rates_on_grids(t, y, dydt, out, handle):
+    """Rates on grids."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if on_grid(basin) and wanted(basin, dydt):
+            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out)
+
+
+@njit
+def rates_on_meshes(t, y, dydt, out, handle):
+    """Rates on meshes of any cells."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if on_mesh(basin) and wanted(basin, dydt):
+            any_mesh(tables, b, tables.plane[basin["table"] :], y, dydt, out)
+
+
+@njit
+def patch_pressures(t, y, dydt, out, handle):
+    """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
+    tables = open_tables(handle)
+    layout = tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
+        if basin["kind"] != MINE:
+            continue
+        table = tables.plane[basin["table"] :]
+        found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, y))
+        out[layout["pressure"] + patch["node"]] = found
+        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch["area"])
+
+
+@njit
+def observe_pressures(t, y, out, handle, values):
+    """Pressures in cells [Pa]."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        probe = probes[k]
+        if probe["kind"] != CELL_FIELD or tables.basins[probe["index"]]["kind"] != MINE or probe["side"] != PRESSURE:
+            continue
+        basin, total = tables.basins[probe["index"]], 0.0
+        table = tables.plane[basin["table"] :]
+        for m in range(probe["count"]):
+            r = y[basin["y"] + tables.integers[probe["cell"] + m]]
+            total += tables.floats[probe["weights"] + m] * pressure(table, basin["density"], r)[0]
+        values[k] = total + probe["offset"]

@@ -1,0 +1,47 @@
+"""Riemann invariants of a liquid of any density law, by cubics on uniform grids. Knows one cell; knows no row of them.
+
+w = integral of c / rho over the density from rest on; r [kg/m3] and p [Pa] are deviations from rest. A table is
+    1/dr, first interval, how many follow, offset, 1/dw, first interval, how many follow, offset
+and four coefficients of s in [0, 1] an interval: of w over r, then of r and of p over w. Intervals are counted from
+rest, where all is 0 to the bit; the first and the last are straight and have no end. `lower_waves` makes it.
+"""
+
+from fvsolve.jit import njit
+
+HEAD = 8  # floats before the cubics
+W_OF_R, OF_W = 0, 4  # where in it the two grids are said
+
+
+@njit(forceinline=True)
+def locate(table, grid, x, size):
+    """(offset of the cubics of the interval, of `size` floats, that x lies in, place there); of NaN the first, NaN."""
+    z, first, last = x * table[grid], table[grid + 1], table[grid + 2]
+    k = z - first
+    k = k if k > 0.0 else 0.0
+    k = k if k < last else last
+    i = int(k)
+    return int(table[grid + 3]) + size * i, z - (i + first)
+
+
+@njit(forceinline=True)
+def invariant(table, r):
+    """(w, dw/dr = c / rho) at a deviation of density."""
+    k, s = locate(table, W_OF_R, r, 4)
+    b, c, d = table[k + 1], table[k + 2], table[k + 3]
+    return table[k] + s * (b + s * (c + s * d)), table[W_OF_R] * (b + s * (2.0 * c + 3.0 * s * d))
+
+
+@njit(forceinline=True)
+def state(table, w):
+    """(r, p) where the invariant is w."""
+    k, s = locate(table, OF_W, w, 8)
+    r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+    return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
+
+
+@njit(forceinline=True)
+def pressure(table, rho, r):
+    """(p, dp/dr = c^2) at a deviation from the density rho at rest."""
+    w, slope = invariant(table, r)
+    c = (rho + r) * slope
+    return state(table, w)[1], c * c

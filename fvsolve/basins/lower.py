@@ -1,0 +1,40 @@
+"""Basins lowered to rows of tables, loaded by scenes that have one. Knows where a physics lies; knows none."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+
+def lower_basins(draft) -> None:
+    """Fill the tables of basins and their patches, and states for their cells."""
+    case = draft.case
+    draft.basins = [lowered_by(case.nodes[name].own)(case, name) for name in case.meshes]
+    draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
+    for basin, row in zip(draft.basins, draft.basin_table, strict=True):
+        basin.lower_common(draft, row)
+    patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]
+    draft.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
+    for row, (name, place) in zip(draft.patch_table, patches, strict=True):
+        row["basin"], row["node"] = names.index(place.basin), draft.node_index[name]
+        draft.basins[row["basin"]].lower_patch(draft, place.patch, row)
+
+
+def lowered_by(physics: type) -> type:
+    """The class by which a physics lowers its basins: of the module `lower` beside what declares it."""
+    home = physics.__module__.rpartition(".")[0]
+    import_module(f"{home}.lower")
+    return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
+
+
+def at_start(basins: list, size: int) -> np.ndarray:
+    """States at the start: no deviation from the profile but where basins start from one."""
+    found = np.zeros(size)
+    for basin in basins:
+        basin.of(found)[:] = basin.start()
+        if basin.scalars:
+            basin.start_scalars(found)
+    return found

@@ -1,0 +1,82 @@
+"""A mesh lowered to the flat arrays that loops over the sides of cells run on. Knows geometry; knows no physics.
+
+The layout is that of `fvsolve.basins.faces`, where the words are explained.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fvsolve.basins import faces
+
+if TYPE_CHECKING:
+    from fvsolve.mesh import Mesh
+
+
+def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """(float64[:] floats, int64[:] integers): geometry, and who lies beyond; cells and faces keep their numbers."""
+    n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
+    slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
+    face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
+    own = np.concatenate([mesh.left, mesh.right[:inner]])
+    sort = np.lexsort((_turn(mesh, face), own))
+    first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=n))[:-1]])
+    side = np.empty(own.size, np.int64)
+    side[sort] = np.arange(own.size) - first[own[sort]]
+    block, lane, count = own // faces.BLOCK, own % faces.BLOCK, -(-n // faces.BLOCK)
+    slot, at = (4 * block + side) * faces.BLOCK + lane, (slots * block + side) * faces.BLOCK + lane
+    other = np.concatenate([f + np.arange(inner), np.arange(inner, f), np.arange(inner)])  # the side beyond, or itself
+    step = np.abs(block[other] - block)
+    ring = 1 << int(3 * step.max()).bit_length()
+    need = np.zeros(count, np.int64)
+    np.maximum.at(need, block, block[other] + 1)
+    indices = np.zeros((faces.INDICES, count * slots * faces.BLOCK), np.int64)
+    k, i = np.divmod(np.arange(indices.shape[1]), faces.BLOCK)
+    j, k = np.divmod(k, slots)
+    indices[faces.CELL] = (j % ring) * faces.BLOCK + i  # of sides that a cell has not: itself
+    indices[faces.SIDE] = (4 * (j % ring) + k) * faces.BLOCK + i
+    indices[:, at] = indices[:, at[other]]
+    face_of = np.full(indices.shape[1], ~0)
+    face_of[at] = face
+    measures = np.zeros((faces.MEASURES + faces.DISTANCES, indices.shape[1]))
+    measures[faces.NX] = 1.0
+    measures[:, at] = _measures(mesh, face, own, n)
+    rank = np.argsort(slot[inner:f])
+    measures, distances = np.split(measures, [faces.MEASURES])
+    floats = [_by_block(measures), mesh.normal[inner + rank].T.ravel(), mesh.length, _by_block(distances)]
+    need = np.maximum.accumulate(need)
+    places = _by_block(indices).astype(np.int32).view(np.int64)
+    integers = [[slots, n, f, f - inner, ring], places, need, slot[inner + rank], rank, face_of]
+    return np.concatenate(floats), np.concatenate(integers).astype(np.int64)
+
+
+def _by_block(table: np.ndarray) -> np.ndarray:
+    """Rows over slots as they lie in memory."""
+    return table.reshape(len(table), -1, faces.BLOCK).swapaxes(0, 1).ravel()
+
+
+def _turn(mesh: Mesh, face: np.ndarray) -> np.ndarray:
+    """Direction of a side seen from its cell, west first: sides of cells of a grid stand west, south, east, north."""
+    normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
+    return np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
+
+
+def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
+    """float64[MEASURES, sides]: what `faces` tells of every side."""
+    number = np.where(face >= 0, face, ~face)
+    normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[number]
+    to_side = mesh.middle[number] - mesh.centre[own]
+    beyond = np.where(face >= 0, mesh.right[number], mesh.left[number])
+    across = 2.0 * np.sum(to_side * normal, axis=1, keepdims=True) * normal  # to the mirror image
+    across = np.where(beyond[:, None] >= 0, mesh.centre[beyond] - mesh.centre[own], across)
+    weight = 1.0 / np.sum(across**2, axis=1)
+    square = [np.bincount(own, weight * across[:, a] * across[:, b], n) for a, b in ((0, 0), (0, 1), (1, 1))]
+    xx, xy, yy = (s[own] for s in square)
+    scale = weight / (xx * yy - xy * xy)
+    slope = scale * (yy * across[:, 0] - xy * across[:, 1]), scale * (xx * across[:, 1] - xy * across[:, 0])
+    gap = 1.0 / np.sum(across * normal, axis=1)
+    lean = normal - across * gap[:, None]
+    share = 1.0 / mesh.area[own]
+    return np.stack([*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *lean.T])

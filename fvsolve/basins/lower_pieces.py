@@ -1,0 +1,48 @@
+"""Of which pieces basins consist that all physics share (`kernels.phases`). Knows names; knows no physics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fvsolve.kernels.phases import MIXED, Pieces
+
+HOME = "fvsolve.basins"
+ALL = Pieces(home=HOME, observe="observe: observe_flows", power="energy: patch_power")
+DENSE = Pieces(home=HOME, observe="observe: observe_dense_flows")  # under all laws but linear
+MARKED = Pieces(home=HOME, record="patches: record_patches")
+VALUES = Pieces(home=HOME, leave="carried: patch_values", observe="carried: observe_values")
+GRIDS = Pieces(home=HOME, carry="carried_grids: carry_on_grids")
+FIFTH = Pieces(home=HOME, carry="carried_grids: add_on_grids")
+SPREAD = Pieces(home=HOME, carry="carried_grids: spread_on_grids")
+MESHES = Pieces(home=HOME, carry="carried_faces: carry_on_meshes")
+SETTLED = Pieces(home=HOME, carry="carried: settle_amounts")
+CARRIED = (VALUES, MIXED, GRIDS, FIFTH, SPREAD, MESHES, SETTLED)  # in order, which those of a phase run in
+
+
+def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
+    """What runs in basins beside scalars; valves : whether there are any in the network."""
+    shared = [ALL] if basins and basins[0].case.law.linear else [ALL, DENSE] if basins else []
+    return tuple(dict.fromkeys([*shared, *(one for basin in basins for one in basin.pieces(valves))]))
+
+
+def of_scalars(basins: list) -> tuple[Pieces, ...]:
+    """What carries scalars there; each piece knows which basins are its own."""
+    wanted = {piece for basin in basins for piece in carrying(basin)}
+    return tuple(one for one in CARRIED if one in wanted)
+
+
+def carrying(basin) -> Iterator[Pieces]:
+    """Of what one basin needs to carry its scalars, if any."""
+    if not basin.scalars:
+        return
+    yield from (VALUES, SETTLED)
+    if not basin.given:
+        yield MIXED
+    if not basin.is_grid:
+        yield MESHES
+        return
+    yield GRIDS
+    if basin.fifth:
+        yield FIFTH
+    if any(basin.case.scalars[name].diffusivity > 0.0 for name in basin.scalars):
+        yield SPREAD

@@ -1,0 +1,48 @@
+"""What probes read off all basins: flows through patches. Knows the tables; changes no state.
+
+Each physics reads its own cells, by the number of a field that stands as `side` in a probe of kind CELL_FIELD.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import density
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import PATCH_FLOW
+
+U, V, SPEED, OWN = range(4)  # fields of velocities; from OWN on each physics has its own
+
+
+@njit
+def of_velocity(field, u, v):
+    """What such a field is of a velocity."""
+    return u if field == U else v if field == V else sqrt(u * u + v * v)
+
+
+@njit
+def observe_flows(t, y, out, handle, values):
+    """values[k] of the probes of flows through patches [m3/s]."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        if probes[k]["kind"] == PATCH_FLOW:
+            values[k] = probes[k]["scale"] * patch_flow(tables, probes[k], out)
+
+
+@njit
+def observe_dense_flows(t, y, out, handle, values):
+    """The same at the density of the place, under all laws but linear."""
+    tables = open_tables(handle)
+    st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
+    for k in range(probes.size):
+        if probes[k]["kind"] == PATCH_FLOW:
+            i = probes[k]["index"]
+            rho = density(st, tables.floats, tables.nodes[i]["pressure"] + out[at + i])
+            values[k] = patch_flow(tables, probes[k], out) / rho
+
+
+@njit
+def patch_flow(tables, probe, out):
+    """Mass that flows into a basin through a patch [kg/s]."""
+    layout, i = tables.layout[0], probe["index"]
+    return out[layout["net"] + i] + out[layout["supply"] + i]

@@ -1,0 +1,86 @@
+"""Scalars carried by a given velocity. Knows flows through faces; knows no network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
+from fvsolve.errors import CaseError
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.phases import Pieces
+
+
+class TransportRows(BasinRows):
+    """Nothing moves but what is carried; depth 1."""
+
+    given = True
+
+    def pieces(self, valves: bool) -> Iterator[Pieces]:
+        yield Pieces(home=__package__, observe="observe: observe_given_flows")
+
+    def lower(self, draft, row) -> None:
+        given, mesh = self.part.velocity, self.mesh
+        flows = self.flows(draft)
+        row["thickness"], row["density"] = self.part.thickness or 1.0, self.case.properties.density
+        row["period"] = given.period or 0.0
+        if self.is_grid:
+            grid = mesh.grid
+            flow_x, flow_y = grid_flows(mesh, flows)
+            row["flows"] = draft.to_plane(np.concatenate([flow_x, flow_y]))
+            kx, ky = 1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)
+            along, across = abs(flow_x).reshape(grid.ny, -1), abs(flow_y).reshape(-1, grid.nx)
+            through = np.maximum(along[:, 1:], along[:, :-1]) + np.maximum(across[1:], across[:-1])
+            row["fastest"] = (kx * ky[:, None] * through).max()
+            worst = np.unravel_index(np.argmax(kx * ky[:, None] * through), through.shape)
+            self.share = float(np.maximum(along[:, 1:], along[:, :-1])[worst] / max(through[worst], 1e-300))
+        else:
+            row["flows"], inner = draft.to_plane(flows), mesh.inner
+            through = np.bincount(mesh.left, np.abs(flows), self.n)
+            through += np.bincount(mesh.right[:inner], np.abs(flows[:inner]), self.n)
+            row["fastest"], self.share = (0.5 * through / mesh.area).max(), 1.0
+        net = np.bincount(mesh.left, flows, self.n)
+        net -= np.bincount(mesh.right[: mesh.inner], flows[: mesh.inner], self.n)
+        self.gathers = float(np.abs(net / mesh.area).max())
+        self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
+        if mesh.patches[-1] in passing:
+            own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
+            at = mesh.middle[own[np.argmax(flows[own] != 0.0)]]
+            what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
+            draft.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
+            draft.check()
+        row["unsplit"] = self.unsplit(row, passing)
+        if passing:
+            inward = -flows[mesh.inner :]
+            row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
+
+    def unsplit(self, row, passing: list[str]) -> float:
+        """What counts as rate over what leaves a cell, so that Euler steps of Courant number 1 keep bounds."""
+        if row["scheme"] in (rec.UPWIND, rec.LINEAR):
+            return 1.0
+        return 3.0 if row["scheme"] == rec.MUSCL and self.is_grid and passing else 2.0
+
+    def opens(self, patch: str) -> bool:
+        return patch in self.passing
+
+    def flows(self, draft) -> np.ndarray:
+        """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
+        given, mesh = self.part.velocity.given, self.mesh
+        if self.part.velocity.way == "u, v":
+            return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))
+        if self.part.velocity.way == "stream":
+            given = {"stream": given["stream"].at(*np.ascontiguousarray(mesh.points.T))}
+        try:
+            return face_flows(mesh, given)
+        except (ValueError, TypeError, CaseError) as error:
+            draft.fault(f"nodes.{self.name}.velocity", str(error))
+            draft.check()
+            raise
+
+    def pace(self, y: np.ndarray) -> tuple[float, float]:
+        return float(self.row["fastest"]), self.share
+
+    def held(self) -> np.ndarray:
+        return self.row["density"] * self.row["thickness"] * self.mesh.area

@@ -1,0 +1,19 @@
+"""What probes read of a given velocity. Knows the tables; changes no state."""
+
+from fvsolve.basins.behind import through_patch
+from fvsolve.basins.carried import turned
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import GIVEN_FLOW
+
+
+@njit
+def observe_given_flows(t, y, out, handle, values):
+    """values[k] of every probe of what a given velocity brings in through a patch [m3/s]."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        if tables.probes[k]["kind"] == GIVEN_FLOW:
+            patch = tables.patches[tables.probes[k]["index"]]
+            basin, values[k] = tables.basins[patch["basin"]], 0.0
+            if patch["open"] == 1:
+                values[k] = turned(t, basin) * basin["thickness"] * through_patch(tables, patch)

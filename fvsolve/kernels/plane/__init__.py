@@ -1,1 +1,0 @@
-"""Fields in the plane; loaded and compiled by scenes with basins alone."""

@@ -1,0 +1,30 @@
+"""Patches as places of the fluid in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import Lowering
+
+
+class PatchRows(Lowering, kind="patch"):
+    """A place whose pressure the cells behind it set."""
+
+    books = "dry patch"
+
+    def place(self, draft, name, node, row) -> None:
+        row["kind"], row["row"] = rec.PATCH, draft.stiff()
+
+    def pressure_at_start(self, start, i, node, row) -> float:
+        if node.pressure is not None:
+            return node.pressure
+        return start.law.pressure_under(node.depth) if node.depth else start.case.ambient_pressure
+
+    def moves(self, name, node, row, inflow, flow) -> str:
+        return f"basin {name}: {flow:.4g} m3/s flow in"
+
+    def probe(self, draft, name, probe, row) -> None:
+        if probe.quantity != "flow":
+            return super().probe(draft, name, probe, row)
+        row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
+        if not draft.case.nodes[draft.case.places[name].basin].own.joined:
+            row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

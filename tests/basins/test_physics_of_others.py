@@ -1,0 +1,203 @@
+"""A physics of basins is one folder: one from outside is declared, checked, lowered, compiled, run and read."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from math import exp, factorial
+from pathlib import Path
+from typing import Annotated
+
+import pytest
+from pytest import approx
+from truth.scenes import WATER
+
+import fvsolve
+from fvsolve.basins.lower import lowered_by
+from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.errors import FvsolveError
+from fvsolve.parts import Basin
+from fvsolve.parts.basin.part import Physics, Start
+from fvsolve.parts.value import Quantity
+
+SOURCES = {
+    "part.py": '''
+"""Heat on a belt. Knows its keys."""
+from typing import Annotated, ClassVar
+from fvsolve.parts.basin.part import Physics
+from fvsolve.parts.formula import Formula, Shaped
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import Quantity, positive
+
+class Warm(Table):
+    """What it starts from."""
+    heat: Annotated[Formula | None, Shaped("number", "of the belt")] = None
+
+class Belt(Physics, name="belt"):
+    """T_t + v T_x = 0."""
+    states: ClassVar[dict[str, str]] = {"heat": "K"}
+    fields: ClassVar[dict[str, str]] = {"heat": "number"}
+    starts: ClassVar[type[Table]] = Warm
+    laws: ClassVar[tuple[str, ...]] = ("linear",)
+    joined: ClassVar[bool] = False
+    carries: ClassVar[bool] = False
+    pace: Annotated[float, Quantity("velocity", positive, "along x [m/s]")]
+''',
+    "rates.py": '''
+"""Rates of the cells of a belt, and what probes read there."""
+from fvsolve.basins.kinds import kind_of
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import CELL_FIELD, RATE
+
+MINE = kind_of(__package__)
+
+@njit
+def carry(t, y, dydt, out, handle):
+    """By upwind, cold where the belt begins."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["kind"] != MINE:
+            continue
+        rate, o, nx = basin["speed"] * tables.plane[basin["spacing"]], basin["y"], basin["nx"]
+        out[RATE] = max(out[RATE], rate)
+        for i in range(basin["n"] if dydt.size > 0 else 0):
+            dydt[o + i] = rate * ((y[o + i - 1] if i % nx > 0 else 0.0) - y[o + i])
+
+@njit
+def read(t, y, out, handle, values):
+    """values[k] of its probes."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+            values[k] = 0.0
+            for m in range(probe["count"]):
+                at = tables.basins[probe["index"]]["y"] + tables.integers[probe["cell"] + m]
+                values[k] += tables.floats[probe["weights"] + m] * y[at]
+''',
+    "lower.py": '''
+"""A belt lowered to rows of tables."""
+import numpy as np
+from fvsolve.basins.lower_basin import BasinRows
+from fvsolve.kernels.phases import Pieces
+
+class BeltRows(BasinRows):
+    """One state a cell."""
+    units = {"heat": "K"}
+
+    def pieces(self, valves):
+        yield Pieces(home=__package__, rates="rates: carry", observe="rates: read")
+
+    def lower(self, draft, row):
+        row["speed"] = self.part.pace
+
+    def start(self):
+        return self.formula(self.part.start.heat)[None]
+
+    def fields(self, y):
+        return {"heat": y[0]}
+
+    def speeds(self, y):
+        return np.tile([self.part.pace, 0.0, 0.0], (self.n, 1)), np.zeros(self.n)
+
+    def lower_probe(self, row, field, cells, weights):
+        pass
+''',
+}
+NUMERICS = {"end": 2.0, "scheme": "upwind", "method": "euler", "courant": 1.0}
+BELT = {"type": "basin", "physics": "belt", "size": [10.0, 2.0], "cells": [10, 2], "pace": "2 m/s",
+        "start": {"heat": "(x > 1) * (x < 3) * (300 + y)"}}  # fmt: skip
+SAYS = """
+import json, sys
+import numpy as np
+import fvsolve
+from fvsolve.case.schema import schema
+from fvsolve.model.dependence import sparsity
+
+case = json.loads(sys.argv[2])
+
+def faults(**more):
+    try:
+        fvsolve.load({**case, **more})
+    except fvsolve.CaseError as error:
+        return str(error)
+
+basin = case["nodes"]["belt"]
+said = {"unknown": faults()}
+fvsolve.register(sys.argv[1])
+slowly = {**case["numerics"], "method": "radau-iia-5", "courant": 0.5}
+for name, numerics in {"exact": case["numerics"], "implicit": slowly}.items():
+    run = fvsolve.run({**case, "numerics": numerics})
+    said[name] = [run.t.tolist(), run["belt.heat@6.5,0.5"].tolist()]
+model = fvsolve.build(fvsolve.load(case))
+hangs = model.jacobian(0.0, model.start) != 0.0
+said["missed"] = int((hangs & ~sparsity(model)[: model.y_size].toarray()).sum())
+said["path"] = model.checks["basins"]["belt"]["path"]
+said["schema"] = "pace" in json.dumps(schema())
+said["missing"] = faults(nodes={"belt": {key: value for key, value in basin.items() if key != "pace"}})
+said["other"] = faults(nodes={"belt": {**basin, "level": 1.0}})
+said["start"] = faults(nodes={"belt": {**basin, "start": {"heat": 1.0, "u": 1.0}}})
+said["law"] = faults(fluid={**case["fluid"], "law": "log"})
+print(json.dumps(said))
+"""
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory) -> dict:
+    """What a process says of itself in which the belt's folder is registered."""
+    folder = tmp_path_factory.mktemp("others") / "belt"
+    folder.mkdir()
+    for name, text in SOURCES.items():
+        (folder / name).write_text(text)
+    output = {"every": 0.5, "probes": ["belt.heat@6.5,0.5"]}
+    case = {"fluid": dict(WATER), "nodes": {"belt": BELT}, "numerics": NUMERICS, "output": output}
+    found = subprocess.run([sys.executable, "-c", SAYS, str(folder), json.dumps(case)], capture_output=True, text=True)
+    assert found.returncode == 0, found.stderr
+    return json.loads(found.stdout.splitlines()[-1])
+
+
+def test_it_runs_exactly(said):
+    """Euler's steps of Courant number 1 move upwind values by a cell each: to the bit what was there."""
+    assert said["exact"] == [[0.0, 0.5, 1.0, 1.5, 2.0], [0.0, 0.0, 0.0, 0.0, 300.5]]
+
+
+def test_it_is_stepped_implicitly(said):
+    """Upwind rates 2 (T[i - 1] - T[i]) leave a cell's own start, and k cells behind it that of weight (2 t)^k / k!."""
+    times, found = said["implicit"]
+    share = [sum((2.0 * t) ** k / factorial(k) * exp(-2.0 * t) for k in (4, 5)) for t in times]
+    assert found == approx([300.5 * one for one in share], abs=0.01)
+    assert said["missed"] == 0  # of what its rates hang on, in the pattern
+
+
+def test_it_is_checked_by_its_own_declaration(said):
+    assert 'no physics named "belt"; wanted one of free-surface, liquid, transport' in said["unknown"]
+    assert "nodes.belt: pace is missing" in said["missing"]
+    assert 'nodes.belt.level: means nothing to physics "belt"; it goes with free-surface' in said["other"]
+    assert 'nodes.belt.start.u: means nothing to physics "belt"' in said["start"]
+    assert 'fluid.law: "log" does not go with basins; wanted "linear"' in said["law"]
+    assert said["path"] == "grid" and said["schema"]
+
+
+def test_every_physics_is_a_folder_that_lowers_itself():
+    """Declared in `part.py` of a folder of basins, whose `lower.py` has one class; all keys stand among a basin's."""
+    folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "basins").glob("*/part.py")}
+    assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
+    for one in Physics.kinds.values():
+        assert set(one.model_fields) <= set(Basin.model_fields) and set(one.starts.model_fields) <= set(Start.keys())
+        assert issubclass(lowered_by(one), BasinRows) and lowered_by(one) is not BasinRows
+
+
+@pytest.mark.parametrize("key", ["pressure", "size"])  # of a liquid, of all basins
+def test_a_key_that_is_there_keeps_its_meaning(key):
+    keys = {"__annotations__": {key: Annotated[float, Quantity("time")]}, "__module__": __name__}
+    with pytest.raises(FvsolveError, match=f'"clock" declares {key} otherwise than a basin has it already'):
+        type(Physics)("Clock", (Physics,), keys, name="clock")
+    assert "clock" not in Physics.kinds and Basin.keys().count(key) == 1
+
+
+def test_a_name_that_is_there_is_taken():
+    with pytest.raises(FvsolveError, match='a physics "liquid" is there already'):
+        type(Physics)("Other", (Physics,), {"__module__": __name__}, name="liquid")
