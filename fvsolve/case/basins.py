@@ -17,7 +17,7 @@ from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import Place, Start
+from fvsolve.parts.basin.part import Place, StartOfFields
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show
@@ -202,7 +202,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
                 yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
         shapes = [*own.shapes(basin, meshes[name])]
         if basin.start is not None:
-            shapes += [(("start", what), getattr(basin.start, what), None) for what in Start.model_fields]
+            shapes += [(("start", what), getattr(basin.start, what), None) for what in StartOfFields.model_fields]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]

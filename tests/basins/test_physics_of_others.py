@@ -18,7 +18,7 @@ from fvsolve.basins.lower import lowered_by
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import Physics, Start
+from fvsolve.parts.basin.part import Physics, StartOfFields
 from fvsolve.parts.value import Quantity
 
 SOURCES = {
@@ -186,7 +186,9 @@ def test_every_physics_is_a_folder_that_lowers_itself():
     folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "basins").glob("*/part.py")}
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
-        assert set(one.model_fields) <= set(Basin.model_fields) and set(one.starts.model_fields) <= set(Start.keys())
+        assert set(one.model_fields) <= set(Basin.model_fields) and set(one.starts.model_fields) <= set(
+            StartOfFields.keys()
+        )
         assert issubclass(lowered_by(one), BasinRows) and lowered_by(one) is not BasinRows
 
 

@@ -18,7 +18,7 @@ WRONG = 0.01  # share of the speed from which a word is due
 SEEN, MATTERS = 1e-6, 1e-3  # of the depth, root mean square of a surface: given at the start, come about in a run
 
 
-class Waves(NamedTuple):
+class SurfaceWaves(NamedTuple):
     """Of a surface: wavenumber [1/m], mean depth of wet cells [m], root mean square of the surface over that depth."""
 
     k: float
@@ -32,7 +32,7 @@ class Waves(NamedTuple):
         return 1.0 - math.sqrt(math.tanh(kh) / kh)
 
 
-def waves(basin, y: np.ndarray) -> Waves | None:
+def waves(basin, y: np.ndarray) -> SurfaceWaves | None:
     """The waves of a basin at deviations y; None without any."""
     depth, area = basin.depth + y[0], basin.mesh.area
     wet = depth > 0.0
@@ -45,7 +45,7 @@ def waves(basin, y: np.ndarray) -> Waves | None:
     if not SEEN * mean < math.sqrt(square) < math.inf:
         return None
     inverse = on_grid(basin, surface) if is_even(basin) else on_mesh(basin, surface)
-    return Waves(math.sqrt(square / inverse), mean, math.sqrt(square) / mean)
+    return SurfaceWaves(math.sqrt(square / inverse), mean, math.sqrt(square) / mean)
 
 
 def is_even(basin) -> bool:
@@ -83,7 +83,7 @@ def on_mesh(basin, surface: np.ndarray) -> float:
     return float(own @ psi / mesh.area.sum())
 
 
-def said(basin, found: Waves) -> str:
+def said(basin, found: SurfaceWaves) -> str:
     """What a reader has to know."""
     return (
         f"{basin.name}: waves about {2.0 * math.pi / found.k:.3g} m long in {found.depth:.3g} m of water (k h = "
@@ -91,7 +91,7 @@ def said(basin, found: Waves) -> str:
     )
 
 
-def notice(basin, found: Waves, when: str = "") -> Notice:
+def notice(basin, found: SurfaceWaves, when: str = "") -> Notice:
     """That they are too short, and when."""
     return Notice("dispersion", f"nodes.{basin.name}", said(basin, found) + when, None, float(found.wrong), WRONG)
 
@@ -114,11 +114,11 @@ class Watch:
     def look(self, t: float, y: np.ndarray) -> None:
         """At a model's state."""
         one = waves(self.basin, self.basin.of(y))
-        if one is not None and one.size > MATTERS and not one.wrong <= Waves(*self.kept[1:]).wrong:
+        if one is not None and one.size > MATTERS and not one.wrong <= SurfaceWaves(*self.kept[1:]).wrong:
             self.kept[:] = t, *one
 
     def notices(self) -> list[Notice]:
         """That they are too short, where they are."""
         t, *found = self.kept.tolist()
-        one = Waves(*found)
+        one = SurfaceWaves(*found)
         return [notice(self.basin, one, f", at {t:.4g} s")] if one.wrong > WRONG else []

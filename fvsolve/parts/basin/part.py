@@ -118,7 +118,7 @@ class MovingStart(Table):
     v: Annotated[Formula, Shaped("velocity", "velocity along y [m/s]")] = even(0.0)
 
 
-class Start(Table):
+class StartOfFields(Table):
     """What a basin starts from where that is not rest: the keys that its physics has."""
 
 
@@ -168,7 +168,7 @@ class Physics(Table):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:
-        both = (Start, optional(cls.starts)), (Basin, optional(cls))
+        both = (StartOfFields, optional(cls.starts)), (Basin, optional(cls))
         for table, keys in both:
             for key in (key for key in keys if key in table.model_fields):
                 own, known = keys[key], table.model_fields[key]
@@ -244,7 +244,8 @@ class Basin(Node, kind="basin"):
     ] = None
     patches: Annotated[Any, Named(Patch, "patches by name: { outlet = { side, span } }")] = {}
     start: Annotated[
-        Start | None, Inside(Start, "level or pressure above that at rest, and velocities; at rest if left out")
+        StartOfFields | None,
+        Inside(StartOfFields, "level or pressure above that at rest, and velocities; at rest if left out"),
     ] = None
 
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
