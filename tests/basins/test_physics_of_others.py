@@ -186,9 +186,8 @@ def test_every_physics_is_a_folder_that_lowers_itself():
     folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "basins").glob("*/part.py")}
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
-        assert set(one.model_fields) <= set(Basin.model_fields) and set(one.starts.model_fields) <= set(
-            StartOfFields.keys()
-        )
+        assert set(one.model_fields) <= set(Basin.model_fields)
+        assert set(one.starts.model_fields) <= set(StartOfFields.keys())
         assert issubclass(lowered_by(one), BasinRows) and lowered_by(one) is not BasinRows
 
 
