@@ -82,6 +82,7 @@ def test_every_answer_is_proved():
     assert all(one.proved for one in found)
 
 
+@pytest.mark.slow
 def test_some_limits_are_set_by_the_longest_waves_and_no_short_run_shows_them():
     found = {(one.scheme, one.method): one for one in advection_limits(None, DISTINCT)}
     longest = {pair for pair, one in found.items() if one.wave == "longest"}

@@ -112,6 +112,7 @@ def test_its_order_is_that_of_methods(home):
     assert orders == pytest.approx([1.0, 2.0], abs=0.05)
 
 
+@pytest.mark.slow
 def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
     def least() -> float:
         told = json.loads(command(home, "run", "mill.toml", "--json", "--force"))

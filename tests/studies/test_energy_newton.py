@@ -47,6 +47,7 @@ def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
     assert row["newton_loss"] == found.newton[-1]
 
 
+@pytest.mark.slow
 def test_beside_newton_gauss_leaves_rounding_in_a_network_of_pipes():
     from fvsolve.case import shipped
 
