@@ -79,6 +79,10 @@ class Device(Restriction):
     def settle(self, slate, row, y: np.ndarray, scale: np.ndarray) -> None:
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
+    def resists(self, part: Any) -> bool:
+        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
+        return True
+
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
         """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.
 

@@ -84,10 +84,6 @@ class Lowering:
         """What the ledger of energy calls each of them."""
         return [name]
 
-    def resists(self, part: Any) -> bool:
-        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
-        return True
-
 
 class Restriction(Lowering):
     """Links of one row among the valves, by the root M |M| = G dp or a law of their own."""
