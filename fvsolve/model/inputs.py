@@ -61,6 +61,11 @@ def inputs_of(model: Model) -> dict[str, Input]:
     return found
 
 
+def opening(model: Model, name: str) -> dict[str, Input]:
+    """That of a restriction, by its schedule."""
+    return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
+
+
 def values_in(model: Model, name: str) -> dict[str, Input]:
     """Values of scalars that flow in from a place, by their names."""
     i, found = model.node_names.index(name), {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.inputs import OPENING, Input
+from fvsolve.model.inputs import opening
 from fvsolve.model.lowering import Restriction
 from fvsolve.parts.schedule import constant
 
@@ -15,4 +15,4 @@ class ConnectionRows(Restriction, kind="connection"):
         super().restriction(draft, name, link, row)
 
     def inputs(self, model, name, part):
-        return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
+        return opening(model, name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.inputs import OPENING, Input
+from fvsolve.model.inputs import opening
 from fvsolve.model.lowering import Lowering, Restriction
 from fvsolve.parts.outlet import law
 from fvsolve.parts.schedule import constant
@@ -46,4 +46,4 @@ class OutletRows(Restriction, kind="outlet"):
         return 1e5 if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
-        return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
+        return opening(model, name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.inputs import OPENING, Input
+from fvsolve.model.inputs import opening
 from fvsolve.model.lowering import Restriction
 
 
@@ -20,4 +20,4 @@ class ValveRows(Restriction, kind="valve"):
             draft.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
 
     def inputs(self, model, name, part):
-        return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
+        return opening(model, name)
