@@ -14,6 +14,9 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
     if schedule.kind == "step":
         side = "left" if left else "right"
         return values[np.clip(np.searchsorted(times, t, side=side) - 1, 0, len(times) - 1)]
+    if schedule.kind == "harmonic":
+        mean, amplitude, period, phase = schedule.wave
+        return mean + amplitude * np.sin(2.0 * np.pi * t / period + phase)
     inside = np.clip(t, times[0], times[-1])
     if schedule.kind == "ramp":
         s = (inside - times[0]) / (times[1] - times[0])
@@ -27,7 +30,7 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
 
 def kinks(schedule) -> list[float]:
     """Times at which a schedule, or its slope, jumps; points of a smooth one are none but its ends."""
-    if schedule.kind == "constant":
+    if schedule.kind in ("constant", "harmonic"):
         return []
     return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
 

@@ -269,7 +269,8 @@ DEVICE = np.dtype(
 )
 
 SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
-# Piece: start, kind (0 polynomial in t - origin, 1 power), origin, then a, b, c, d or v0, v1, duration, exponent
+# Piece: start, kind (0 polynomial in t - origin, 1 power, 2 wave, 3 what of a wave is above zero), origin, then
+# a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
 PIECE_COLUMNS = 7
 
 CLUSTER_RECORD = np.dtype([("first_node", "i8"), ("nodes", "i8"), ("first_valve", "i8"), ("valves", "i8")], align=True)

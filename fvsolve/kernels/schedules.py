@@ -1,6 +1,10 @@
-"""Values of schedules at a time. Knows pieces of polynomials and powers; knows no units."""
+"""Values of schedules at a time. Knows pieces of polynomials, powers and waves; knows no units."""
+
+from math import cos, sin
 
 from fvsolve.jit import njit
+
+POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: of a wave what is above zero
 
 
 @njit(forceinline=True)
@@ -19,12 +23,45 @@ def piece_at(pieces, first, count, t, limit):
 
 @njit(forceinline=True)
 def piece_value(pieces, row, t):
-    """a + b s + c s^2 + d s^3 with s = t - origin, or the power v1 + (v0 - v1) (1 - s / duration)^exponent."""
+    """a + b s + c s^2 + d s^3 with s = t - origin, or the power v1 + (v0 - v1) (1 - s / duration)^exponent, or a wave.
+
+    A wave is mean + amplitude sin(frequency s + phase).
+    """
     s = t - pieces[row, 2]
-    if pieces[row, 1] == 0.0:
+    if pieces[row, 1] == POLYNOMIAL:
         return pieces[row, 3] + s * (pieces[row, 4] + s * (pieces[row, 5] + s * pieces[row, 6]))
-    rest = min(max(1.0 - s / pieces[row, 5], 0.0), 1.0)
-    return pieces[row, 4] + (pieces[row, 3] - pieces[row, 4]) * rest ** pieces[row, 6]
+    if pieces[row, 1] == POWER:
+        rest = min(max(1.0 - s / pieces[row, 5], 0.0), 1.0)
+        return pieces[row, 4] + (pieces[row, 3] - pieces[row, 4]) * rest ** pieces[row, 6]
+    value = pieces[row, 3] + pieces[row, 4] * sin(pieces[row, 5] * s + pieces[row, 6])
+    return max(value, 0.0) if pieces[row, 1] == CREST else value
+
+
+@njit(forceinline=True)
+def piece_slopes(pieces, row, t):
+    """First and second derivative of a piece that is no crest."""
+    s = t - pieces[row, 2]
+    if pieces[row, 1] == POLYNOMIAL:
+        c, d = pieces[row, 5], pieces[row, 6]
+        return pieces[row, 4] + s * (2.0 * c + s * 3.0 * d), 2.0 * c + 6.0 * d * s
+    if pieces[row, 1] == POWER:
+        span, n, rest = pieces[row, 5], pieces[row, 6], 1.0 - s / pieces[row, 5]
+        fall = (pieces[row, 4] - pieces[row, 3]) * n / span
+        if rest <= 0.0:
+            return fall if n == 1.0 else 0.0, 0.0
+        return fall * rest ** (n - 1.0), -fall * (n - 1.0) / span * rest ** (n - 2.0)
+    often, at = pieces[row, 5], pieces[row, 5] * s + pieces[row, 6]
+    return pieces[row, 4] * often * cos(at), -pieces[row, 4] * often * often * sin(at)
+
+
+@njit
+def schedule_slopes(tables, index, t):
+    """First and second derivative of schedule `index` at t [per s, per s2], the left ones at the end of the segment."""
+    record, limit = tables.schedules[index], tables.clock[0]["limit"]
+    if record["pieces"] == 1:
+        return piece_slopes(tables.pieces, record["first"], t)
+    row = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
+    return piece_slopes(tables.pieces, row, min(t, limit))
 
 
 @njit(forceinline=True)

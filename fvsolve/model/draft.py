@@ -92,6 +92,7 @@ class Draft:
         case = self.case
         self.fluid, self.hydraulics = case.properties, Hydraulics(case)
         self.warnings += case.notes
+        self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 

@@ -7,14 +7,21 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fvsolve.kernels.records import PIECE_COLUMNS, SCHEDULE
+from fvsolve.kernels.schedules import CREST, POWER, WAVE
 
+AWAKE = 8  # steps in a period at least
 LONG = 32  # more entries than this are samples of something smooth
 MARKED = 0.2  # change of slope, relative to the greatest, that forces a step in samples
 
 
 @dataclass
 class Schedules:
-    """The table of all schedules of a model, filled one by one."""
+    """The table of all schedules of a model, filled one by one.
+
+    span : times between which what repeats itself has kinks [s]
+    """
+
+    span: tuple[float, float] = (0.0, 0.0)
 
     records: list[tuple[int, int]] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
@@ -29,6 +36,8 @@ class Schedules:
         self.rows += pieces.tolist()
         for time, jump in break_times(schedule):
             self.breaks[time] = self.breaks.get(time, False) or jump
+        if schedule.kind == "harmonic":
+            self.spacing = min(self.spacing, schedule.wave[2] / AWAKE)
         if len(schedule.time) > LONG:
             self.spacing = min(self.spacing, 4.0 * float(np.median(np.diff(schedule.time))))
         return len(self.records) - 1
@@ -37,6 +46,10 @@ class Schedules:
         """Index of the positive part of side * value; where it leaves and meets zero are kinks."""
         index = self.add(schedule, side)
         first, count = self.records[index]
+        if schedule.kind == "harmonic":
+            self.rows[first][1] = CREST
+            self.breaks |= {time: self.breaks.get(time, False) for time in wave_roots(self.rows[first], self.span)}
+            return index
         rows, crossings = positive_part(np.array(self.rows[first : first + count]))
         self.rows[first:], self.records[index] = rows, (first, len(rows))
         for time in crossings:
@@ -52,6 +65,9 @@ class Schedules:
 def lower(schedule) -> np.ndarray:
     """float64[pieces, 7]: start, kind, origin, then a, b, c, d of a polynomial or v0, v1, duration, exponent."""
     t, v = schedule.time, schedule.value
+    if schedule.kind == "harmonic":
+        mean, amplitude, period, phase = schedule.wave
+        return np.array([[-np.inf, WAVE, 0.0, mean, amplitude, 2.0 * np.pi / period, phase]])
     hold = [[-np.inf, 0, 0.0, v[0], 0, 0, 0]]
     last = [[t[-1], 0, t[-1], v[-1], 0, 0, 0]]
     if schedule.kind == "constant":
@@ -75,17 +91,17 @@ def lower(schedule) -> np.ndarray:
 def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
     """Coefficients of scale * value + offset."""
     values = pieces[:, 3:] * scale
-    power = pieces[:, 1] == 1
+    power, kept = pieces[:, 1] == POWER, pieces[:, 1] != 0
     values[:, 0] += offset
     values[power, 1] += offset
-    values[power, 2:] = pieces[power, 5:]
+    values[kept, 2:] = pieces[kept, 5:]
     return values
 
 
 def break_times(schedule) -> list[tuple[float, bool]]:
     """(time, whether the value jumps) of all kinks and jumps that steps must end at."""
     t, v = schedule.time, schedule.value
-    if schedule.kind == "constant":
+    if schedule.kind in ("constant", "harmonic"):
         return []
     if schedule.kind == "ramp":
         return [(float(t[0]), False), (float(t[1]), False)]
@@ -122,6 +138,21 @@ def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
             held = piece_value(piece, middle) > 0.0
             rows.append([low, *piece[1:]] if held else [low, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     return rows, crossings
+
+
+def wave_roots(piece: list[float], span: tuple[float, float]) -> list[float]:
+    """Times between both at which a wave is zero, rising."""
+    mean, amplitude, often, phase = piece[3:]
+    if abs(mean) >= abs(amplitude):
+        return []
+    up = np.arcsin(-mean / amplitude)
+    found = []
+    for angle in (up, np.pi - up):
+        first, last = ((often * t + phase - angle) / (2.0 * np.pi) for t in span)
+        found += [
+            (angle - phase + 2.0 * np.pi * k) / often for k in range(int(np.ceil(first)), int(np.floor(last)) + 1)
+        ]
+    return sorted(found)
 
 
 def piece_value(piece: np.ndarray, t: float) -> float:

@@ -32,15 +32,18 @@ from fvsolve.parts.value import (
 from fvsolve.units import show
 
 KINDS = ("linear", "step", "smooth")
+AMPLITUDES = {"pressure": "pressure_drop"}  # of what has another zero than its differences
 
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
     """A value over time: held before the first and after the last entry, right-continuous.
 
-    kind : constant | linear | step | smooth (monotone cubic) | ramp
-    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one
+    kind : constant | linear | step | smooth (monotone cubic) | ramp | harmonic
+    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one, and one
+    that is harmonic its least and its greatest, at no time
     exponent : of a ramp, value = v1 + (v0 - v1) (1 - s)^exponent with s from 0 to 1 between its two times
+    wave : mean, amplitude, period [s] and phase of one that is harmonic, mean + amplitude sin(2 pi t / period + phase)
     origin : the table the file would say, in SI
     """
 
@@ -49,6 +52,7 @@ class Schedule:
     value: np.ndarray
     exponent: float = 1.0
     origin: Any = field(default=None, repr=False)
+    wave: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("time", "value"):
@@ -59,11 +63,11 @@ class Schedule:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Schedule):
             return NotImplemented
-        mine, theirs = (self.kind, self.exponent), (other.kind, other.exponent)
+        mine, theirs = (self.kind, self.exponent, self.wave), (other.kind, other.exponent, other.wave)
         return mine == theirs and np.array_equal(self.time, other.time) and np.array_equal(self.value, other.value)
 
     def __hash__(self) -> int:
-        return hash((self.kind, self.exponent, self.time.tobytes(), self.value.tobytes()))
+        return hash((self.kind, self.exponent, self.wave, self.time.tobytes(), self.value.tobytes()))
 
     @property
     def first(self) -> float:
@@ -87,7 +91,7 @@ def constant(value: float) -> Schedule:
 
 @dataclass(frozen=True)
 class Scheduled(Value):
-    """A schedule of a quantity: a number or text, a table, a file, a ramp, or a signal."""
+    """A schedule of a quantity: a number or text, a table, a file, a ramp, a wave, or a signal."""
 
     dimension: str
     range: Range = anything
@@ -106,6 +110,8 @@ class Scheduled(Value):
             return self._read_file(given, setting)
         if any(key in given for key in ("start", "duration", "exponent")):
             return self._read_ramp(given, setting)
+        if any(key in given for key in ("mean", "amplitude", "period", "phase")):
+            return self._read_wave(given, setting)
         return self._read_table(given, setting)
 
     def forms(self) -> dict[str, dict[str, tuple[Value, Any]]]:
@@ -118,6 +124,12 @@ class Scheduled(Value):
                 "duration": (Quantity("time", nonnegative), NEEDED),
                 "value": (Rows(*item, length=2), NEEDED),
                 "exponent": (Number(positive), 1.0),
+            },
+            "wave": {
+                "mean": (Quantity(self.dimension), NEEDED),
+                "amplitude": (Quantity(AMPLITUDES.get(self.dimension, self.dimension)), NEEDED),
+                "period": (Quantity("time", positive), NEEDED),
+                "phase": (Quantity("angle"), 0.0),
             },
             "file": {"file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "kind": kind},
             "signal": {"signal": (Text(), NEEDED)},
@@ -151,6 +163,17 @@ class Scheduled(Value):
             return Schedule("step", (start - 1.0 - abs(start), start), v, origin=origin)
         return Schedule("ramp", (start, start + duration), v, exponent, origin)
 
+    def _read_wave(self, given: dict[str, Any], setting: Setting) -> Schedule:
+        found = read_keys(given, self.forms()["wave"], setting)
+        mean, amplitude, period, phase = (found[key] for key in ("mean", "amplitude", "period", "phase"))
+        reach = mean - abs(amplitude), mean + abs(amplitude)
+        try:
+            for one in reach:
+                self.range.check(one, one)
+        except ValueError as error:
+            raise Misfit([(("amplitude",), f"takes it from {reach[0]:g} to {reach[1]:g}: {error}")]) from None
+        return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, found, (mean, amplitude, period, phase))
+
     def _read_file(self, given: dict[str, Any], setting: Setting) -> Schedule:
         found = read_keys(given, self.forms()["file"], setting)
         kind = found["kind"]
@@ -180,4 +203,4 @@ class Scheduled(Value):
         except ValueError as error:
             raise Misfit([((ROOT, "signals", name), str(error))]) from None
         setting.used[name] = made.table()
-        return Schedule(made.kind, made.time, made.value, made.exponent, origin={"signal": name})
+        return Schedule(made.kind, made.time, made.value, made.exponent, {"signal": name}, made.wave)
