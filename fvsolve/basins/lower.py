@@ -16,6 +16,10 @@ def lower_basins(draft) -> None:
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
     for basin, row in zip(draft.basins, draft.basin_table, strict=True):
         basin.lower_common(draft, row)
+    if any(basin.moves for basin in draft.basins):
+        from fvsolve.basins.lower_walls import lower_walls
+
+        lower_walls(draft)
     patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]
     draft.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
     for row, (name, place) in zip(draft.patch_table, patches, strict=True):
@@ -34,7 +38,7 @@ def at_start(basins: list, size: int) -> np.ndarray:
     """States at the start: no deviation from the profile but where basins start from one."""
     found = np.zeros(size)
     for basin in basins:
-        basin.of(found)[:] = basin.start()
+        basin.own(found)[:] = basin.start()
         if basin.scalars:
             basin.start_scalars(found)
     return found

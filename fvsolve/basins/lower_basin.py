@@ -52,6 +52,7 @@ class BasinRows:
         self.is_grid = is_grid(self.mesh)
         self.scalars = list(case.scalars) if self.part.own.carries else []
         self.quantities = tuple(self.part.own.states)  # of cells, as states have them; the first is what is stored
+        self.stretches: list[tuple[int, np.ndarray]] = []  # of walls that move: state, and per travel [1/m]
 
     # what a physics says ------------------------------------------------------------------------------------
 
@@ -194,10 +195,40 @@ class BasinRows:
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
 
-    def of(self, y: np.ndarray) -> np.ndarray:
-        """Its deviations in the states of a model : float64[quantities, n]."""
+    def own(self, y: np.ndarray) -> np.ndarray:
+        """Its part of the states of a model : float64[quantities, n]."""
         at = int(self.row["y"])
         return y[at : at + len(self.quantities) * self.n].reshape(-1, self.n)
+
+    def of(self, y: np.ndarray) -> np.ndarray:
+        """Its deviations in a state of a model : float64[quantities, n]."""
+        if not self.moves:
+            return self.own(y)
+        wide, rest = self.stretched(y), np.zeros((len(self.quantities), self.n))
+        rest[0] = self.at_rest()
+        return (self.own(y) - rest * (wide - 1.0)) / wide
+
+    @property
+    def walls(self) -> list[str]:
+        """Names of its patches that are walls that move."""
+        return [patch for patch, one in self.part.patches.items() if one.moves]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has any of these."""
+        return bool(self.walls)
+
+    def stretched(self, y: np.ndarray) -> np.ndarray:
+        """Areas of cells over those as drawn, in a state of a model : float64[n]."""
+        return 1.0 + sum((y[at] * per for at, per in self.stretches), np.zeros(self.n))
+
+    def at_rest(self) -> np.ndarray | float:
+        """Its first quantity at rest."""
+        raise NotImplementedError
+
+    def thrust_at_rest(self) -> np.ndarray:
+        """Force at rest on a wall of one metre beside each cell : float64[n] [N/m]."""
+        raise NotImplementedError
 
     def lower_common(self, draft, row) -> None:
         """Fill what all kinds need."""
@@ -210,7 +241,7 @@ class BasinRows:
         )
         row["scheme"] = family(self.scheme)
         row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].wide
-        row["area"] = draft.to_plane(mesh.area)
+        row["area"] = row["drawn"] = draft.to_plane(mesh.area)
         if self.is_grid:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
@@ -227,8 +258,12 @@ class BasinRows:
         row["reflect"], row["outer_given"] = draft.to_plane(given), given.size
         row["outer"] = mesh.left.size - mesh.inner
         row["through"] = draft.to_work(given.size) if given.size else -1
-        row["unused"] = draft.to_work(len(self.quantities) * self.n if given.size else 0)
+        row["unused"] = draft.to_work(len(self.quantities) * self.n if given.size or self.moves else 0)
         row["carried"] = row["flows"] = -1
+        if self.moves:
+            from fvsolve.basins.lower_walls import lower_lines
+
+            lower_lines(draft, self, row)
         self.lower(draft, row)
         if self.scalars:
             self.lower_scalars(draft, row)
@@ -309,7 +344,7 @@ class BasinRows:
 
     def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """Values of scalars in cells, by name."""
-        depth = np.maximum(self.depth_of(self.of(y)), THIN)
+        depth = np.maximum(self.depth_of(self.of(y)), THIN) * (self.stretched(y) if self.moves else 1.0)
         return {name: one / depth for name, one in zip(self.scalars, self.amounts(y), strict=True)}
 
     def held(self) -> np.ndarray:

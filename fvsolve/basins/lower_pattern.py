@@ -59,6 +59,12 @@ def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndar
     return (int(basin.row["y"]) + np.arange(many)[:, None] * basin.n + cells).ravel()
 
 
+def all_of(basin) -> np.ndarray:
+    """All states of a basin."""
+    own = int(basin.row["y"]) + np.arange(len(basin.quantities) * basin.n)
+    return np.concatenate([own, int(basin.row["carried"]) + np.arange(len(basin.scalars) * basin.n)])
+
+
 def neighbours(basin) -> csr_array:
     """bool[n, n]: which cells the rate of each looks at: along either axis of a grid, all around on other meshes."""
     found, reach = csr_array(eye_array(basin.n, dtype=bool)), basin.reach

@@ -10,6 +10,10 @@ HOME = "fvsolve.basins"
 ALL = Pieces(home=HOME, observe="observe: observe_flows", power="energy: patch_power")
 DENSE = Pieces(home=HOME, observe="observe: observe_dense_flows")  # under all laws but linear
 MARKED = Pieces(home=HOME, record="patches: record_patches")
+WALLS = Pieces(
+    home=HOME, see="walls: see", prepare="walls: drive_lines", enter="walls: push_bodies", swell="walls: swell",
+    observe="walls: observe_walls", power="walls: wall_power",
+)  # fmt: skip
 VALUES = Pieces(home=HOME, leave="carried: patch_values", observe="carried: observe_values")
 GRIDS = Pieces(home=HOME, carry="carried_grids: carry_on_grids")
 FIFTH = Pieces(home=HOME, carry="carried_grids: add_on_grids")
@@ -22,7 +26,8 @@ CARRIED = (VALUES, MIXED, GRIDS, FIFTH, SPREAD, MESHES, SETTLED)  # in order, wh
 def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
     """What runs in basins beside scalars; valves : whether there are any in the network."""
     shared = [ALL] if basins and basins[0].case.law.linear else [ALL, DENSE] if basins else []
-    return tuple(dict.fromkeys([*shared, *(one for basin in basins for one in basin.pieces(valves))]))
+    moving = [WALLS] if any(basin.moves for basin in basins) else []
+    return tuple(dict.fromkeys([*shared, *(one for basin in basins for one in basin.pieces(valves)), *moving]))
 
 
 def of_scalars(basins: list) -> tuple[Pieces, ...]:

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from fvsolve.case import walls
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import Place, StartOfFields
+from fvsolve.parts.basin.part import Place, StartOfFields, Wall
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show
@@ -160,12 +161,19 @@ def means(found: np.ndarray) -> np.ndarray:
     return np.where(np.ptp(found, axis=0) > 0.0, mean, found[0])
 
 
+def place_kind(basin: Basin, patch: str) -> type[Place]:
+    """What a patch is as a place."""
+    stated = basin.patches.get(patch)
+    return Wall if stated is not None and stated.moves else Place
+
+
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
     """Patches as places, at rest."""
     found = {}
     for patch in patch_names(mesh):
         rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), behind(mesh, patch), mesh.area)
-        found[f"{name}.{patch}"] = Place.model_construct(position=None, basin=name, patch=patch, **rest)
+        kind = place_kind(basin, patch)
+        found[f"{name}.{patch}"] = kind.model_construct(position=None, basin=name, patch=patch, **rest)
     return found
 
 
@@ -190,6 +198,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
+        yield from walls.misfits(name, basin, meshes[name], nodes, joined)
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"

@@ -42,13 +42,15 @@ def network(table: dict[str, Any]) -> Found:
     for group in ("nodes", "links"):
         if table.get(group) == {} and not any(own_places(name, node) is not None for name, node in nodes.items()):
             yield (group,), "is empty; wanted two places and a link between them at least"
-    touched = {place for places in ends.values() for place in places}
+    tied = {name: _tied(name, node, places) for name, node in nodes.items()}
+    touched = {place for some in (ends, tied) for places in some.values() for place in places}
     for name, node in nodes.items():
         if own_places(name, node) is None and name not in touched:
             yield ("nodes", name), "no link touches it"
     if not complete:
         return  # what hangs together is not known
-    islands = _islands({name: own for name, node in nodes.items() if (own := own_places(name, node))} | ends)
+    own = {name: places for name, places in tied.items() if places}
+    islands = _islands(own | {f"links.{name}": places for name, places in ends.items()})
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
         yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
@@ -136,6 +138,12 @@ def own_places(name: str, node: Any) -> list[str] | None:
     kind = _kind("nodes", node)
     own = kind.own_places(_dict(node)) if kind else None
     return None if own is None else [f"{name}.{one}" for one in own]
+
+
+def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:
+    """Places that hang together by a node alone: those in its stead, and the bodies that it goes with."""
+    own, kind = own_places(name, node) or [], _kind("nodes", node)
+    return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
 
 
 def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | None]:

@@ -20,7 +20,6 @@ from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
-from fvsolve.parts.basin.part import Place
 from fvsolve.parts.meant import MEANT
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
@@ -121,7 +120,8 @@ class _Reader:
                 pool = parts["nodes"][name]
                 own = dict.fromkeys(carried, "number") if pool.own.carries else {}
                 kinds["nodes"][name] = basins.Pool(pool.own.fields | own, meshes[name])
-                kinds["nodes"] |= {f"{name}.{patch}": Place for patch in basins.patch_names(meshes[name])}
+                kinds["nodes"] |= {f"{name}.{patch}": basins.place_kind(pool, patch)
+                                   for patch in basins.patch_names(meshes[name])}  # fmt: skip
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.with_patches(meshes)))
@@ -316,8 +316,8 @@ class _Reader:
     def with_patches(self, meshes: dict[str, Any]) -> dict[str, Any]:
         """The table as the file has it, basins with all the patches of their meshes."""
         nodes = self.raw.table.get("nodes")
-        own = {name: {**nodes[name], "patches": dict.fromkeys(basins.patch_names(mesh), {})}
-               for name, mesh in meshes.items()}  # fmt: skip
+        own = {name: {**nodes[name], "patches": dict.fromkeys(basins.patch_names(mesh), {})
+                      | (nodes[name].get("patches") or {})} for name, mesh in meshes.items()}  # fmt: skip
         return {**self.raw.table, "nodes": {**nodes, **own}} if meshes else self.raw.table
 
     def kind(self, group: str, name: str, part: dict[str, Any]) -> Any:

@@ -17,9 +17,10 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import table_types
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
-RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, JOBS = range(8)
+# SEE makes of a state what the pieces of all others see of it, where that is something else (`basins.walls`).
+RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, SEE, JOBS = range(9)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
-ARGUMENTS = dict.fromkeys((RHS, CLOSE), RATES)
+ARGUMENTS = dict.fromkeys((RHS, CLOSE, SEE), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 HOOKS = {  # of the law of a part: arguments, and what it returns
     "set": (
@@ -192,6 +193,15 @@ else:
 
 
 @njit(forceinline=True)
+def see(t, y, out, handle):
+    """Let `seen` be what the pieces see of a state, in scenes where that is something else."""
+    tables, k = open_tables(handle), 0
+    while tables.calls[SEE, k] != 0:
+        call_rates(tables.calls[SEE, k], t, y, tables.seen, out, handle)
+        k += 1
+
+
+@njit(forceinline=True)
 def run(job, t, y, dydt, out, handle):
     """Every piece of a job that takes part in the right-hand side."""
     calls, k = open_tables(handle).calls, 0
@@ -203,25 +213,30 @@ def run(job, t, y, dydt, out, handle):
 @njit
 def rhs_in_turn(t, y, dydt, out, handle):
     """Every piece of the right-hand side."""
-    run(RHS, t, y, dydt, out, handle)
+    tables = open_tables(handle)
+    see(t, y, out, handle)
+    run(RHS, t, tables.seen if tables.seen.size > 0 else y, dydt, out, handle)
 
 
 @njit
 def observe_in_turn(t, y, out, handle, values):
     """Every piece that reads probes."""
-    calls, k = open_tables(handle).calls, 0
+    tables, k = open_tables(handle), 0
+    see(t, y, out, handle)
+    calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[OBSERVE, k] != 0:
-        call_reader(calls[OBSERVE, k], t, y, out, handle, values)
+        call_reader(calls[OBSERVE, k], t, seen, out, handle, values)
         k += 1
 
 
 @njit
 def record_in_turn(t, y, out, handle, values):
     """Every piece that notes an accepted state, after the probes are read."""
-    calls, k = open_tables(handle).calls, 0
+    tables, k = open_tables(handle), 0
     observe_in_turn(t, y, out, handle, values)
+    calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[RECORD, k] != 0:
-        call_reader(calls[RECORD, k], t, y, out, handle, values)
+        call_reader(calls[RECORD, k], t, seen, out, handle, values)
         k += 1
 
 
@@ -236,24 +251,30 @@ def events_in_turn(t, y, handle, g):
     """Every piece of the event functions."""
     tables, k = open_tables(handle), 0
     calls, out = tables.calls, tables.spare
+    see(t, y, out, handle)
+    seen = tables.seen if tables.seen.size > 0 else y
     while calls[EVENTS, k] != 0:
-        call_reader(calls[EVENTS, k], t, y, out, handle, g)
+        call_reader(calls[EVENTS, k], t, seen, out, handle, g)
         k += 1
 
 
 @njit
 def power_in_turn(t, y, dydt, out, handle, power):
     """Every piece that fills `power`."""
-    calls, k = open_tables(handle).calls, 0
+    tables, k = open_tables(handle), 0
+    see(t, y, out, handle)
+    calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[POWER, k] != 0:
-        call_energies(calls[POWER, k], t, y, dydt, out, handle, power)
+        call_energies(calls[POWER, k], t, seen, dydt, out, handle, power)
         k += 1
 
 
 @njit
 def stored_in_turn(t, y, dydt, out, handle, stored):
     """Every piece that fills `stored`."""
-    calls, k = open_tables(handle).calls, 0
+    tables, k = open_tables(handle), 0
+    see(t, y, out, handle)
+    calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[STORED, k] != 0:
-        call_energies(calls[STORED, k], t, y, dydt, out, handle, stored)
+        call_energies(calls[STORED, k], t, seen, dydt, out, handle, stored)
         k += 1

@@ -29,6 +29,7 @@ class Functions:
             self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
             self.hang(*MOVING, *["lead"] * cast.columns)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))
+        self.enter(calls.SEE, cast.functions("see"))
         self.observe = self.all(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, cast.functions("record"))
         self.enter(calls.EVENTS, cast.functions("events"))

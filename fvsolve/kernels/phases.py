@@ -37,17 +37,19 @@ class Pieces:
     leave: str = ""  # values of scalars with which water leaves pipes and cells
     mix: str = ""  # and their values at nodes
     carry: str = ""  # rates of what is carried in cells
+    swell: str = ""  # of all rates of cells that stretch, those of what they contain
     # and beside the right-hand side
     observe: str = ""  # reads probes
     record: str = ""  # notes an accepted state
     events: str = ""  # event functions
     power: str = ""
     stored: str = ""
+    see: str = ""  # makes of states what all others see of them, in place of dydt
     home: str = HOME
 
 
 JOBS = tuple(field.name for field in fields(Pieces) if field.name != "home")
-PHASES = JOBS[: JOBS.index("carry") + 1]
+PHASES = JOBS[: JOBS.index("swell") + 1]
 CLOSING = PHASES[: PHASES.index("brake") + 1]
 
 BAROTROPIC = {"store": "barotropic_nodes: store_barotropic", "close": "barotropic_nodes: close_barotropic"}

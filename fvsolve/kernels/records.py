@@ -297,6 +297,7 @@ LAYOUT = np.dtype(
         ("edge", "i8"),  # values that the water of pipes has at both ends
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
+        ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("size", "i8"),
     ],
     align=True,
@@ -325,6 +326,7 @@ POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8
 NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
 GIVEN_FLOW = 18  # of a patch that a given velocity passes
+WALL_VALUE = 19  # of a wall that moves
 
 BASIN = np.dtype(
     [
@@ -366,6 +368,13 @@ BASIN = np.dtype(
         ("roughness", "f8"),  # Manning's n, or a factor
         ("unsplit", "f8"),  # what counts as rate of its cells over that of the kernels
         ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
+        ("wall", "i8"),  # first of its walls that move, and
+        ("walls", "i8"),  # how many these are; with any, its states are contents, see `basins.walls`
+        ("drawn", "i8"),  # offsets in `plane`: areas of cells as drawn; else those of cells now
+        ("stretch", "i8"),  # area of cells over that as drawn
+        ("lines", "i8"),  # speeds of lines [m/s]
+        ("thrust", "i8"),  # and in `work`: on faces of the boundary, see `free_surface.grid`
+        ("turn", "i8"),  # 0 where lines along x move, 1 where those along y do
     ],
     align=True,
 )
@@ -386,6 +395,22 @@ PATCHES = np.dtype(
         ("normals", "i8"),  # in `plane`: outward normals along x, along y, and length over area of cells, of each
         ("open", "i8"),  # 1 where it is no wall and no link joins: what passes is the boundary's
         ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
+    ],
+    align=True,
+)
+
+WALL = np.dtype(
+    [
+        ("basin", "i8"),
+        ("y", "i8"),  # offset of its travel since the start [m]
+        ("body", "i8"),  # that it goes with, or
+        ("schedule", "i8"),  # of its travel; -1 for none
+        ("weights", "i8"),  # in `plane`: how far lines go with it, then by how much cells stretch per travel [1/m]
+        ("faces", "i8"),  # in `integers`: its faces' numbers, as the boundary has them
+        ("count", "i8"),  # how many these are
+        ("lengths", "i8"),  # in `plane`: of these [m]
+        ("outward", "f8"),  # 1 where its travel counts outward, -1 inward
+        ("rest", "f8"),  # force that the profile puts on it [N]
     ],
     align=True,
 )
@@ -432,11 +457,12 @@ RECORDS = {
     "basins": BASIN,
     "patches": PATCHES,
     "scalars": SCALAR,
+    "walls": WALL,
 }
 # Of a model, which nobody writes; of one run, which writes them; behind a handle, with addresses of functions: of
 # pieces, a row a job, and of devices, a row a law.
 Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
-Written = namedtuple("Written", ("clock", "work", "armed", "marks", "scratch", "spare", "envelope", "extremes"))
+Written = namedtuple("Written", ("clock", "work", "armed", "marks", "scratch", "spare", "seen", "envelope", "extremes"))
 Called = namedtuple("Called", (*Tables._fields, *Written._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are no records float64[:]
 INTEGERS = ("integers", "calls", "hooks")  # but int64

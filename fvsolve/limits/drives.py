@@ -22,9 +22,9 @@ def drives(model) -> np.ndarray:
             max(pressure * float(row["admittance"]), flow), model.scale[row["y"] : row["y"] + 2 * mesh.cells]
         )
     for basin in model.basins:
-        states, scales = basin.of(found), basin.of(model.scale)
+        states, scales = basin.own(found), basin.own(model.scale)
         ratio = 1.0 + pressure / (linear.density * model.case.gravity)
-        for own, scale, start in zip(states, scales, basin.of(model.start), strict=True):
+        for own, scale, start in zip(states, scales, basin.own(model.start), strict=True):
             own[:] = np.maximum(ratio * scale, np.ptp(start))
     return found
 

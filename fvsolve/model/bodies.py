@@ -99,6 +99,10 @@ def start_bodies(draft, start) -> list[str]:
             for port, sign in zip(ports, (-1.0, 1.0), strict=True):
                 total[row[port]] += sign * row["force"]
                 size[row[port]] += abs(row["force"])
+    for row in draft.wall_table:
+        if row["body"] >= 0:
+            total[row["body"]] += row["outward"] * row["rest"]
+            size[row["body"]] += abs(row["rest"])
     bodies["force"] = np.where(np.abs(total) > SNAP * size, total, 0.0)
     moving = []
     for name, row in zip(draft.body_names, bodies, strict=False):

@@ -92,12 +92,13 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
+        draft.wall_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
     draft.shapes = rec.Written(
         clock=1, work=draft.work_size, marks=marks_of(draft),
         armed=limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
-        scratch=scratch_of(draft), spare=int(layout["size"][0]),
+        scratch=scratch_of(draft), spare=int(layout["size"][0]), seen=draft.size if len(draft.wall_table) else 0,
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)),
     )  # fmt: skip
 
@@ -136,7 +137,7 @@ def layout_of(draft: Draft) -> np.ndarray:
         ("stiffness", draft.moving), ("had", draft.moving), ("swept", draft.moving),
         ("net_force", len(draft.body_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", many * nodes), ("edge", 2 * pipes * many),
-        ("carried", 2 * pipes * many), ("brought", many * nodes),
+        ("carried", 2 * pipes * many), ("brought", many * nodes), ("wall", len(draft.wall_table)),
     ):  # fmt: skip
         found[name], at = at, at + size
     found["size"] = at

@@ -60,6 +60,7 @@ class Draft:
     body_index: dict[str | None, int] = field(default_factory=dict)
     piston_names: list[str] = field(default_factory=list)
     push_names: list[str] = field(default_factory=list)
+    wall_names: list[str] = field(default_factory=list)
     devices: list[tuple] = field(default_factory=list)  # (name, part, what it is lowered by)
     laws: list[str] = field(default_factory=list)  # modules of compiled laws, as rows of `hooks` lie
     events: list[tuple[str, str]] = field(default_factory=list)  # (what, what it means); "": nothing to a reader
@@ -80,6 +81,7 @@ class Draft:
     basin_table: np.ndarray = rows(rec.BASIN)
     patch_table: np.ndarray = rows(rec.PATCHES)
     scalar_table: np.ndarray = rows(rec.SCALAR)
+    wall_table: np.ndarray = rows(rec.WALL)
     probe_table: np.ndarray = rows(rec.PROBE)
 
     # of the start

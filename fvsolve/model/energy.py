@@ -159,7 +159,7 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         kept = slice(row["memory"], row["memory"] + shares.size * row["cells"])
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
     for basin in model.basins:
-        basin.of(found)[:] = basin.weights(basin.of(y))
+        basin.own(found)[:] = basin.weights(basin.of(y))
         for q, amount in enumerate(basin.amounts(found) if basin.scalars else ()):
             amount[:] = CARRIED * 0.5 * basin.mesh.area / typical(model, q) ** 2
     for row in tables.nodes:

@@ -57,6 +57,7 @@ class Accounts:
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.mechanics()
         self.devices()
+        self.walls()
         self.basins()
         self.matrix = matrix_of(self.accounts, self.powers)
         self.holding = matrix_of(self.held, self.stores)
@@ -131,6 +132,13 @@ class Accounts:
             }.items():
                 self.accounts.append(Account(what, name, kind, tuple(of), (1.0, sign)[: len(of)]))
             self.hold(name, kind, at + 1)
+
+    def walls(self) -> None:
+        names = [f"{basin.name}.{patch}" for basin in self.model.basins for patch in basin.walls]
+        for name, row in zip(names, self.model.tables.walls, strict=True):
+            at = self.take(1)
+            if row["body"] < 0:
+                self.add("supplied", name, "wall", at)
 
     def basins(self) -> None:
         for basin in self.model.basins:

@@ -348,7 +348,7 @@ class Model(Shown):
                 change += float(y[row["y"]])
         for basin in self.basins:
             rest, per = basin.mass()
-            for own, start in zip(basin.of(y)[:1], basin.of(self.start)[:1], strict=True):
+            for own, start in zip(basin.own(y)[:1], basin.own(self.start)[:1], strict=True):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
         for row in self.tables.pistons:  # what moving chambers hold is their excess and what was swept

@@ -38,7 +38,10 @@ class Slate:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model, self.written = model, wiped(model.shapes)
+        self.model, self.written, self.tables = model, wiped(model.shapes), model.tables
+        if len(model.tables.walls) > 0:  # what is drawn moves: a run has its own
+            self.tables = model.tables._replace(plane=lined(model.tables.plane.size))
+            self.tables.plane[:] = model.tables.plane
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
@@ -52,7 +55,7 @@ class Slate:
         from fvsolve.kernels.handle import make_handle
 
         functions = self.model.functions
-        return make_handle((*self.model.tables, *self.written, functions.calls, functions.hooks))
+        return make_handle((*self.tables, *self.written, functions.calls, functions.hooks))
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
         """`Model.evaluate` where devices stand as the flags here have them, which follow what holds at (t, y)."""

@@ -45,7 +45,7 @@ class Couplings:
         self.bodies, self.pistons = tables.bodies["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
         self.devices = tables.devices
-        self.basins, self.integers = model.basins, tables.integers
+        self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
         self.sets = self.pressures()  # of each node, the states that set its pressure
 
@@ -62,6 +62,7 @@ class Couplings:
         yield from self.rigid()
         yield from self.moving()
         yield from self.driven()
+        yield from self.walled()
 
     def passing(self) -> Iterator[Pairs]:
         """What passes an open patch, on the cells there."""
@@ -97,7 +98,7 @@ class Couplings:
     def held(self, i: int) -> np.ndarray:
         """The states that set the pressure of a node that stores: its mass, its cells, and where its piston is."""
         if i in self.patches:
-            return self.behind(i, 1)
+            return states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
         filled = (self.held_by(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
         moved = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
         return states(self.own(i), *moved, *filled)
@@ -175,6 +176,17 @@ class Couplings:
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             felt = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
             yield every(self.held_by(row), states(self.held_by(row), *felt))
+
+    def walled(self) -> Iterator[Pairs]:
+        """Cells on where walls of their basin stand and how fast these move, and bodies on the cells before them."""
+        for wall in self.walls:
+            basin, body = self.basins[wall["basin"]], self.bodies[wall["body"]] if wall["body"] >= 0 else -1
+            speed = states(body + 1) if body >= 0 else states()
+            yield every(pattern.all_of(basin), states(wall["y"], speed))
+            yield every(states(wall["y"]), speed)
+            behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
+            cells = pattern.about(pattern.neighbours(basin), behind)
+            yield every(speed, states(wall["y"], pattern.of_cells(basin, cells)))
 
     # pipes ------------------------------------------------------------------------------------------------------
 

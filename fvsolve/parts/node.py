@@ -48,6 +48,11 @@ class Node(Table):
         """Names of places in its stead, as the file says them; None where it is a place itself."""
         return None
 
+    @classmethod
+    def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
+        """Names of bodies that it goes with, as the file says them."""
+        return ()
+
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
         """(places, links) of the fluid that it stands for, by name: itself, and what it owns as `NAME.PLACE`."""
         return {name: self}, {}

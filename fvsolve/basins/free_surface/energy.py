@@ -46,6 +46,7 @@ def water_power(st, basin, plane, y, dydt, rows):
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
+    drawn = plane[basin["drawn"] :]
     friction, rate = 0.0, 0.0
     for i in range(n):
         d, qx, qy = y[o + i], y[o + n + i], y[o + 2 * n + i]
@@ -54,7 +55,7 @@ def water_power(st, basin, plane, y, dydt, rows):
         u, v = share * qx, share * qy
         level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
         moves = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
-        rate += area[i] * (level * dydt[o + i] + st["rho"] * moves)
+        rate += drawn[i] * (level * dydt[o + i] + st["rho"] * moves)
         friction += area[i] * drag_power(st, basin, depth, u * u + v * v)
     rows[2], rows[3] = friction, rate
 

@@ -13,6 +13,8 @@ cells; in the plane of second order, since a flux of mean values is not the mean
 """
 
 from fvsolve.basins.free_surface.rows import (
+    AFTER,
+    ALONG,
     EAST,
     FIELDS,
     FLOW_EAST,
@@ -24,6 +26,8 @@ from fvsolve.basins.free_surface.rows import (
     PUSH,
     SIDES,
     STRIDE,
+    drive_beyond,
+    drive_end,
     put_beyond,
     put_cells,
     put_end,
@@ -43,6 +47,7 @@ PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # rows of cells at hand
 BLOCK, SIDE, FLUX = FIELDS * STRIDE, SIDES * STRIDE, FLUXES * STRIDE
 WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # floats that `grid_rates` works in
+MOVING = WORK + STRIDE
 
 
 @njit
@@ -59,7 +64,7 @@ def place(j, i):
 
 
 @njit
-def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top):
+def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves):
     """Columns `first` to `last` of row j of cells and their ghosts; also one beyond the grid, from those before it."""
     fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
     cells, walls = ring[place(j, left - first) :], reflect.size > 0
@@ -74,8 +79,12 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
         block = ring[place(j, -GHOSTS) :]
         if left == 0:
             put_end(fields, 3 if fifth else 2, reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
+            if moves is not None and moves[0].size > 0:
+                drive_end(fields, 3 if fifth else 2, moves[0][0], block, GHOSTS, -1)
         if right == nx:
             put_end(fields, 3 if fifth else 2, reflect[ny + j] if walls else 1.0, block, GHOSTS + nx - 1 - first, 1, nx)
+            if moves is not None and moves[0].size > 0:
+                drive_end(fields, 3 if fifth else 2, moves[0][nx], block, GHOSTS + nx - 1 - first, 1)
         return
     edge = 0 if j < 0 else ny - 1
     mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)
@@ -84,12 +93,23 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
         last - first, fields, reflect[at : at + last - first] if walls else reflect,
         ring[place(edge, 0) :], ring[place(mirror, 0) :], ring[place(j, 0) :],
     )  # fmt: skip
+    if moves is not None and moves[1].size > 0:
+        drive_beyond(last - first, fields, moves[1][0 if j < 0 else ny], ring[place(j, 0) :])
+
+
+@njit
+def push_walls(g, speed, rest, side, f, thrust):
+    """Let nothing pass a row of faces of the boundary that moves; thrust less that of the depth at rest there."""
+    for i in range(thrust.size):
+        if speed != 0.0:
+            f[i], f[i + ALONG] = 0.0, 0.0
+        thrust[i] = f[i + AFTER] + 0.5 * g * ((side[i] - rest[i]) * (side[i] + rest[i]))
 
 
 @njit
 def grid_rates(
     g, scheme, limiter, nx, ny, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h, rate_x,
-    rate_y,
+    rate_y, moves,
 ):  # fmt: skip
     """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
@@ -100,14 +120,17 @@ def grid_rates(
     dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
     through : float64[2 (nx + ny)]  flows inward through faces of the boundary [m3/s], in the order of reflect, or empty
-    work : float64[WORK], fastest where it begins at a cache line
+    work : float64[WORK], fastest where it begins at a cache line; float64[MOVING] where lines move
+    moves : None, or speeds of lines along x and along y [m/s], float64[nx + 9] and float64[ny + 9], empty where they
+    stand still, and what they find: thrust on faces of the boundary less that at rest, over density [m2/s2],
+    float64[2 (nx + ny)]
     """
     most = 0.0
     for first in range(0, nx, MOST):
         last = min(first + MOST, nx)
         rate = column_rates(
             g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
-            work, rate_h, rate_x, rate_y,
+            work, rate_h, rate_x, rate_y, moves,
         )  # fmt: skip
         most = max(most, rate)
     return most
@@ -116,7 +139,7 @@ def grid_rates(
 @njit
 def column_rates(
     g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
-    work, rate_h, rate_x, rate_y,
+    work, rate_h, rate_x, rate_y, moves,
 ):  # fmt: skip
     """The same of columns `first` to `last`, no more than MOST of them, row by row."""
     n, fifth = last - first, scheme == LINEAR or scheme == WENO5
@@ -129,12 +152,12 @@ def column_rates(
     reach = 3 if fifth else 2
     ahead = min(reach, ny)
     for j in range(ahead):
-        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves)
     for j in range(-1, -1 - reach, -1):
-        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves)
     for j in range(-1, ny + 1):
         while ahead < j + reach:
-            put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top)
+            put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves)
             ahead += 1
         # values of row j at its southern and northern faces
         now, was = j & 1, (j - 1) & 1
@@ -151,7 +174,17 @@ def column_rates(
         # faces between rows j - 1 and j
         south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], sides[was * SIDE + HIGH :]
         l, r = (under, low) if fifth else (before, here)  # where speeds are looked at
-        put_fluxes(g, n, NORTH, EAST, under, low, l, r, north)
+        if moves is None or moves[1].size == 0:
+            put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, None)
+        else:
+            even = work[WORK : WORK + STRIDE]
+            for i in range(n):
+                even[i] = moves[1][j]
+            put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, even)
+            if j == 0 or j == ny:
+                at = 2 * ny + first + (nx if j > 0 else 0)
+                rest = plan[0, (0 if j == 0 else (ny - 1) * nx) + first :]
+                push_walls(g, moves[1][j], rest, low if j == 0 else under, north, moves[2][at : at + n])
         if flow_y.size > 0:
             copy(north, flow_y[j * nx + first : j * nx + last])
         if through.size > 0 and (j == 0 or j == ny):
@@ -170,7 +203,15 @@ def column_rates(
             )  # fmt: skip
         left, right = ends[HIGH:], ends[1:]
         l, r = (left, right) if fifth else (cell, before)
-        put_fluxes(g, (n + 8) // 8 * 8, EAST, NORTH, left, right, l, r, along)
+        if moves is None or moves[0].size == 0:
+            put_fluxes(g, (n + 8) // 8 * 8, EAST, NORTH, left, right, l, r, along, None)
+        else:
+            put_fluxes(g, (n + 8) // 8 * 8, EAST, NORTH, left, right, l, r, along, moves[0][first:])
+            rest = plan[0, (j - 1) * nx :]
+            if first == 0:
+                push_walls(g, moves[0][0], rest, right, along, moves[2][j - 1 : j])
+            if last == nx:
+                push_walls(g, moves[0][nx], rest[nx - 1 :], left[n:], along[n:], moves[2][ny + j - 1 : ny + j])
         if flow_x.size > 0:
             at = (j - 1) * (nx + 1)
             copy(along, flow_x[at + first : at + last + 1])

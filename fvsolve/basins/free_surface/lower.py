@@ -59,8 +59,11 @@ class FreeSurfaceRows(BasinRows):
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
 
     def pieces(self, valves: bool) -> Iterator[Pieces]:
-        yield Pieces(home=HOME, rates="rates: rates_on_grids" if self.is_grid else "rates: rates_on_meshes")
+        kind = "grids" if self.is_grid else "meshes"
+        yield Pieces(home=HOME, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}")
         yield WATER
+        if self.moves:
+            yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
         if valves:
             yield Pieces(home=HOME, brake="patches: quickest_inflow")
@@ -86,7 +89,7 @@ class FreeSurfaceRows(BasinRows):
     def lower_grid(self, draft, row) -> None:
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
         row["unsplit"] = SHORES if dry and self.fifth else UNSPLIT
-        row["work"] = draft.to_work(grid.WORK)
+        row["work"] = draft.to_work(grid.MOVING if self.moves else grid.WORK)
 
     def lower_faces(self, draft, row) -> None:
         row["unsplit"] = UNSPLIT
@@ -127,6 +130,12 @@ class FreeSurfaceRows(BasinRows):
         row["side"], row["scale"] = DEPTH, float(field != "bed")
         if field != "depth":
             row["offset"] = weights @ self.bed[cells] + (self.part.elevation or 0.0)
+
+    def at_rest(self) -> np.ndarray:
+        return self.depth
+
+    def thrust_at_rest(self) -> np.ndarray:
+        return 0.5 * self.case.properties.density * self.case.gravity * self.depth**2
 
     def mass(self) -> tuple[float, np.ndarray]:
         per = self.case.properties.density * self.mesh.area

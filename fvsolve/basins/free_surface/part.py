@@ -25,6 +25,7 @@ class FreeSurface(Physics, name="free-surface"):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
     starts: ClassVar[type[MovingStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)
+    moves: ClassVar[bool] = True
     described: ClassVar[str] = "a free surface, whose water has one density"
     steep: ClassVar[bool] = True
 

@@ -40,32 +40,37 @@ def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
 
 
 @njit
+def on_grid(tables, b, y, dydt, out, moves):
+    """Rates of cells of a rectangle; moves : None, or as `grid.grid_rates` has it."""
+    st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
+    n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
+    nx, ny, through = basin["nx"], basin["ny"], basin["through"]
+    plan, many = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), ny * (nx + 1)
+    flow_x, flow_y = work[:0], work[:0]
+    if f >= 0:  # scalars are carried by them
+        flow_x, flow_y = work[f : f + many], work[f + many : f + many + (ny + 1) * nx]
+    dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+    rates = to[first : first + 3 * n]
+    rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
+    rate = grid.grid_rates(
+        st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
+        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
+        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y, moves,
+    )  # fmt: skip
+    if f >= 0:
+        through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
+    finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+
+
+@njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Rates of cells of rectangles."""
+    """Rates of cells of rectangles that stand still."""
     tables = open_tables(handle)
-    st, plane, work = tables.settings[0], tables.plane, tables.work
     for b in range(tables.basins.size):
         basin = tables.basins[b]
-        if basin["kind"] != MINE or basin["nx"] == 0 or not wanted(basin, dydt):
-            continue
-        n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
-        nx, ny, through = basin["nx"], basin["ny"], basin["through"]
-        plan, many = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), ny * (nx + 1)
-        flow_x, flow_y = work[:0], work[:0]
-        if f >= 0:  # scalars are carried by them
-            flow_x, flow_y = work[f : f + many], work[f + many : f + many + (ny + 1) * nx]
-        dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
-        rates = to[first : first + 3 * n]
-        rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
-        rate = grid.grid_rates(
-            st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
-            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
-            work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
-        )  # fmt: skip
-        if f >= 0:
-            through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
-        finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+        if basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0 and wanted(basin, dydt):
+            on_grid(tables, b, y, dydt, out, None)
 
 
 @njit

@@ -62,6 +62,25 @@ def put_end(fields, reach, wall, cells, first, step, deep):
 
 
 @njit
+def drive_end(fields, reach, speed, cells, first, step):
+    """Let ghosts beyond cell `first` be seen in a wall that moves along the row: u is mirrored to 2 speed - u."""
+    for k in range(reach):
+        at = first + step * (k + 1)
+        cells[at + EAST] += 2.0 * speed
+        if fields * STRIDE > FLOW_EAST:
+            cells[at + FLOW_EAST] += 2.0 * speed * cells[at + DEPTH]
+
+
+@njit
+def drive_beyond(n, fields, speed, cells):
+    """The same of a row of ghosts beyond a wall that moves across it."""
+    for i in range(n):
+        cells[i + NORTH] += 2.0 * speed
+        if fields * STRIDE > FLOW_NORTH:
+            cells[i + FLOW_NORTH] += 2.0 * speed * cells[i + DEPTH]
+
+
+@njit
 def put_beyond(n, fields, walls, last, mirror, cells):
     """A row beyond the last one, from that and its mirror image; walls : float64[n] or empty, as in `put_end`."""
     for f in range(fields):
@@ -106,11 +125,12 @@ def put_limited(scheme, limiter, n, before, here, after, sides):
 
 
 @inner
-def put_fluxes(g, n, normal, along, left, right, l, r, f):
+def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
     """Through a row of n faces (HLLC); momentum along them goes with the mass, as the contact carries it.
 
     normal, along : EAST and NORTH, or the other way round
     left, right : values on either side; l, r : cells between whose velocities and wave speeds those of the face lie
+    moves : speeds of the faces [m/s], None where they stand still: F(U) - w U, found in axes that move along
     """
     half = 0.5 * g
     for i in range(n):
@@ -119,12 +139,16 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f):
         bed = max(el - hl, er - hr)
         a, b = max(0.0, el - bed), max(0.0, er - bed)
         wave, ua, ub = max(l[i + WAVE], r[i + WAVE]), l[i + normal], r[i + normal]
+        if moves is not None:
+            nl, nr, ua, ub = nl - moves[i], nr - moves[i], ua - moves[i], ub - moves[i]
         low, high = min(min(ua, ub) - wave, 0.0), max(max(ua, ub) + wave, 0.0)
         both = 1.0 / (high - low + TINY)
         wa, wb, mix = high * both, -(low * both), high * low * both
         qa, qb = a * nl, b * nr
         mass = (wa * qa + wb * qb) + mix * (b - a)
         flow = (wa * (qa * nl) + wb * (qb * nr)) + mix * (qb - qa)
+        if moves is not None:
+            flow += moves[i] * mass
         rise = half * ((b - a) * (b + a))
         f[i], f[i + BEFORE], f[i + AFTER] = mass, flow + wb * rise, flow - wa * rise
         f[i + ALONG] = mass * (tl if mass > 0.0 else tr)

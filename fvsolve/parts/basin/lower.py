@@ -23,8 +23,16 @@ class PatchRows(Lowering, kind="patch"):
         return f"basin {name}: {flow:.4g} m3/s flow in"
 
     def probe(self, draft, name, probe, row) -> None:
-        if probe.quantity != "flow":
-            return super().probe(draft, name, probe, row)
+        if probe.quantity in ("force", "power", "travel"):
+            row["kind"], row["index"] = rec.WALL_VALUE, draft.wall_names.index(name)
+            row["side"] = ("force", "power", "travel").index(probe.quantity)
+        elif probe.quantity != "flow":
+            super().probe(draft, name, probe, row)
+        else:
+            self.probe_flow(draft, name, row)
+
+    def probe_flow(self, draft, name, row) -> None:
+        """Fill the PROBE row of what flows in."""
         row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
         if not draft.case.nodes[draft.case.places[name].basin].own.joined:
             row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

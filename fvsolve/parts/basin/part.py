@@ -15,6 +15,7 @@ from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
+from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.table import Inside, Named, Table
 from fvsolve.parts.value import (
@@ -60,8 +61,26 @@ class Patch(Table):
             "impedance", nonnegative, "pressure over velocity of waves, in place of boundary, of a liquid [Pa s/m]"
         ),
     ] = None
+    body: Annotated[str | None, Text("a mass that it moves with, a wall then, along x or y as that along its axis")] = (
+        None
+    )
+    travel: Annotated[
+        Schedule | None, Scheduled("position", about="how far it moves along x or y, in place of body [m]")
+    ] = None
+    zone: Annotated[
+        float | None,
+        Quantity(
+            "length", positive, "behind a wall that moves, in which lines go with it [m]; all of the basin if left out",
+            changes=SHAPE,
+        ),
+    ] = None  # fmt: skip
     scalars: Annotated[dict[str, Any], Carried("of scalars that the given velocity brings in")] = {}
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"),)
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"), ("body", "travel"))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a wall that moves."""
+        return self.body is not None or self.travel is not None
 
 
 class Cells(Value):
@@ -135,6 +154,13 @@ class Place(Node):
     pressure: float | None = None  # of a liquid at rest [Pa]
 
 
+class Wall(Place):
+    """A patch that is a wall that moves: force on the water, inward, power that it brings, how far it has moved."""
+
+    own: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
+    quantities: ClassVar[dict[str, str]] = Place.quantities | own
+
+
 class Physics(Table):
     """What the cells of basins hold: its name in the file, keys of its own, and what goes with it.
 
@@ -144,6 +170,7 @@ class Physics(Table):
     dimensions; starts : keys of `start`
     laws : of density that it goes with, all if left out; described : what other laws do not go with, in words
     joined : whether links may join its patches; a given velocity passes others
+    moves : whether its walls may move
     carries : whether it carries scalars; echoes : whether its boundary may have an impedance
     steep : whether its fronts steepen into jumps that keep, and smooth flow in the plane is of second order at most
     """
@@ -156,6 +183,7 @@ class Physics(Table):
     laws: ClassVar[tuple[str, ...]] = ()
     described: ClassVar[str] = "basins"
     joined: ClassVar[bool] = True
+    moves: ClassVar[bool] = False
     carries: ClassVar[bool] = True
     echoes: ClassVar[bool] = False
     steep: ClassVar[bool] = False
@@ -276,6 +304,12 @@ class Basin(Node, kind="basin"):
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
         patches = given.get("patches")
         return tuple(patches) if isinstance(patches, dict) else ()
+
+    @classmethod
+    def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
+        patches = given.get("patches")
+        stated = [one.get("body") for one in patches.values() if isinstance(one, dict)] if patches else []
+        return tuple(one for one in stated if isinstance(one, str))
 
 
 ABOUT = Basin.__doc__  # to which every physics adds a line

@@ -1,0 +1,49 @@
+"""Water between walls that move: rates of cells, and its energy as areas change. Knows the tables; knows no flux."""
+
+from fvsolve.basins.energy import at_rest, row_of
+from fvsolve.basins.free_surface.rates import MINE, on_grid
+from fvsolve.basins.walls import moves_of, widening
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+
+
+@njit(forceinline=True)
+def is_moving(basin):
+    """Whether it is water between walls that move."""
+    return basin["kind"] == MINE and basin["walls"] > 0
+
+
+@njit
+def rates_on_moving_grids(t, y, dydt, out, handle):
+    """Rates of cells of rectangles."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if is_moving(tables.basins[b]) and tables.basins[b]["nx"] > 0:
+            on_grid(tables, b, y, dydt, out, moves_of(tables, tables.basins[b]))
+
+
+@njit
+def add_power(t, y, dydt, out, handle, power):
+    """Of the rate of storage what areas that change take: - rho g h^2 / 2 dA/dt."""
+    tables = open_tables(handle)
+    st, plane = tables.settings[0], tables.plane
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        for i in range(basin["n"] if is_moving(basin) else 0):
+            depth = max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+            spent = 0.5 * st["rho"] * st["gravity"] * depth * depth * widening(t, tables, basin, y, i)
+            power[row_of(tables, power, b) + 3] -= plane[basin["drawn"] + i] * spent
+
+
+@njit
+def add_stored(t, y, dydt, out, handle, stored):
+    """What areas that have changed hold of the profile's energy."""
+    tables = open_tables(handle)
+    st, plane, first = tables.settings[0], tables.plane, stored.size - tables.basins.size
+    weight = st["rho"] * st["gravity"]
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        for i in range(basin["n"] if is_moving(basin) else 0):
+            depth, surface = plane[basin["plan"] + i], plane[basin["plan"] + basin["n"] + i]
+            held = depth * (at_rest(st, basin) + weight * (surface - 0.5 * depth))
+            stored[first + b] += (plane[basin["area"] + i] - plane[basin["drawn"] + i]) * held

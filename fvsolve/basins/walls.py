@@ -1,0 +1,218 @@
+"""Walls of basins that move, and the lines of grids that go with them. Knows rows of tables; knows no physics.
+
+d/dt of what a cell contains is the sum of F - w U over its faces, w their speeds (Reynolds' transport theorem, 71 to
+73). So the states are contents over areas as drawn, (A U - A0 U0) / A0, and where walls stand are states as well: areas
+are then linear in states, a sum that every Runge-Kutta method keeps, and what is even stays so to round-off. All walls
+of a basin move along one axis. What other pieces see in place of the contents are deviations U - U0, and in `plane`
+lines and areas as they are.
+"""
+
+from math import sqrt
+
+from fvsolve.basins.energy import row_of
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanics import motion
+from fvsolve.kernels.records import RATE, WALL_VALUE
+from fvsolve.kernels.schedules import schedule_slopes
+
+FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.Wall`
+BESIDE = 8  # speeds of lines that loops over whole vectors look at beyond the last
+
+
+@njit(forceinline=True)
+def across(basin):
+    """How many cells lie between the lines that move, and how many in each row of these."""
+    return (basin["ny"], basin["nx"]) if basin["turn"] == 1 else (basin["nx"], basin["ny"])
+
+
+@njit
+def see(t, y, seen, out, handle):
+    """Lines and areas of basins as they are at y, and in `seen` the state as all others see it."""
+    tables = open_tables(handle)
+    for i in range(y.size):
+        seen[i] = y[i]
+    for b in range(tables.basins.size):
+        if tables.basins[b]["walls"] > 0:
+            stretch_cells(tables, tables.basins[b], y)
+            see_cells(tables, tables.basins[b], y, seen)
+
+
+@njit
+def stretch_cells(tables, basin, y):
+    """Widths of columns or rows, and areas, with walls where they are."""
+    plane, walls, at = tables.plane, tables.walls, basin["stretch"]
+    many, _ = across(basin)
+    spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
+    drawn = at + many  # 1 / widths as drawn, behind what they are stretched by
+    for i in range(many):
+        plane[at + i] = 1.0
+    for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+        weights = walls[k]["weights"] + many + 1
+        for i in range(many):
+            plane[at + i] += plane[weights + i] * y[walls[k]["y"]]
+    for i in range(many):
+        plane[spacing + i] = plane[drawn + i] / plane[at + i]
+    for i in range(basin["n"]):
+        plane[basin["area"] + i] = plane[basin["drawn"] + i] * stretched(plane, basin, i)
+
+
+@njit(forceinline=True)
+def stretched(plane, basin, i):
+    """Area of cell i over that as drawn."""
+    return plane[basin["stretch"] + (i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"])]
+
+
+@njit
+def see_cells(tables, basin, y, seen):
+    """U - U0 of all cells, from what they contain: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    plane, n, first = tables.plane, basin["n"], basin["y"]
+    for i in range(n):
+        wide = stretched(plane, basin, i)
+        rest = plane[basin["plan"] + i] if basin["deep"] == 1 else basin["density"]
+        share = 1.0 / wide
+        seen[first + i] = (y[first + i] - rest * (wide - 1.0)) * share
+        seen[first + n + i], seen[first + 2 * n + i] = y[first + n + i] * share, y[first + 2 * n + i] * share
+    for k in range(basin["carried"], basin["carried"] + tables.scalars.size * n if basin["carried"] >= 0 else -1):
+        seen[k] = y[k] / stretched(plane, basin, (k - basin["carried"]) % n)
+
+
+@njit
+def speed_of(t, tables, wall, y):
+    """Speed of a wall along its axis [m/s]."""
+    if wall["body"] >= 0:
+        return motion(tables.bodies[wall["body"]], y)[1]
+    return schedule_slopes(tables, wall["schedule"], t)[0]
+
+
+@njit
+def drive_lines(t, y, dydt, out, handle):
+    """Speeds of all lines; steps follow these too."""
+    tables = open_tables(handle)
+    plane, walls = tables.plane, tables.walls
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["walls"] == 0:
+            continue
+        lines, (many, _) = basin["lines"], across(basin)
+        for i in range(many + 1):
+            plane[lines + i] = 0.0
+        for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+            speed = speed_of(t, tables, walls[k], y)
+            for i in range(many + 1):
+                plane[lines + i] += speed * plane[walls[k]["weights"] + i]
+            if dydt.size > 0:
+                dydt[walls[k]["y"]] = speed
+        spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
+        for i in range(many):
+            most = max(most, max(abs(plane[lines + i]), abs(plane[lines + i + 1])) * plane[spacing + i])
+        out[RATE] = max(out[RATE], most)
+
+
+@njit(forceinline=True)
+def moves_of(tables, basin):
+    """Speeds of lines along x and along y, and room for the thrust on the boundary, as kernels of grids want them."""
+    plane, lines, (many, _) = tables.plane, basin["lines"], across(basin)
+    speeds, none = plane[lines : lines + many + 1 + BESIDE], plane[:0]
+    thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * (basin["nx"] + basin["ny"])]
+    if basin["turn"] == 1:
+        return none, speeds, thrust
+    return speeds, none, thrust
+
+
+@njit
+def impedance(tables, basin, i, y):
+    """Force per speed of one metre of wall beside cell i that sends out waves [N s/m2]."""
+    st = tables.settings[0]
+    if basin["deep"] == 0:
+        return basin["density"] * basin["speed"] * basin["thickness"]
+    depth = max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+    return st["rho"] * depth * sqrt(st["gravity"] * depth)
+
+
+@njit
+def push_bodies(t, y, dydt, out, handle):
+    """Forces on walls, outward, less those of the profile; bodies feel them, as steps do."""
+    tables = open_tables(handle)
+    layout, walls, bodies, st = tables.layout[0], tables.walls, tables.bodies, tables.settings[0]
+    for k in range(walls.size):
+        wall, total, waves = walls[k], 0.0, 0.0
+        basin = tables.basins[wall["basin"]]
+        for m in range(wall["count"]):
+            face, length = tables.integers[wall["faces"] + m], tables.plane[wall["lengths"] + m]
+            total += length * tables.work[basin["thrust"] + face]
+            waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], y)
+        total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
+        out[layout["wall"] + k] = total
+        if wall["body"] < 0:
+            continue
+        body = bodies[wall["body"]]
+        force = wall["outward"] * total
+        out[layout["net_force"] + wall["body"]] += force
+        out[RATE] = max(out[RATE], waves * body["lightness"])
+        if dydt.size > 0 and body["y"] >= 0:
+            dydt[body["y"] + 1] += force * body["lightness"]
+
+
+@njit
+def swell(t, y, dydt, out, handle):
+    """Rates of what cells contain, from those of what they hold per area."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
+        if basin["walls"] == 0:
+            continue
+        n, many = basin["n"], tables.scalars.size if basin["carried"] >= 0 else 0
+        for i in range(n):
+            wide = stretched(tables.plane, basin, i)
+            for q in range(3):
+                dydt[basin["y"] + q * n + i] *= wide
+            for q in range(many):
+                dydt[basin["carried"] + q * n + i] *= wide
+
+
+@njit
+def observe_walls(t, y, out, handle, values):
+    """Forces of walls on the water, inward, the power that they bring, and how far they have moved."""
+    tables = open_tables(handle)
+    for p in range(tables.probes.size):
+        probe = tables.probes[p]
+        if probe["kind"] != WALL_VALUE:
+            continue
+        wall = tables.walls[probe["index"]]
+        force = wall["rest"] + out[tables.layout[0]["wall"] + probe["index"]]
+        if probe["side"] == FORCE_OF:
+            values[p] = force
+        elif probe["side"] == POWER_OF:
+            values[p] = brought(t, tables, probe["index"], y, out)
+        else:
+            values[p] = y[wall["y"]]
+
+
+@njit(forceinline=True)
+def brought(t, tables, k, y, out):
+    """Power that wall k brings to what it stands in [W]."""
+    wall = tables.walls[k]
+    force = wall["rest"] + out[tables.layout[0]["wall"] + k]
+    return -force * wall["outward"] * speed_of(t, tables, wall, y)
+
+
+@njit
+def wall_power(t, y, dydt, out, handle, power):
+    """Rows of walls, before those of basins, and what they bring to these."""
+    tables = open_tables(handle)
+    for k in range(tables.walls.size):
+        work = brought(t, tables, k, y, out)
+        power[row_of(tables, power, 0) - tables.walls.size + k] = work
+        power[row_of(tables, power, tables.walls[k]["basin"])] += work
+
+
+@njit
+def widening(t, tables, basin, y, i):
+    """Rate of the area of cell i over that as drawn [1/s]."""
+    total, (many, _) = 0.0, across(basin)
+    column = i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
+    for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+        wall = tables.walls[k]
+        total += tables.plane[wall["weights"] + many + 1 + column] * speed_of(t, tables, wall, y)
+    return total

@@ -1,0 +1,135 @@
+"""What must hold between walls of basins that move and the rest of a case. Knows no network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.formula import Formula
+from fvsolve.units import show
+
+AXES = {"west": 0, "east": 0, "south": 1, "north": 1}
+FLAT = 1e-12  # of the height of a bed, what counts as none of it
+
+
+def moving(basin: Any) -> dict[str, Any]:
+    """The patches of a basin that are walls that move, by name."""
+    return {patch: one for patch, one in basin.patches.items() if one.moves}
+
+
+def axis_of(basin: Any, mesh: Any) -> int:
+    """Along which axis its walls move: 0 of x, 1 of y."""
+    return outward(mesh, next(iter(moving(basin))))[0]
+
+
+def outward(mesh: Any, patch: str) -> tuple[int, float]:
+    """(axis, 1 or -1) of the normal of a patch that lies across one."""
+    normal = mesh.normal[mesh.patch(patch)].mean(axis=0)
+    axis = int(np.argmax(np.abs(normal)))
+    return axis, float(np.sign(normal[axis]))
+
+
+def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
+    """How far lines at places along the axis [m] go with a wall: 1 on it, 0 where its zone ends : float64[...]."""
+    axis, side = outward(mesh, patch)
+    low, high = mesh.points[:, axis].min(), mesh.points[:, axis].max()
+    zone = basin.patches[patch].zone or high - low
+    return np.clip(1.0 - (high - at if side > 0.0 else at - low) / zone, 0.0, 1.0)
+
+
+def misfits(name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str]) -> Iterator[tuple[tuple, str]]:
+    """Faults of walls that move."""
+    key = ("nodes", name, "patches")
+    for patch, one in basin.patches.items():
+        if one.zone is not None and not one.moves:
+            yield (*key, patch, "zone"), "goes with a wall that moves; give it body or travel"
+    walls = {patch: one for patch, one in moving(basin).items() if patch in mesh.patches[:-1]}
+    for patch, one in walls.items():
+        yield from (((*key, patch, *below), text) for below, text in wall_faults(name, basin, mesh, patch, one, nodes))
+        if f"{name}.{patch}" in joined:
+            yield (*key, patch), "a link joins here, and it is a wall that moves; join a patch that stands still"
+    yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls))
+    if walls and basin.holes:
+        yield ("nodes", name, "holes"), "would be drawn out where lines move; wanted none beside a wall that moves"
+
+
+def wall_faults(name: str, basin: Any, mesh: Any, patch: str, one: Any, nodes: dict) -> Iterator[tuple[tuple, str]]:
+    """Faults of one wall, as keys below it."""
+    if not basin.own.moves:
+        yield (), f"walls do not move in physics {show(basin.physics)}"
+    for other in ("boundary", "impedance", "scalars"):
+        if getattr(one, other):
+            yield (other,), "goes with what waves or water pass, and this is a wall that moves; leave it out"
+    if one.span is not None:
+        yield ("span",), "a wall that moves is all of a side; leave span out"
+    if one.body is not None:
+        yield from ((("body",), text) for text in body_faults(one.body, nodes))
+    normals = mesh.normal[mesh.patch(patch)]
+    if np.ptp(normals, axis=0).max() > 1e-9 or np.abs(normals[0]).max() < 1.0 - 1e-9:
+        yield (), "is not straight across x or y; wanted a wall that is, to move along that axis"
+        return
+    axis, side = outward(mesh, patch)
+    at = mesh.points[:, axis]
+    size, zone = float(np.ptp(at)), one.zone or float(np.ptp(at))
+    if zone > size * (1.0 + 1e-9):
+        yield ("zone",), f"{zone:g} m is more than there is along {'xy'[axis]}, {size:g} m"
+    if one.travel is not None:
+        yield from ((("travel",), text) for text in travel_faults(one.travel, side, zone))
+    if isinstance(getattr(basin, "bed", None), Formula):
+        yield from bed_faults(basin, mesh, patch)
+
+
+def body_faults(name: str, nodes: dict[str, Any]) -> Iterator[str]:
+    """Faults of the body that a wall names."""
+    masses = [one for one, node in nodes.items() if getattr(node, "kind", "") == "mass"]
+    node = nodes.get(name)
+    if node is None:
+        yield f"no mass named {show(name)}; masses are {listing(masses) or 'none'}{did_you_mean(name, masses)}"
+    elif node.kind != "mass":
+        still = "a frame, which stands still" if node.kind == "frame" else f"a {node.kind}"
+        yield f"{name} is {still}; wanted a mass, or travel in its place"
+
+
+def travel_faults(travel: Any, side: float, zone: float) -> Iterator[str]:
+    """Faults of how far a wall is to move: jumps, and all of its zone used up."""
+    if travel.kind == "step":
+        yield "jumps, and a wall has a speed; wanted one without jumps, for example a ramp"
+    mean, amplitude, _, phase = travel.wave or (travel.first, 0.0, 1.0, 0.0)
+    inward = float((-side * (travel.value - mean - amplitude * np.sin(phase))).max())
+    if inward >= zone:
+        yield f"comes {inward:g} m inward, and the zone behind it is {zone:g} m wide; wanted less, or a wider zone"
+
+
+def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
+    """A bed that is not flat where lines move."""
+    axis, _ = outward(mesh, patch)
+    corners = np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)
+    goes = weights(basin, mesh, patch, mesh.points[:, axis]) > 0.0
+    cells = goes[corners].any(axis=1)
+    x, y = mesh.points[np.unique(corners[cells])].T
+    heights = np.append(basin.bed.at(x, y), basin.bed.at(*mesh.centre[cells].T))
+    if np.ptp(heights) > FLAT * max(np.abs(heights).max(), 1.0):
+        zone = f"from {x.min():g} to {x.max():g} m" if axis == 0 else f"from {y.min():g} to {y.max():g} m"
+        text = f"the bed is not flat where lines move, {'xy'[axis]} {zone}; wanted a flat one, or a shorter zone"
+        yield ("zone",), text
+
+
+def faults_between(basin: Any, mesh: Any, walls: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
+    """Faults of several walls, and of other patches that lie on one."""
+    axes = {patch: outward(mesh, patch) for patch in walls}
+    first = next(iter(axes), None)
+    for patch, (axis, _) in axes.items():
+        if axis != axes[first][0]:
+            text = f"moves along {'xy'[axis]} and {first} along {'xy'[1 - axis]}; all walls of a basin move along one"
+            yield (patch,), text
+    for patch in basin.patches:
+        if patch in walls or patch not in mesh.patches[:-1]:
+            continue
+        for wall, (axis, side) in axes.items():
+            end = mesh.points[:, axis].max() if side > 0.0 else mesh.points[:, axis].min()
+            lies = np.abs(mesh.middle[mesh.patch(patch), axis] - end) < 1e-9 * np.ptp(mesh.points[:, axis])
+            if lies.any():
+                yield (patch,), f"lies on {wall}, a wall that moves; wanted on a side that stands still"
