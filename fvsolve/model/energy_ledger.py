@@ -98,8 +98,8 @@ class Accounts:
 
     def mechanics(self) -> None:
         model, tables = self.model, self.model.tables
-        names = [*model.body_names, *[""] * (len(tables.bodies) - len(model.body_names))]
-        for name, row in zip(names, tables.bodies, strict=True):
+        names = [*model.mass_names, *[""] * (len(tables.masses) - len(model.mass_names))]
+        for name, row in zip(names, tables.masses, strict=True):
             at = self.take(1)
             self.hold(name, "mass", at if row["y"] >= 0 else None)
         for name, link, lowering in rows_in(model.case, "brace"):
