@@ -19,7 +19,7 @@ def lower_walls(draft) -> None:
         one, (axis, side) = basin.part.patches[patch], case.outward(basin.mesh, patch)
         row["basin"], row["outward"] = draft.basins.index(basin), side
         row["y"] = draft.states([f"{basin.name}.{patch}.travel"], SCALE)
-        row["body"] = draft.body_index[one.body] if one.body is not None else -1
+        row["mass"] = draft.mass_index[one.body] if one.body is not None else -1
         row["schedule"] = draft.schedules.add(one.travel) if one.travel is not None else -1
         lines = (basin.mesh.grid.x, basin.mesh.grid.y)[axis]
         goes = case.weights(basin.part, basin.mesh, patch, lines)

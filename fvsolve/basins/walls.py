@@ -12,7 +12,7 @@ from math import sqrt
 from fvsolve.basins.energy import row_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanics import motion
+from fvsolve.kernels.masses import motion
 from fvsolve.kernels.records import RATE, WALL_VALUE
 from fvsolve.kernels.schedules import schedule_slopes
 
@@ -80,8 +80,8 @@ def see_cells(tables, basin, y, seen):
 @njit
 def speed_of(t, tables, wall, y):
     """Speed of a wall along its axis [m/s]."""
-    if wall["body"] >= 0:
-        return motion(tables.bodies[wall["body"]], y)[1]
+    if wall["mass"] >= 0:
+        return motion(tables.masses[wall["mass"]], y)[1]
     return schedule_slopes(tables, wall["schedule"], t)[0]
 
 
@@ -134,7 +134,7 @@ def impedance(tables, basin, i, y):
 def push_bodies(t, y, dydt, out, handle):
     """Forces on walls, outward, less those of the profile; bodies feel them, as steps do."""
     tables = open_tables(handle)
-    layout, walls, bodies, st = tables.layout[0], tables.walls, tables.bodies, tables.settings[0]
+    layout, walls, masses, st = tables.layout[0], tables.walls, tables.masses, tables.settings[0]
     for k in range(walls.size):
         wall, total, waves = walls[k], 0.0, 0.0
         basin = tables.basins[wall["basin"]]
@@ -144,14 +144,14 @@ def push_bodies(t, y, dydt, out, handle):
             waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], y)
         total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
         out[layout["wall"] + k] = total
-        if wall["body"] < 0:
+        if wall["mass"] < 0:
             continue
-        body = bodies[wall["body"]]
+        mass = masses[wall["mass"]]
         force = wall["outward"] * total
-        out[layout["net_force"] + wall["body"]] += force
-        out[RATE] = max(out[RATE], waves * body["lightness"])
-        if dydt.size > 0 and body["y"] >= 0:
-            dydt[body["y"] + 1] += force * body["lightness"]
+        out[layout["net_force"] + wall["mass"]] += force
+        out[RATE] = max(out[RATE], waves * mass["lightness"])
+        if dydt.size > 0 and mass["y"] >= 0:
+            dydt[mass["y"] + 1] += force * mass["lightness"]
 
 
 @njit

@@ -14,7 +14,7 @@ FLUID = {
     "vapor_pressure": "pressure",
 }  # fmt: skip
 NODE = {"elevation": ("elevation", "length"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
-BODY = {
+MASS = {
     "position": ("position", "position"), "velocity": ("velocity", "velocity"), "force": ("net force", "force")
 }  # fmt: skip
 PIPE = {
@@ -80,7 +80,7 @@ def checks(case, found: dict, every: bool = False) -> None:
     _line(console, case.title or case.name, "bold")
     _line(console, _fluid(case, found["fluid"]))
     odd = {one["place"] for one in found["warnings"]}
-    for group, word, keys in (("nodes", "node", NODE), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)):
+    for group, word, keys in (("nodes", "node", NODE), ("masses", "mass", MASS), ("pipes", "pipe", PIPE)):
         place = "links" if group == "pipes" else "nodes"
         _states(
             console, case, word, found[group], keys, every, {name for name in found[group] if f"{place}.{name}" in odd}

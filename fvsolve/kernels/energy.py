@@ -7,9 +7,9 @@ from the values at three Gauss points of a polynomial of the scheme's degree thr
 are changes since the profile, a cross term and a square: no small difference of large numbers.
 
 Rows of `power` [W], table by table: NODE supply, rate of storage; PIPE in, friction, jets, rate;
-VALVE loss; COLUMN in, friction, rate; BODY rate; BRACE what it takes up (a spring, a damper) or gives (a force); STOP
+VALVE loss; COLUMN in, friction, rate; MASS rate; BRACE what it takes up (a spring, a damper) or gives (a force); STOP
 rate, loss; PISTON leak, friction, what the linear law makes where a volume moves. Rows of `stored` [J]: node; pipe
-kinetic, elastic and height; column; body; brace; stop.
+kinetic, elastic and height; column; mass; brace; stop.
 """
 
 import numpy as np
@@ -17,13 +17,13 @@ import numpy as np
 from fvsolve.jit import njit
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanics import between, contact, motion
+from fvsolve.kernels.masses import between, contact, motion
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import CHAMBER, MUSCL, SHORT, TANK, UPWIND, WENO5
 from fvsolve.kernels.rigid import column_drag
 from fvsolve.kernels.tanks import tank_level
 
-NODE, PIPE, VALVE, COLUMN, BODY, BRACE, STOP, PISTON = 2, 4, 1, 3, 1, 1, 2, 3  # rows of `power` a part
+NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 4, 1, 3, 1, 1, 2, 3  # rows of `power` a part
 WIDEST = 5
 PLACES = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)  # Gauss points of a cell, in cell widths from its centre
 SHARES = np.array([5.0, 8.0, 5.0]) / 18.0
@@ -157,23 +157,23 @@ def power_linear(t, y, dydt, out, handle, power):
         power[at], power[at + 1] = per * drop * flow, size * flow * column_drag(column, flow)
         power[at + 2] = size * own * dydt[column["y"]]
         at += COLUMN
-    at = power_bodies(t, y, dydt, out, tables, power, at)
+    at = power_masses(t, y, dydt, out, tables, power, at)
     power_pistons(y, dydt, out, tables, power, at)
 
 
 @njit
-def power_bodies(t, y, dydt, out, tables, power, at):
-    """Rows of bodies, braces and stops from row `at` on; returns the row behind them."""
-    layout, bodies, braces, stops = tables.layout[0], tables.bodies, tables.braces, tables.stops
+def power_masses(t, y, dydt, out, tables, power, at):
+    """Rows of masses, braces and stops from row `at` on; returns the row behind them."""
+    layout, masses, braces, stops = tables.layout[0], tables.masses, tables.braces, tables.stops
     armed = tables.armed
-    for i in range(bodies.size):
+    for i in range(masses.size):
         power[at] = 0.0
-        if bodies[i]["y"] >= 0:
-            power[at] = motion(bodies[i], y)[1] * dydt[bodies[i]["y"] + 1] / bodies[i]["lightness"]
-        at += BODY
+        if masses[i]["y"] >= 0:
+            power[at] = motion(masses[i], y)[1] * dydt[masses[i]["y"] + 1] / masses[i]["lightness"]
+        at += MASS
     for k in range(braces.size):
         brace = braces[k]
-        speed = between(tables, y, brace["from_body"], brace["to_body"])[1]
+        speed = between(tables, y, brace["from_mass"], brace["to_mass"])[1]
         power[at] = out[layout["push"] + k] * speed
         if brace["schedule"] < 0:
             power[at] = -power[at]
@@ -181,7 +181,7 @@ def power_bodies(t, y, dydt, out, tables, power, at):
     first = armed.size - 2 * stops.size
     for k in range(stops.size):
         stop = stops[k]
-        x, speed = between(tables, y, stop["from_body"], stop["to_body"])
+        x, speed = between(tables, y, stop["from_mass"], stop["to_mass"])
         into, rate = 0.0, 0.0
         for side in range(2):
             if armed[first + 2 * k + side] > 0.0:
@@ -261,7 +261,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
         change = y[column["y"]]
         stored[at] = per * column["length"] / column["area"] * change * (column["flow"] + 0.5 * change)
         at += 1
-    stored_bodies(y, tables, stored, at)
+    stored_masses(y, tables, stored, at)
 
 
 @njit
@@ -295,24 +295,24 @@ def level_moment(floats, shape, rows, level):
 
 
 @njit
-def stored_bodies(y, tables, stored, at):
-    """Rows of bodies, braces and stops from row `at` on."""
-    bodies, braces, stops = tables.bodies, tables.braces, tables.stops
-    for i in range(bodies.size):
+def stored_masses(y, tables, stored, at):
+    """Rows of masses, braces and stops from row `at` on."""
+    masses, braces, stops = tables.masses, tables.braces, tables.stops
+    for i in range(masses.size):
         stored[at] = 0.0
-        if bodies[i]["y"] >= 0:
-            change = y[bodies[i]["y"] + 1]
-            stored[at] = change * (bodies[i]["velocity"] + 0.5 * change) / bodies[i]["lightness"]
+        if masses[i]["y"] >= 0:
+            change = y[masses[i]["y"] + 1]
+            stored[at] = change * (masses[i]["velocity"] + 0.5 * change) / masses[i]["lightness"]
         at += 1
     for k in range(braces.size):
-        x = between(tables, y, braces[k]["from_body"], braces[k]["to_body"])[0]
+        x = between(tables, y, braces[k]["from_mass"], braces[k]["to_mass"])[0]
         stored[at] = x * (0.5 * braces[k]["stiffness"] * x - braces[k]["force"])
         if braces[k]["stiffness"] == 0.0:
             stored[at] = 0.0
         at += 1
     for k in range(stops.size):
         stop = stops[k]
-        x = between(tables, y, stop["from_body"], stop["to_body"])[0]
+        x = between(tables, y, stop["from_mass"], stop["to_mass"])[0]
         now, then = (
             max(0.0, max(-(stop["below"] + x), x - stop["above"])),
             max(0.0, max(-stop["below"], -stop["above"])),

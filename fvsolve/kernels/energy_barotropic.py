@@ -8,9 +8,9 @@ V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_mass, thrust
 from fvsolve.kernels.energy import (
-    BODY,
     BRACE,
     COLUMN,
+    MASS,
     NODE,
     PIPE,
     PISTON,
@@ -21,14 +21,14 @@ from fvsolve.kernels.energy import (
     at_point,
     gauge,
     moving_side,
-    power_bodies,
-    stored_bodies,
+    power_masses,
+    stored_masses,
     tank_energy,
     width_of,
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanics import between, leak_flow
+from fvsolve.kernels.masses import between, leak_flow
 from fvsolve.kernels.records import CHAMBER, JUNCTION, LAW_LINEAR, TANK
 from fvsolve.kernels.rigid import column_drag
 
@@ -163,8 +163,8 @@ def power_barotropic(t, y, dydt, out, handle, power):
         power[at], power[at + 1] = drop * flow, size * flow * column_drag(column, flow)
         power[at + 2] = size * own * dydt[column["y"]]
         at += COLUMN
-    power_bodies(t, y, dydt, out, tables, power, at)
-    at += BODY * tables.bodies.size + BRACE * tables.braces.size + STOP * tables.stops.size
+    power_masses(t, y, dydt, out, tables, power, at)
+    at += MASS * tables.masses.size + BRACE * tables.braces.size + STOP * tables.stops.size
     power_pistons_barotropic(y, dydt, out, tables, power, at)
 
 
@@ -233,7 +233,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
         size = column["length"] / (column["area"] * st["rho"])
         stored[at] = size * change * (column["flow"] + 0.5 * change)
         at += 1
-    stored_bodies(y, tables, stored, at)
+    stored_masses(y, tables, stored, at)
 
 
 @njit

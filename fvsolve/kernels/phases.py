@@ -89,9 +89,9 @@ MEMBERS = {
         hold="barotropic_columns: hold_columns_barotropic", move="barotropic_columns: column_rates_barotropic",
         **COLUMNS,
     ),
-    "bodies": Pieces(
-        prepare="mechanics: chambers", move="mechanics: finish_bodies", observe="mechanics: observe_bodies",
-        record="mechanics: record_bodies", events="mechanics: body_events",
+    "masses": Pieces(
+        prepare="masses: chambers", move="masses: finish_masses", observe="masses: observe_masses",
+        record="masses: record_masses", events="masses: mass_events",
     ),
     "devices": Pieces(
         prepare="devices: set_devices", move="devices: move_devices",
@@ -122,7 +122,7 @@ class Cast:
     pipes: bool
     clusters: bool = False
     columns: bool = False
-    bodies: bool = False
+    masses: bool = False
     memory: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
@@ -151,8 +151,8 @@ class Cast:
             yield MEMBERS["clusters"]
         if self.columns:
             yield MEMBERS["columns" if linear else "columns, barotropic"]
-        if self.bodies:
-            yield MEMBERS["bodies"]
+        if self.masses:
+            yield MEMBERS["masses"]
         if self.devices:
             yield MEMBERS["devices"]
         if self.memory:

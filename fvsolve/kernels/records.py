@@ -191,7 +191,7 @@ COLUMN = np.dtype(
     align=True,
 )
 
-BODY = np.dtype(
+MASS = np.dtype(
     [
         ("y", "i8"),  # offset of its position, velocity follows; both as deviations; -1 for a frame
         ("lightness", "f8"),  # 1 / mass, 0 for a frame [1/kg]
@@ -204,8 +204,8 @@ BODY = np.dtype(
 
 BRACE = np.dtype(  # springs, dampers and forces: push = force + (schedule - given) - stiffness dx - damping (v - speed)
     [
-        ("from_body", "i8"),
-        ("to_body", "i8"),
+        ("from_mass", "i8"),
+        ("to_mass", "i8"),
         ("schedule", "i8"),  # -1 for none
         ("given", "f8"),  # value of the schedule at the start [N]
         ("stiffness", "f8"),
@@ -218,8 +218,8 @@ BRACE = np.dtype(  # springs, dampers and forces: push = force + (schedule - giv
 
 STOP = np.dtype(
     [
-        ("from_body", "i8"),
-        ("to_body", "i8"),
+        ("from_mass", "i8"),
+        ("to_mass", "i8"),
         ("stiffness", "f8"),
         ("damping", "f8"),
         ("below", "f8"),  # room at the start before it pushes forward, infinite for none [m]
@@ -231,7 +231,7 @@ STOP = np.dtype(
 
 PISTON = np.dtype(
     [
-        ("case", "i8"),  # bodies
+        ("case", "i8"),  # masses
         ("rod", "i8"),
         ("a", "i8"),  # nodes
         ("b", "i8"),
@@ -287,7 +287,7 @@ LAYOUT = np.dtype(
         ("stiffness", "i8"),  # of moving chambers, pressure per mass [Pa/kg]
         ("had", "i8"),  # of patches, share of the outflow asked for that there is water for
         ("swept", "i8"),  # mass flow that the piston and its leak take from moving chambers [kg/s]
-        ("net_force", "i8"),  # on bodies [N]
+        ("net_force", "i8"),  # on masses [N]
         ("push", "i8"),  # of braces, then of stops, then of pistons [N]
         ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
         ("drive", "i8"),  # relative speeds of pumps now, one a valve
@@ -308,7 +308,7 @@ OUT_HEAD = 4
 PROBE = np.dtype(
     [
         ("kind", "i8"),
-        ("index", "i8"),  # of the node, pipe, valve, column, body, push, piston or basin
+        ("index", "i8"),  # of the node, pipe, valve, column, mass, push, piston or basin
         ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside; CELL_FIELD: which, as its physics numbers them
         ("cell", "i8"),  # first of the cells that are read; of a basin, offset of their numbers in `integers`
         ("count", "i8"),  # how many
@@ -403,7 +403,7 @@ WALL = np.dtype(
     [
         ("basin", "i8"),
         ("y", "i8"),  # offset of its travel since the start [m]
-        ("body", "i8"),  # that it goes with, or
+        ("mass", "i8"),  # that it goes with, or
         ("schedule", "i8"),  # of its travel; -1 for none
         ("weights", "i8"),  # in `plane`: how far lines go with it, then by how much cells stretch per travel [1/m]
         ("faces", "i8"),  # in `integers`: its faces' numbers, as the boundary has them
@@ -449,7 +449,7 @@ RECORDS = {
     "clusters": CLUSTER_RECORD,
     "schedules": SCHEDULE,
     "probes": PROBE,
-    "bodies": BODY,
+    "masses": MASS,
     "braces": BRACE,
     "stops": STOP,
     "pistons": PISTON,

@@ -33,7 +33,7 @@ class BarotropicStart(Start):
         for _ in range(80):
             super().solve()
             now = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
-            scale = 1 + np.max(np.abs(now), initial=0.0)  # bodies alone have no unknowns here
+            scale = 1 + np.max(np.abs(now), initial=0.0)  # masses alone have no unknowns here
             moves = np.full(now.size, np.inf) if before is None else np.abs(now - before) / scale
             if np.max(moves, initial=0.0) <= 1e-14:
                 return

@@ -36,9 +36,9 @@ def checks(model) -> dict[str, Any]:
                "head": float(model.head(row["pressure"], row["elevation"]))}
         for name, row in zip(model.node_names, model.tables.nodes, strict=True)
     }  # fmt: skip
-    bodies = {
+    masses = {
         name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
-        for name, row in zip(model.body_names, model.tables.bodies, strict=False)
+        for name, row in zip(model.mass_names, model.tables.masses, strict=False)
     }
     pipes, remembered = {}, model.steady["unsteady"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
@@ -63,7 +63,7 @@ def checks(model) -> dict[str, Any]:
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     return {
-        "fluid": model.case.properties.plain(), "nodes": nodes, "bodies": bodies, "pipes": pipes,
+        "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "pipes": pipes,
         "basins": {one.name: basin_facts(one) for one in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
@@ -188,8 +188,8 @@ def velocities(model) -> np.ndarray:
 
 
 def quick_parts(model) -> str:
-    """What may have a rate of its own beside the pipes: what stores, rigid columns, bodies."""
+    """What may have a rate of its own beside the pipes: what stores, rigid columns, masses."""
     stores = [name for name, row in zip(model.node_names, model.tables.nodes, strict=True)
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
-    found = [*(basin.name for basin in model.basins), *stores, *model.column_names, *model.body_names]
+    found = [*(basin.name for basin in model.basins), *stores, *model.column_names, *model.mass_names]
     return found[0] if len(found) == 1 else f"one of {listing(found)}"

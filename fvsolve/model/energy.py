@@ -78,7 +78,7 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     """The energy of a deviation from the state y, that of the start if None.
 
     A wave of r [kg/s] stores r^2 dx / (rho A), a flow that unsteady friction remembers (`kernels.unsteady`)
-    g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a body m v^2 / 2,
+    g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a mass m v^2 / 2,
     a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
     its excess at y. Exact under `linear` about a profile at rest. Devices store what their `squares` say, cells of
     basins what `basins.lower_energy` says. A scalar stores nothing; a deviation of its amount, over the greatest value
@@ -115,7 +115,7 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
     for at in blocks:
         if at.size > TOGETHER:
             raise FvsolveError(
-                f"{at.size} bodies hang together: their energy norm is found up to {TOGETHER}; take fewer"
+                f"{at.size} masses hang together: their energy norm is found up to {TOGETHER}; take fewer"
             )
         part = rows[:, at].toarray() * scale[at]
         part = np.vstack([part[np.any(part, axis=1)], np.zeros((1, at.size))])
@@ -167,7 +167,7 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
             found[row["y"]] = stiffness(model, row) / (2.0 * rho)
     for row in tables.columns:
         found[row["y"]] = row["length"] / (2.0 * rho * row["area"])
-    for row in tables.bodies:
+    for row in tables.masses:
         if row["y"] >= 0:
             found[int(row["y"]) + 1] = 0.5 / row["lightness"]
     weigh_scalars(model, found)
@@ -197,11 +197,11 @@ def stretched(model, y: np.ndarray):
     """(name, row of L) of springs and of stops in touch."""
     for (name, *_), row in zip(rows_in(model.case, "brace"), model.tables.braces, strict=True):
         if row["stiffness"] > 0.0:
-            yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
+            yield name, travel(model, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
     for (name, *_), row in zip(rows_in(model.case, "stop"), model.tables.stops, strict=True):
-        x = distance(model, y, row["from_body"], row["to_body"])
+        x = distance(model, y, row["from_mass"], row["to_mass"])
         if row["below"] + x < 0.0 or x > row["above"]:
-            yield name, travel(model, row["from_body"], row["to_body"], float(np.sqrt(0.5 * row["stiffness"])))
+            yield name, travel(model, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
 
 
 def of_devices(model, y: np.ndarray):
@@ -219,26 +219,26 @@ def swept(model, y: np.ndarray):
     nodes, pistons = model.tables.nodes, model.tables.pistons
     per_mass = model.evaluate(model.case.numerics.start, y)[1][model.layout["stiffness"] :] if len(pistons) else []
     for row in pistons:
-        bodies = row["case"], row["rod"]
-        x = distance(model, y, *bodies)
+        masses = row["case"], row["rod"]
+        x = distance(model, y, *masses)
         for name, sign in (("a", 1.0), ("b", -1.0)):
             node, area = nodes[row[name]], sign * float(row[f"area_{name}"])
             at, volume = int(node["y"]), float(node["volume"] + area * x)
             added = float(y[at]) / volume  # density, over that of the start
             density = float(row[f"sweep_{name}"]) / area + added
             root = float(np.sqrt(per_mass[node["row"]] / (2.0 * density)))
-            yield at, {at: root} | (travel(model, *bodies, -root * added * area) if added else {})
+            yield at, {at: root} | (travel(model, *masses, -root * added * area) if added else {})
 
 
 def travel(model, i: int, j: int, factor: float) -> dict[int, float]:
-    """Row of `factor` times (x_j - x_i), of those of the two bodies that can move."""
-    places = model.tables.bodies["y"]
+    """Row of `factor` times (x_j - x_i), of those of the two masses that can move."""
+    places = model.tables.masses["y"]
     return {int(places[k]): sign * factor for k, sign in ((i, -1.0), (j, 1.0)) if places[k] >= 0 and i != j}
 
 
 def distance(model, y: np.ndarray, i: int, j: int) -> float:
-    """By how much body j has moved away from body i since the start [m]."""
-    places = model.tables.bodies["y"]
+    """By how much mass j has moved away from mass i since the start [m]."""
+    places = model.tables.masses["y"]
     back, forth = (float(y[places[k]]) if places[k] >= 0 else 0.0 for k in (i, j))
     return forth - back
 

@@ -99,8 +99,8 @@ class Accounts:
 
     def mechanics(self) -> None:
         model, tables = self.model, self.model.tables
-        names = [*model.body_names, *[""] * (len(tables.bodies) - len(model.body_names))]
-        for name, row in zip(names, tables.bodies, strict=True):
+        names = [*model.mass_names, *[""] * (len(tables.masses) - len(model.mass_names))]
+        for name, row in zip(names, tables.masses, strict=True):
             at = self.take(1)
             self.hold(name, "mass", at if row["y"] >= 0 else None)
         for name, link, lowering in rows_in(model.case, "brace"):
@@ -137,7 +137,7 @@ class Accounts:
         names = [f"{basin.name}.{patch}" for basin in self.model.basins for patch in basin.walls]
         for name, row in zip(names, self.model.tables.walls, strict=True):
             at = self.take(1)
-            if row["body"] < 0:
+            if row["mass"] < 0:
                 self.add("supplied", name, "wall", at)
 
     def basins(self) -> None:

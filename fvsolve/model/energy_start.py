@@ -37,7 +37,7 @@ def available(model: Model) -> dict[str, float]:
         found[pipe.name] = pipe_above(model, k) + memory_above(model, k)
     for name, row in zip(model.column_names, tables.columns, strict=True):
         found[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
-    for name, row in zip(model.body_names, tables.bodies, strict=False):
+    for name, row in zip(model.mass_names, tables.masses, strict=False):
         if row["y"] >= 0:
             found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:

@@ -117,7 +117,7 @@ class Model(Shown):
     valve_names: list[str]
     column_names: list[str]
     piston_names: list[str]
-    body_names: list[str]
+    mass_names: list[str]
     elevation: dict[str, float]
     probes: list[Any]
     warnings: list[Notice]
@@ -190,7 +190,7 @@ class Model(Shown):
         from fvsolve.kernels.phases import Cast
 
         many = rec.Tables(*(len(table) > 0 for table in self.tables))
-        there = [many.clusters, many.columns, many.bodies]
+        there = [many.clusters, many.columns, many.masses]
         basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
         alone = bool(self.basins and patches) and not (self.cells or valves or many.devices or any(there))
@@ -352,7 +352,7 @@ class Model(Shown):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
         for row in self.tables.pistons:  # what moving chambers hold is their excess and what was swept
-            places = self.tables.bodies[[row["case"], row["rod"]]]["y"]
+            places = self.tables.masses[[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
             change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
         return initial, change

@@ -3,7 +3,7 @@
 A pipe's cells depend on their neighbours as far as the scheme reaches. Where a pipe meets a node, what it offers
 (its edge cells) is read by the node, and what the node makes of all offers together is read by the cells that look
 beyond the end. Tanks, chambers and given pressures part one group of nodes from the next: their pressure is their own,
-but for chambers of cylinders, whose pressure is that of their bodies too. Cells of a basin depend on those about them
+but for chambers of cylinders, whose pressure is that of their masses too. Cells of a basin depend on those about them
 (`basins.lower_pattern`), and a patch is a node whose pressure the cells behind it set.
 """
 
@@ -42,7 +42,7 @@ class Couplings:
         self.upwind = settings["scheme"] == rec.UPWIND
         self.reach = reach_of(model.case.numerics.scheme, settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
-        self.bodies, self.pistons = tables.bodies["y"], tables.pistons
+        self.masses, self.pistons = tables.masses["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
         self.devices = tables.devices
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
@@ -114,9 +114,9 @@ class Couplings:
         return self.held_by(self.devices[link["device"]])
 
     def places(self, row, what: int) -> np.ndarray:
-        """Positions (`what` 0) or velocities (1) of the two bodies that a row joins, where they are states."""
-        ends = ("case", "rod") if "rod" in row.dtype.names else ("from_body", "to_body")
-        return np.array([self.bodies[row[end]] + what for end in ends if self.bodies[row[end]] >= 0], dtype=np.int64)
+        """Positions (`what` 0) or velocities (1) of the two masses that a row joins, where they are states."""
+        ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
+        return np.array([self.masses[row[end]] + what for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
 
     def pressures(self) -> list[np.ndarray]:
         """Of each node, the states that set its pressure: its own, or all that enter its group."""
@@ -161,8 +161,8 @@ class Couplings:
             yield every(states(column["y"]), states(*(self.sets[i] for i in ends_of(column))))
 
     def moving(self) -> Iterator[Pairs]:
-        """A body's position on its velocity, and that on what pushes it: bodies beside it, and chambers."""
-        at = self.bodies[self.bodies >= 0]
+        """A mass's position on its velocity, and that on what pushes it: masses beside it, and chambers."""
+        at = self.masses[self.masses >= 0]
         yield at, at + 1
         for row in [*self.braces, *self.pistons]:
             felt = [self.places(row, 0), self.places(row, 1)]
@@ -180,8 +180,8 @@ class Couplings:
     def walled(self) -> Iterator[Pairs]:
         """Cells on where walls of their basin stand and how fast these move, and bodies on the cells before them."""
         for wall in self.walls:
-            basin, body = self.basins[wall["basin"]], self.bodies[wall["body"]] if wall["body"] >= 0 else -1
-            speed = states(body + 1) if body >= 0 else states()
+            basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
+            speed = states(mass + 1) if mass >= 0 else states()
             yield every(pattern.all_of(basin), states(wall["y"], speed))
             yield every(states(wall["y"]), speed)
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]

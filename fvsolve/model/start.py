@@ -16,8 +16,8 @@ from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.handle import make_handle
 from fvsolve.kernels.schedules import value_until
 from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
-from fvsolve.model.bodies import start_bodies
 from fvsolve.model.lowering import lowering_of
+from fvsolve.model.masses import start_masses
 from fvsolve.model.slate import wiped
 from fvsolve.steady import Edge, solve_steady
 
@@ -234,7 +234,7 @@ class Start:
         return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        """Mass flow from A to B past a piston, as kernels.mechanics.leak_flow has it [kg/s]."""
+        """Mass flow from A to B past a piston, as kernels.masses.leak_flow has it [kg/s]."""
         return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
@@ -394,7 +394,7 @@ class Start:
         return float(self.valves[k]["conductance"]) * denser, drop
 
     def report(self) -> dict[str, Any]:
-        moving = start_bodies(self.draft, self) + self.moving
+        moving = start_masses(self.draft, self) + self.moving
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])

@@ -46,7 +46,7 @@ class Loop:
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
         sums = [
             *model.tables.nodes["y"],
-            *model.tables.bodies["y"],
+            *model.tables.masses["y"],
             *amounts(model),
         ]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)

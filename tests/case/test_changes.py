@@ -73,7 +73,7 @@ def form(model) -> tuple:
               for name, table in zip(model.tables._fields, model.tables, strict=True)}  # fmt: skip
     tables["integers"] = model.tables.integers.tobytes()
     names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
-             model.piston_names, model.body_names, model.events, [probe.text for probe in model.probes])  # fmt: skip
+             model.piston_names, model.mass_names, model.events, [probe.text for probe in model.probes])  # fmt: skip
     return tables, names, model.shapes
 
 

@@ -17,14 +17,14 @@ from fvsolve.solve.loop import Loop
 from fvsolve.steppers import slots
 
 PIPES = {"pipes", "ends", "reconstruction", "limiters", "leap"}
-BODIES = {"mechanics"}
+MASSES = {"masses"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"memory"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
 SCALARS = {"scalars", "mixing"}
-ALL = SCALARS | PIPES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
+ALL = SCALARS | PIPES | MASSES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
 def compiled_with(*functions) -> set[str]:
@@ -98,7 +98,7 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
     assert found & ALL == CAVITIES | {"reconstruction", "limiters"}
     cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
-    assert files(cylinder) & (PIPES | BODIES) == BODIES
+    assert files(cylinder) & (PIPES | MASSES) == MASSES
 
 
 @pytest.mark.slow

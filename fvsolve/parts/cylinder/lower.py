@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.bodies import Push, join
+from fvsolve.model.masses import Push, join
 
 
 class CylinderRows(Push, kind="cylinder"):

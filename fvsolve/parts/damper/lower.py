@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import Push, join
+from fvsolve.model.masses import Push, join
 
 
 class DamperRows(Push, kind="damper"):
@@ -13,5 +13,5 @@ class DamperRows(Push, kind="damper"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        _, row["speed"] = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["damping"], row["force"] = -1, link.damping, -link.damping * row["speed"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import Push, join
+from fvsolve.model.masses import Push, join
 
 FAR = 1e300  # room before a stop that is not there
 
@@ -13,10 +13,10 @@ class EndStopRows(Push, kind="end-stop"):
     table = "stop"
 
     def fill(self, draft, name, link, rows) -> None:
-        from fvsolve.kernels.mechanics import contact  # models without bodies load none of it
+        from fvsolve.kernels.masses import contact  # models without bodies load none of it
 
         (row,) = rows
-        x, speed = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        x, speed = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["below"] = FAR if link.least is None else x - link.least
         row["above"] = FAR if link.greatest is None else link.greatest - x

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import Push, join
 from fvsolve.model.inputs import FORCE, Input
 from fvsolve.model.lowering import rows_in
+from fvsolve.model.masses import Push, join
 
 
 class ForceRows(Push, kind="force"):
@@ -15,7 +15,7 @@ class ForceRows(Push, kind="force"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        _, row["speed"] = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"] = draft.schedules.add(link.force)
 
     def inputs(self, model, name, part):

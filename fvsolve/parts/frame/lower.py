@@ -1,7 +1,7 @@
 """Frames in the tables of a model."""
 
-from fvsolve.model.bodies import Body
+from fvsolve.model.masses import OnAxis
 
 
-class FrameRows(Body, kind="frame"):
+class FrameRows(OnAxis, kind="frame"):
     """A body that stands still."""

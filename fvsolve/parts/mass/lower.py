@@ -1,7 +1,7 @@
 """Masses in the tables of a model."""
 
-from fvsolve.model.bodies import Body
+from fvsolve.model.masses import OnAxis
 
 
-class MassRows(Body, kind="mass"):
+class MassRows(OnAxis, kind="mass"):
     """A body that forces move."""

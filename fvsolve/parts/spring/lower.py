@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.bodies import Push, join
+from fvsolve.model.masses import Push, join
 
 
 class SpringRows(Push, kind="spring"):
@@ -13,6 +13,6 @@ class SpringRows(Push, kind="spring"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        x, row["speed"] = join(draft, row, ("from_body", "to_body"), (link.from_, link.to))
+        x, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["stiffness"] = -1, link.stiffness
         row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels.mechanics import motion
+from fvsolve.kernels.masses import motion
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.solve.loop import Loop
 from fvsolve.solve.solve import Run
@@ -124,7 +124,7 @@ class Booked(Loop):
 
 def pressed(tables, stop, y: np.ndarray) -> tuple[float, bool]:
     """(how deep a stop is pressed [m], whether what presses it leaves quicker than it can follow)."""
-    (x_i, v_i), (x_j, v_j) = (motion(tables.bodies[stop[port]], y) for port in ("from_body", "to_body"))
+    (x_i, v_i), (x_j, v_j) = (motion(tables.masses[stop[port]], y) for port in ("from_mass", "to_mass"))
     above, below = (x_j - x_i) - stop["above"], -stop["below"] - (x_j - x_i)
     deep, faster = (above, v_j - v_i) if above > below else (below, v_i - v_j)
     leaves = faster < 0.0 and stop["stiffness"] * deep + stop["damping"] * faster <= 0.0

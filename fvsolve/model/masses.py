@@ -1,4 +1,4 @@
-"""Bodies and what pushes them, lowered to tables, and the forces they start from. Knows names; knows no rhs."""
+"""Masses and what pushes them, lowered to tables, and the forces they start from. Knows names; knows no rhs."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering, rows_in
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
-SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of bodies that no chamber holds, of bodies that nothing holds
-SNAP = 1e-12  # share of the forces on a body below which their sum is rounding
+SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses that no chamber holds, of masses that nothing holds
+SNAP = 1e-12  # share of the forces on a mass below which their sum is rounding
 
 
 class Push(Lowering):
-    """Links between bodies, whose force is their quantity."""
+    """Links between masses, whose force is their quantity."""
 
     def probe(self, draft, name, probe, row) -> None:
         row["kind"], row["index"] = rec.FORCE, draft.push_names.index(name)
 
 
-class Body(Lowering):
+class OnAxis(Lowering):
     """What moves along an axis, or stands still there."""
 
     def probe(self, draft, name, probe, row) -> None:
         row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
-        row["index"] = draft.body_index[name]
+        row["index"] = draft.mass_index[name]
 
 
-def lower_bodies(draft) -> None:
-    """Fill the tables of bodies, braces, stops and pistons of a model."""
+def lower_masses(draft) -> None:
+    """Fill the tables of masses, braces, stops and pistons of a model."""
     case = draft.case
-    draft.body_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
+    draft.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
     outside = any(link.from_ is None for _, link, _ in rows_in(case, "brace"))
-    draft.body_table = np.zeros(len(draft.body_names) + outside, rec.BODY)
-    draft.body_index = {name: i for i, name in enumerate(draft.body_names)}
-    draft.body_index |= {None: len(draft.body_names)}
-    for name, row in zip(draft.body_names, draft.body_table, strict=False):
+    draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
+    draft.mass_index = {name: i for i, name in enumerate(draft.mass_names)}
+    draft.mass_index |= {None: len(draft.mass_names)}
+    for name, row in zip(draft.mass_names, draft.mass_table, strict=False):
         node = case.nodes[name]
         row["position"] = node.initial_position
         if (mass := getattr(node, "mass", None)) is not None:  # a frame stands still
@@ -50,37 +50,37 @@ def lower_bodies(draft) -> None:
 
 
 def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str]) -> tuple[float, float]:
-    """Write the bodies at two ports; how far the second lies ahead at the start [m], and its speed ahead [m/s]."""
+    """Write the masses at two ports; how far the second lies ahead at the start [m], and its speed ahead [m/s]."""
     for port, place in zip(ports, places, strict=True):
-        row[port] = draft.body_index[place]
-    first, second = (draft.body_table[int(row[port])] for port in ports)
+        row[port] = draft.mass_index[place]
+    first, second = (draft.mass_table[int(row[port])] for port in ports)
     return second["position"] - first["position"], second["velocity"] - first["velocity"]
 
 
 def add_states(draft) -> None:
     """Position and velocity of every mass; small is the travel that makes a bar, and its speed as it swings."""
-    nodes, bodies = draft.node_table, draft.body_table
-    travel, stiffness = np.full(len(bodies), SMALL_TRAVEL), np.zeros(len(bodies))
+    nodes, masses = draft.node_table, draft.mass_table
+    travel, stiffness = np.full(len(masses), SMALL_TRAVEL), np.zeros(len(masses))
     for row in draft.brace_table:
-        stiffness[[row["from_body"], row["to_body"]]] += row["stiffness"]
+        stiffness[[row["from_mass"], row["to_mass"]]] += row["stiffness"]
     for row in draft.piston_table:
         for node, area in ((nodes[row["a"]], row["area_a"]), (nodes[row["b"]], row["area_b"])):
             per_travel = draft.fluid.bulk_modulus * area / node["volume"]
-            for body in (row["case"], row["rod"]):
-                travel[body] = min(travel[body], BAR / per_travel)
-                stiffness[body] += area * per_travel
-    bodies["y"] = -1
-    for i, name in enumerate(draft.body_names):
-        if bodies[i]["lightness"] > 0.0:
-            speed = travel[i] * math.sqrt(stiffness[i] * bodies[i]["lightness"]) if stiffness[i] > 0.0 else SMALL_SPEED
-            bodies[i]["y"] = draft.states([f"{name}.position"], travel[i])
-            draft.states([f"{name}.velocity"], max(speed, abs(bodies[i]["velocity"])))
+            for mass in (row["case"], row["rod"]):
+                travel[mass] = min(travel[mass], BAR / per_travel)
+                stiffness[mass] += area * per_travel
+    masses["y"] = -1
+    for i, name in enumerate(draft.mass_names):
+        if masses[i]["lightness"] > 0.0:
+            speed = travel[i] * math.sqrt(stiffness[i] * masses[i]["lightness"]) if stiffness[i] > 0.0 else SMALL_SPEED
+            masses[i]["y"] = draft.states([f"{name}.position"], travel[i])
+            draft.states([f"{name}.velocity"], max(speed, abs(masses[i]["velocity"])))
 
 
-def start_bodies(draft, start) -> list[str]:
-    """The forces of the start and what is left of them on each body; returns what moves, in words."""
-    nodes, bodies, ambient = draft.node_table, draft.body_table, draft.case.ambient_pressure
-    size = np.zeros(len(bodies))
+def start_masses(draft, start) -> list[str]:
+    """The forces of the start and what is left of them on each mass; returns what moves, in words."""
+    nodes, masses, ambient = draft.node_table, draft.mass_table, draft.case.ambient_pressure
+    size = np.zeros(len(masses))
     for row in draft.brace_table:
         if row["schedule"] >= 0:
             row["given"] = row["force"] = start.given(row["schedule"])
@@ -92,20 +92,20 @@ def start_bodies(draft, start) -> list[str]:
         pushed, back = row["area_a"] * (a["pressure"] - ambient), row["area_b"] * (b["pressure"] - ambient)
         row["force"] = pushed - back - row["damping"] * row["speed"]
         size[[row["case"], row["rod"]]] += abs(pushed) + abs(back)
-    total = np.zeros(len(bodies))
-    for table, ports in ((draft.brace_table, ("from_body", "to_body")), (draft.stop_table, ("from_body", "to_body")),
+    total = np.zeros(len(masses))
+    for table, ports in ((draft.brace_table, ("from_mass", "to_mass")), (draft.stop_table, ("from_mass", "to_mass")),
                          (draft.piston_table, ("case", "rod"))):  # fmt: skip
         for row in table:
             for port, sign in zip(ports, (-1.0, 1.0), strict=True):
                 total[row[port]] += sign * row["force"]
                 size[row[port]] += abs(row["force"])
     for row in draft.wall_table:
-        if row["body"] >= 0:
-            total[row["body"]] += row["outward"] * row["rest"]
-            size[row["body"]] += abs(row["rest"])
-    bodies["force"] = np.where(np.abs(total) > SNAP * size, total, 0.0)
+        if row["mass"] >= 0:
+            total[row["mass"]] += row["outward"] * row["rest"]
+            size[row["mass"]] += abs(row["rest"])
+    masses["force"] = np.where(np.abs(total) > SNAP * size, total, 0.0)
     moving = []
-    for name, row in zip(draft.body_names, bodies, strict=False):
+    for name, row in zip(draft.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:
             moving.append(f"mass {name} moves at {row['velocity']:.4g} m/s")
         if row["force"] != 0.0 and row["lightness"] > 0.0:

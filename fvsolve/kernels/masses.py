@@ -1,4 +1,4 @@
-"""Bodies on one axis and what pushes them: pistons, springs, dampers, forces, stops. Knows the tables; solves no step.
+"""Masses on one axis and what pushes them: pistons, springs, dampers, forces, stops. Knows the tables; solves no step.
 
 Wraps the rhs of the fluid: first the pressures of moving chambers and what their pistons sweep, then the fluid, then
 forces and accelerations. A chamber's state is its excess mass e over what its volume V would hold at the density
@@ -27,18 +27,18 @@ from fvsolve.kernels.schedules import schedule_value
 
 
 @njit(forceinline=True)
-def motion(body, y):
-    """(change of position since the start [m], velocity [m/s]) of a body."""
-    if body["y"] < 0:
+def motion(mass, y):
+    """(change of position since the start [m], velocity [m/s]) of a mass."""
+    if mass["y"] < 0:
         return 0.0, 0.0
-    return y[body["y"]], body["velocity"] + y[body["y"] + 1]
+    return y[mass["y"]], mass["velocity"] + y[mass["y"] + 1]
 
 
 @njit(forceinline=True)
 def between(tables, y, i, j):
-    """(change of the distance from body i to body j, its rate)."""
-    x_i, v_i = motion(tables.bodies[i], y)
-    x_j, v_j = motion(tables.bodies[j], y)
+    """(change of the distance from mass i to mass j, its rate)."""
+    x_i, v_i = motion(tables.masses[i], y)
+    x_j, v_j = motion(tables.masses[j], y)
     return x_j - x_i, v_j - v_i
 
 
@@ -102,7 +102,7 @@ def chambers(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def push(out, tables, k, i, j, change, start):
-    """Book push k, `start` at the start and changed by `change`, on body j forward and on body i back."""
+    """Book push k, `start` at the start and changed by `change`, on mass j forward and on mass i back."""
     layout = tables.layout[0]
     out[layout["push"] + k] = start + change
     out[layout["net_force"] + i] -= change
@@ -111,29 +111,29 @@ def push(out, tables, k, i, j, change, start):
 
 @njit
 def forces(t, y, out, tables):
-    """Net force on every body; what was balanced at the start and has not changed adds no bit."""
-    layout, bodies, braces = tables.layout[0], tables.bodies, tables.braces
+    """Net force on every mass; what was balanced at the start and has not changed adds no bit."""
+    layout, masses, braces = tables.layout[0], tables.masses, tables.braces
     stops, pistons, armed = tables.stops, tables.pistons, tables.armed
-    for i in range(bodies.size):
-        out[layout["net_force"] + i] = bodies[i]["force"]
+    for i in range(masses.size):
+        out[layout["net_force"] + i] = masses[i]["force"]
     for k in range(braces.size):
         brace = braces[k]
-        x, speed = between(tables, y, brace["from_body"], brace["to_body"])
+        x, speed = between(tables, y, brace["from_mass"], brace["to_mass"])
         change = -brace["stiffness"] * x - brace["damping"] * (speed - brace["speed"])
         if brace["schedule"] >= 0:
             change += schedule_value(tables, brace["schedule"], t) - brace["given"]
-        push(out, tables, k, brace["from_body"], brace["to_body"], change, brace["force"])
+        push(out, tables, k, brace["from_mass"], brace["to_mass"], change, brace["force"])
     first = armed.size - 2 * stops.size
     for k in range(stops.size):
         stop = stops[k]
-        x, speed = between(tables, y, stop["from_body"], stop["to_body"])
+        x, speed = between(tables, y, stop["from_mass"], stop["to_mass"])
         total = 0.0
         if armed[first + 2 * k] > 0.0:
             total += contact(stop["stiffness"], stop["damping"], -(stop["below"] + x), -speed)
         if armed[first + 2 * k + 1] > 0.0:
             total -= contact(stop["stiffness"], stop["damping"], x - stop["above"], speed)
         at = braces.size + k
-        push(out, tables, at, stop["from_body"], stop["to_body"], total - stop["force"], stop["force"])
+        push(out, tables, at, stop["from_mass"], stop["to_mass"], total - stop["force"], stop["force"])
     for k in range(pistons.size):
         piston = pistons[k]
         _, speed = between(tables, y, piston["case"], piston["rod"])
@@ -145,28 +145,28 @@ def forces(t, y, out, tables):
 
 @njit(forceinline=True)
 def load(tables, i, j, stiffness, damping):
-    """Add to what holds and brakes two bodies, per mass [1/s2, 1/s], in scratch."""
-    bodies, work = tables.bodies, tables.scratch
-    lightness = bodies[i]["lightness"] + bodies[j]["lightness"]
-    for body in (i, j):
-        work[2 * body] += lightness * stiffness
-        work[2 * body + 1] += lightness * damping
+    """Add to what holds and brakes two masses, per mass [1/s2, 1/s], in scratch."""
+    masses, work = tables.masses, tables.scratch
+    lightness = masses[i]["lightness"] + masses[j]["lightness"]
+    for mass in (i, j):
+        work[2 * mass] += lightness * stiffness
+        work[2 * mass + 1] += lightness * damping
 
 
 @njit
 def mechanical_rate(out, tables):
-    """Greatest rate of a body [1/s], c / 2 + sqrt(c^2 / 4 + k) with all springs k, fluid ones too, and dampers c."""
-    layout, nodes, bodies = tables.layout[0], tables.nodes, tables.bodies
+    """Greatest rate of a mass [1/s], c / 2 + sqrt(c^2 / 4 + k) with all springs k, fluid ones too, and dampers c."""
+    layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     braces, stops, pistons = tables.braces, tables.stops, tables.pistons
     armed, work = tables.armed, tables.scratch
-    for i in range(2 * bodies.size):
+    for i in range(2 * masses.size):
         work[i] = 0.0
     for k in range(braces.size):
-        load(tables, braces[k]["from_body"], braces[k]["to_body"], braces[k]["stiffness"], braces[k]["damping"])
+        load(tables, braces[k]["from_mass"], braces[k]["to_mass"], braces[k]["stiffness"], braces[k]["damping"])
     first = armed.size - 2 * stops.size
     for k in range(stops.size):
         if armed[first + 2 * k] + armed[first + 2 * k + 1] > 0.0:
-            load(tables, stops[k]["from_body"], stops[k]["to_body"], stops[k]["stiffness"], stops[k]["damping"])
+            load(tables, stops[k]["from_mass"], stops[k]["to_mass"], stops[k]["stiffness"], stops[k]["damping"])
     for k in range(pistons.size):
         piston = pistons[k]
         stiff_a = out[layout["stiffness"] + nodes[piston["a"]]["row"]]
@@ -174,18 +174,18 @@ def mechanical_rate(out, tables):
         spring = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
         load(tables, piston["case"], piston["rod"], spring, piston["damping"])
     rate = 0.0
-    for i in range(bodies.size):
-        if bodies[i]["y"] >= 0:
+    for i in range(masses.size):
+        if masses[i]["y"] >= 0:
             brake = 0.5 * work[2 * i + 1]
             rate = max(rate, brake + sqrt(brake * brake + work[2 * i]))
     return rate
 
 
 @njit
-def finish_bodies(t, y, dydt, out, handle):
+def finish_masses(t, y, dydt, out, handle):
     """Forces, d/dt of positions and velocities, the rate; status where a piston has used up its chamber."""
     tables = open_tables(handle)
-    layout, nodes, bodies = tables.layout[0], tables.nodes, tables.bodies
+    layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     forces(t, y, out, tables)
     out[RATE] = max(out[RATE], mechanical_rate(out, tables))
     for k in range(tables.pistons.size):
@@ -194,24 +194,24 @@ def finish_bodies(t, y, dydt, out, handle):
                 out[STATUS], out[WHERE] = NO_VOLUME, i
     if dydt.size == 0:
         return
-    for i in range(bodies.size):
-        at = bodies[i]["y"]
+    for i in range(masses.size):
+        at = masses[i]["y"]
         if at >= 0:
-            dydt[at] = bodies[i]["velocity"] + y[at + 1]
-            dydt[at + 1] = out[layout["net_force"] + i] * bodies[i]["lightness"]
+            dydt[at] = masses[i]["velocity"] + y[at + 1]
+            dydt[at + 1] = out[layout["net_force"] + i] * masses[i]["lightness"]
 
 
 @njit
-def observe_bodies(t, y, out, handle, values):
-    """Values of the probes that read bodies and what pushes them."""
+def observe_masses(t, y, out, handle, values):
+    """Values of the probes that read masses and what pushes them."""
     tables = open_tables(handle)
-    layout, bodies, pistons, probes = tables.layout[0], tables.bodies, tables.pistons, tables.probes
+    layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
         if kind == POSITION:
-            values[k] = bodies[i]["position"] + motion(bodies[i], y)[0]
+            values[k] = masses[i]["position"] + motion(masses[i], y)[0]
         elif kind == VELOCITY:
-            values[k] = motion(bodies[i], y)[1]
+            values[k] = motion(masses[i], y)[1]
         elif kind == FORCE:
             values[k] = out[layout["push"] + i]
         elif kind == PISTON_POSITION:
@@ -221,7 +221,7 @@ def observe_bodies(t, y, out, handle, values):
 
 
 @njit
-def record_bodies(t, y, out, handle, values):
+def record_masses(t, y, out, handle, values):
     """The first time that a piston is beyond its stroke."""
     tables = open_tables(handle)
     marks, pistons = tables.marks, tables.pistons
@@ -234,11 +234,11 @@ def record_bodies(t, y, out, handle, values):
 
 
 @njit
-def body_events(t, y, out, handle, g):
+def mass_events(t, y, out, handle, g):
     """The room that is left before each side of a stop."""
     tables = open_tables(handle)
     stops = tables.stops
     first = g.size - 2 * stops.size
     for k in range(stops.size):
-        x, _ = between(tables, y, stops[k]["from_body"], stops[k]["to_body"])
+        x, _ = between(tables, y, stops[k]["from_mass"], stops[k]["to_mass"])
         g[first + 2 * k], g[first + 2 * k + 1] = stops[k]["below"] + x, stops[k]["above"] - x
