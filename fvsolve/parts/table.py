@@ -137,6 +137,13 @@ class Inside(Value):
     def takes(self) -> str:
         return f"`{{ {', '.join(self.model.keys())} }}`"
 
+    def json(self) -> dict[str, Any]:
+        fields = {info.alias or name: info for name, info in self.model.model_fields.items()}
+        keys = {
+            key: (value, NEEDED if fields[key].is_required() else None) for key, value in self.model.values().items()
+        }
+        return keys_json(keys)
+
 
 class Named(Value):
     """Tables of one kind by name."""

@@ -270,6 +270,7 @@ class Rows(Value):
     rising: bool = False
     length: int | None = None
     about: str = ""
+    usual: Usual | None = None
     changes: str = PROFILE
 
     def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
@@ -299,6 +300,37 @@ class Rows(Value):
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": Quantity(self.dimension).json(), "minItems": self.length or 1}
+
+
+@dataclass(frozen=True)
+class Matrix(Value):
+    """A matrix of quantities, three rows of three."""
+
+    dimension: str
+    about: str = ""
+    changes: str = PROFILE
+
+    def read(self, given: Any, setting: Setting) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(given, (list, tuple)) or len(given) != 3:
+            raise ValueError(f"{show(given)} is no matrix; wanted three rows of three")
+        rows, faults = [], []
+        for index, row in enumerate(given):
+            try:
+                rows.append(Rows(self.dimension, length=3).read(row, setting))
+            except Misfit as error:
+                faults += [((index, *below), text) for below, text in error.faults]
+            except ValueError as error:
+                faults.append(((index,), str(error)))
+        if faults:
+            raise Misfit(faults)
+        return tuple(rows)
+
+    @property
+    def takes(self) -> str:
+        return f"three rows of {Rows(self.dimension, length=3).takes}"
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": Rows(self.dimension, length=3).json(), "minItems": 3}
 
 
 def check_rising(values: Any, given: Any, what: str = "values") -> None:

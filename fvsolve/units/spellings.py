@@ -250,5 +250,6 @@ LIKELY = {
         "mass": ("kg", "g", "t"),
         "frequency": ("Hz", "kHz"),
         "angular_velocity": ("rpm",),
+        "angle": ("deg",),
     }.items()
 }

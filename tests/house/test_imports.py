@@ -14,9 +14,9 @@ import fvsolve
 
 FLOORS = {  # room -> role -> rooms that it may import beside files of its own role
     "parts": {
-        "part": {"parts", "units", "errors", "names", "steppers"},
+        "part": {"parts", "units", "errors", "names", "steppers", "attitude"},
         "law": {"kernels", "jit"},
-        "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes"},
+        "lower": {"parts", "model", "steady", "kernels", "errors", "units", "fluid", "schemes", "attitude"},
     },
     "basins": {
         "part": {"parts", "units", "errors"},

@@ -1,0 +1,147 @@
+"""An attitude may be said in several forms: each is what SciPy says, and what does not fit is named."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from fvsolve.parts.attitude import Attitude
+from fvsolve.parts.table import Inside, Table, misfits
+
+QUARTER = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+
+
+class Stand(Table):
+    attitude: Annotated[Attitude | None, Inside(Attitude, "of a stand")] = None
+
+
+def read(**given) -> Attitude:
+    return Stand.model_validate({"attitude": given}).attitude
+
+
+def faults(**given) -> dict[str, str]:
+    with pytest.raises(ValidationError) as found:
+        read(**given)
+    return {".".join(map(str, keys)): text for keys, text in misfits(found.value, ["attitude"])}
+
+
+def notes(one: Attitude) -> list[tuple[str, str]]:
+    return [(keys[0], text) for keys, _, _, text in one.unusual()]
+
+
+SAID = {
+    "roll alone": ({"roll": "30 deg"}, Rotation.from_euler("x", 30, degrees=True)),
+    "roll, pitch, yaw": (
+        {"roll": 0.1, "pitch": "-20 deg", "yaw": 2},
+        Rotation.from_euler("ZYX", [2, -np.pi / 9, 0.1]),
+    ),
+    "zyz": ({"zyz": [0.1, "20 deg", -1]}, Rotation.from_euler("ZYZ", [0.1, np.pi / 9, -1.0])),
+    "axis": ({"axis": [0, 0.6, 0.8], "angle": "40 deg"}, Rotation.from_rotvec(np.radians([0, 24, 32]))),
+    "Euler parameters": ({"euler_parameters": [0.6, 0, 0.8, 0]}, Rotation.from_quat([0, 0.8, 0, 0.6])),
+    "matrix": ({"matrix": QUARTER}, Rotation.from_euler("z", 90, degrees=True)),
+    "nothing": ({}, Rotation.identity()),
+}
+
+
+@pytest.mark.parametrize("form", SAID)
+def test_a_form_is_scipy_s(form):
+    given, wanted = SAID[form]
+    one = read(**given)
+    assert_allclose(one.rotation, wanted.as_matrix(), rtol=0, atol=1e-15)
+    assert_allclose(Rotation.from_quat(one.parameters, scalar_first=True).as_matrix(), one.rotation, rtol=0, atol=1e-15)
+    assert not notes(one)
+    assert read(**one.table()) == one
+
+
+def test_forms_that_agree_may_stand_together():
+    turn = Rotation.from_euler("ZYX", [0.3, -0.4, 0.2])
+    vector = turn.as_rotvec()
+    one = read(
+        **{"roll": 0.2, "pitch": -0.4, "yaw": 0.3, "zyz": [*turn.as_euler("ZYZ")]},
+        **{"axis": [*vector / turn.magnitude()], "angle": turn.magnitude()},
+        **{"euler_parameters": [*turn.as_quat(scalar_first=True)], "matrix": turn.as_matrix().tolist()},
+    )
+    assert_allclose(one.rotation, turn.as_matrix(), rtol=0, atol=1e-15)
+    assert not notes(one)
+
+
+def test_forms_that_disagree_are_named_with_the_angle_between_them():
+    found = faults(yaw="90 deg", axis=[0, 0, 1], angle="80 deg", matrix=QUARTER)
+    assert found == {"attitude.axis": "is 10 deg away from what roll, pitch, yaw say"}
+    found = faults(axis=[0, 0, 1], angle="80 deg", matrix=QUARTER, euler_parameters=[1, 0, 0, 0])
+    assert found == {
+        "attitude.euler_parameters": "is 80 deg away from what axis says",
+        "attitude.matrix": "is 10 deg away from what axis says",
+    }
+
+
+def test_a_length_that_is_not_one_is_divided_by_and_said():
+    one = read(axis=[1, 1, 0], angle="90 deg")
+    assert notes(one) == [("axis", "its length is 1.41421, not 1; it is divided by it")]
+    wanted = Rotation.from_rotvec(np.pi / 2**1.5 * np.array([1, 1, 0]))
+    assert_allclose(one.rotation, wanted.as_matrix(), rtol=0, atol=1e-15)
+    assert notes(read(euler_parameters=[0, 0, 0, -3]))[0][0] == "euler_parameters"
+
+
+def test_typed_digits_are_no_fault_but_said():
+    typed = [[0.8660, -0.5, 0], [0.5, 0.8660, 0], [0, 0, 1]]
+    one = read(matrix=typed)
+    assert notes(one) == [("matrix", "R'R is the identity but for 4.4e-05; the nearest rotation is taken")]
+    assert_allclose(one.rotation, Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(), rtol=0, atol=1e-15)
+    one = read(matrix=typed, yaw="30.01 deg")  # of atan(0.5 / 0.866) = 30.00073 deg
+    assert notes(one)[1] == ("matrix", "is 0.00927 deg away from what roll, pitch, yaw say; the latter is taken")
+    assert_allclose(one.rotation, Rotation.from_euler("z", 30.01, degrees=True).as_matrix(), rtol=0, atol=1e-15)
+
+
+BAD = {
+    "no rotation": ({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0.1, 1]]}, {"matrix": "R'R is the identity but for 0.1"}),
+    "a mirror": ({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, {"matrix": "a mirror: its determinant is -1"}),
+    "zeros": (
+        {"axis": [0, 0, 0], "angle": 1, "euler_parameters": [0, 0, 0, 0]},
+        {"axis": "is all zeros", "euler_parameters": "is all zeros"},
+    ),
+    "axis alone": ({"axis": [0, 0, 1]}, {"axis": "wants an angle beside it"}),
+    "angle alone": ({"angle": 1}, {"angle": "wants an axis beside it"}),
+    "unit": ({"yaw": "3 m", "zyz": [1, "2 kg", 3]}, {"yaw": '"3 m" is a length', "zyz.1": '"2 kg" is a mass'}),
+    "sizes": (
+        {"matrix": [[1, 0], [0, 1]], "euler_parameters": [1, 0, 0]},
+        {"matrix": "wanted three rows of three", "euler_parameters": "has 3 values; wanted 4"},
+    ),
+    "row": ({"matrix": [[1, 0, 0], [0, 1], [0, "x", 1]]}, {"matrix.1": "wanted 3", "matrix.2.1": "no number"}),
+    "key": ({"rol": 1}, {"rol": 'did you mean "roll"?'}),
+    "key of others": ({"quaternion": [1, 0, 0, 0]}, {"quaternion": "say euler_parameters = [eta, e1, e2, e3]"}),
+    "not finite": ({"euler_parameters": [float("nan"), 0, 0, 0]}, {"euler_parameters.0": "not finite"}),
+    "no form that can be read": (  # and what can be read is held against nothing
+        {"pitch": "x", "yaw": "90 deg", "matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]},
+        {"pitch": "no number"},
+    ),
+    "all at once": (
+        {"axis": [0, 0, 0], "angle": "m", "matrix": 2 * [[2, 0, 0]] + [[0, 0, 1]], "yaw": 0, "zyz": [0, 1, 0], "x": 1},
+        {"axis": "all zeros", "angle": "no number", "matrix": "but for 7", "zyz": "57.3 deg away", "x": "unknown key"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_what_does_not_fit_is_named(what):
+    given, wanted = BAD[what]
+    found = faults(**given)
+    assert {*found} == {f"attitude.{key}" for key in wanted}
+    for key, text in wanted.items():
+        assert text in found[f"attitude.{key}"]
+
+
+def test_no_table_is_told_what_is_wanted():
+    with pytest.raises(ValidationError) as found:
+        Stand.model_validate({"attitude": "30 deg"})
+    assert "no table; wanted keys of angle, axis, euler_parameters" in str(found.value)
+
+
+def test_its_schema_says_its_keys():
+    said = Stand.model_json_schema()["properties"]["attitude"]
+    assert said["properties"]["matrix"]["minItems"] == 3 and not said["additionalProperties"]
