@@ -71,6 +71,21 @@ def test_two_free_masses_are_measured_as_predicted_and_no_implicit_step_of_their
         assert math.isinf(predicted(system_of(pair(1e7, 0.1), name)).step)
 
 
+@pytest.mark.parametrize("push", [0.0, 30.0])
+def test_energy_changes_by_its_slope_along_the_flow_1(push):
+    """dV/dt = dV/dx f(x, u) of two masses on springs: what a force gives less what the damper takes, at any state."""
+    case = pair(1e4, 2e3)
+    case["links"]["push"] = {"type": "force", "to": "b", "force": push}
+    model = frozen(case).model
+    form, names = energy_form(model), list(model.state_names)
+    for seed in range(5):
+        y = np.random.default_rng(seed).normal(size=len(names))
+        v = {name: y[names.index(f"{name}.velocity")] for name in "ab"}
+        slope = 2.0 * (form.rows.T @ (form.rows @ y))
+        power = push * v["b"] - DAMPING * (v["a"] - v["b"]) ** 2
+        assert slope @ model.rhs(0.0, y) == pytest.approx(power, rel=1e-9, abs=1e-9)
+
+
 def test_masses_that_nothing_holds_are_idle_together_and_a_held_one_is_not():
     free, held = (frozen(pair(1e6, hold)).model for hold in (0.0, 0.1))
     form = energy_form(free)

@@ -49,6 +49,16 @@ def test_what_is_solved_is_the_shifted_matrix(kind, n, m, shift):
     assert (shift * np.eye(n) - dense[:n]) @ x == pytest.approx(b, rel=1e-11, abs=1e-11)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_two_by_two_is_solved_by_the_inverse_of_the_course(kind):
+    """(a b; c d)^-1 = (d -b; -c a) / (a d - b c), of section 2."""
+    structure = Structure(np.ones((2, 2), dtype=bool), kind)
+    j, right = np.array([[1.0, 2.0], [-3.0, 4.0]]), np.array([1.0, -2.0])
+    (a, b), (c, d) = 7.0 * np.eye(2) - j
+    inverse = np.array([[d, -b], [-c, a]]) / (a * d - b * c)
+    assert solved(structure, j.T.ravel().copy(), 7.0, right) == pytest.approx(inverse @ right, rel=1e-14)
+
+
 @pytest.mark.parametrize("kind", ["dense", "banded"])
 def test_rows_are_exchanged_where_a_pivot_is_zero(kind):
     structure = Structure(np.ones((3, 3), dtype=bool), kind)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from scipy.linalg import expm, matrix_balance
 from truth.scenes import (
     AMBIENT,
     GRAVITY,
@@ -61,6 +61,20 @@ def test_a_chamber_behind_an_orifice_is_as_by_hand():
     assert found.output_values == pytest.approx((1e6, mass_flow / RHO))
     assert (found.input_units, found.output_units) == (("Pa", "-"), ("Pa", "m3/s"))
     assert max(found.error.values()) < 1e-6
+
+
+@pytest.mark.parametrize("case", ["two-tanks", "surge-tank", "closed-cylinder"])
+def test_poles_are_eigenvalues_of_a_with_their_vectors(case):
+    """det(lambda I - A) = 0 and (A - lambda I) v = 0, by singular values of A in units that balance it."""
+    a = matrix_balance(linearise(case).a)[0]
+    values = spectrum(a).values
+    assert len(values) == len(a)
+    for pole in values:
+        m = pole * np.eye(len(a)) - a
+        _, sizes, vectors = np.linalg.svd(m)
+        assert sizes[-1] < 1e-9 * np.linalg.norm(a) and np.linalg.norm(m @ vectors[-1].conj()) < 1e-9 * np.linalg.norm(
+            a
+        )
 
 
 @pytest.mark.parametrize("opening", [0.0, 1.0])

@@ -93,6 +93,57 @@ def test_connected_passive_systems_parallel_yes_series_product_no():
     assert not positive_real(times([1], [1]), times(S, S))  # 1/s times 1/s
 
 
+def closed(h, g):
+    """h / (1 + h g), h with g fed back, highest power first."""
+    (n, d), (m, e) = h, g
+    return times(n, e) or [0], total(times(d, e), times(n, m))
+
+
+def total(p, q):
+    found = Polynomial(p[::-1]) - Polynomial([-1]) * Polynomial(q[::-1])
+    return list(found.coefficients[::-1])
+
+
+@pytest.mark.parametrize("name", YES)
+@pytest.mark.parametrize("back", ["resistor", "capacitor 1/s", "inductor s", "1/(s+1)", "PI (s+1)/s"])
+def test_passive_systems_in_feedback_are_passive(name, back):
+    assert positive_real(*closed(YES[name], YES[back]))
+
+
+def test_stable_systems_in_feedback_need_not_be_stable():
+    three = ([1], [1, 3, 3, 1])  # 1 / (s + 1)^3, which is not passive, under a gain of 9: its limit is 8
+    assert not positive_real(*three)
+    assert max(np.roots([float(x) for x in closed(three, ([9], [1]))[1]]).real) > 0.0
+    assert max(np.roots([float(x) for x in closed(three, ([7], [1]))[1]]).real) < 0.0
+
+
+def in_the_right_half_plane(n, d):
+    """Least Re H / |H| about poles and zeros and far around, right of the axis; greatest |Im H| on the real axis."""
+    poles, zeros = (np.roots([float(x) for x in p]) for p in (d, n))
+    about = np.concatenate([poles, zeros, [0.0]])
+    rings = about[:, None, None] + np.geomspace(1e-4, 1e4, 65)[:, None] * np.exp(1j * np.linspace(-np.pi, np.pi, 181))
+    s, real = rings[rings.real > 0], np.geomspace(1.1e-4, 1.1e4, 99) + 0j
+
+    def h(s):
+        below = np.polyval([float(x) for x in d], s)
+        return np.polyval([float(x) for x in n], s[below != 0]) / below[below != 0]
+
+    size = np.abs(h(s))
+    return np.min(h(s).real / np.where(size > 0, size, 1.0)), np.max(np.abs(h(real).imag))
+
+
+@pytest.mark.parametrize("name", YES)
+def test_the_theorem_finds_what_the_definition_says(name):
+    """H is real for positive s, and Re H >= 0 right of the axis: the definition in 4.1, sampled."""
+    least, imaginary = in_the_right_half_plane(*YES[name])
+    assert least > -1e-9 and imaginary == 0.0
+
+
+@pytest.mark.parametrize("name", NO)
+def test_and_where_it_says_no_the_definition_does(name):
+    assert in_the_right_half_plane(*NO[name][:2])[0] < -1e-3
+
+
 def test_residues_of_a_foster_form():
     # (s^2 + 1) / (s (s^2 + 4)) = (1/4)/s + (3/4) s/(s^2 + 4): residues 1/4 at 0 and 3/8 at 2j
     poles = positive_real(*YES["Foster (s^2+1)/(s(s^2+4))"]).axis_poles

@@ -1,0 +1,123 @@
+"""Places, velocities and accelerations of points of axes that move (59) to (68), against differences and symbols."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fvsolve import attitude as at
+
+STEP = 2e-3
+TIMES = [0.0, 0.4, 1.7]
+
+
+def along(of, t: float, times: int = 1):
+    """The derivative, or its derivative, of eighth order in the step."""
+    weights = {1: (4 / 5, -1 / 5, 4 / 105, -1 / 280), 2: (8 / 5, -1 / 5, 8 / 315, -1 / 560)}[times]
+    sign = (-1) ** times
+    sides = [of(t + k * STEP) + sign * of(t - k * STEP) for k in range(1, 5)]
+    middle = -205 / 72 * of(t) if times == 2 else 0.0
+    return (sum(w * one for w, one in zip(weights, sides, strict=True)) + middle) / STEP**times
+
+
+def rotation(t: float) -> np.ndarray:
+    """R^i_b of axes that roll, pitch and yaw, each at a rate of its own that changes."""
+    return at.of_roll_pitch_yaw(0.3 + np.sin(t), 0.5 * np.cos(2 * t), t + 0.2 * t * t)
+
+
+def origin(t: float) -> np.ndarray:
+    return np.array([np.sin(t), t**3 / 6, np.cos(2 * t)])
+
+
+def within(t: float) -> np.ndarray:
+    """Where a bead slides in the body, in its axes."""
+    return np.array([0.4 + 0.1 * t * t, np.sin(3 * t), -0.2 * t])
+
+
+def place(t: float) -> np.ndarray:
+    """(59), (60)."""
+    return origin(t) + rotation(t) @ within(t)
+
+
+def spin(t: float) -> np.ndarray:
+    """w^i_ib by (48)."""
+    return at.angular_velocity(rotation(t), along(rotation, t))
+
+
+def seen(rate):
+    """What b sees of a rate, in axes i."""
+    return lambda t: rotation(t) @ rate(t)
+
+
+def shares(t: float) -> dict[str, np.ndarray]:
+    """The terms of (65) behind that of the origin, in axes i."""
+    w, r = spin(t), rotation(t) @ within(t)
+    slide, pull = (rotation(t) @ along(within, t, times) for times in (1, 2))
+    return {
+        "relative": pull,
+        "coriolis": 2 * np.cross(w, slide),
+        "transversal": np.cross(along(spin, t), r),
+        "centripetal": np.cross(w, np.cross(w, r)),
+    }
+
+
+@pytest.mark.parametrize("t", TIMES)
+def test_a_velocity_is_that_of_the_origin_what_the_body_sees_and_the_turn_61_62(t):
+    slide = at.derivative(rotation(t), within(t), along(within, t), rotation(t).T @ spin(t))
+    assert_allclose(along(origin, t) + slide, along(place, t), atol=1e-10)
+    fixed = at.derivative(rotation(t), within(t), np.zeros(3), rotation(t).T @ spin(t))  # (67)
+    assert_allclose(along(lambda s: rotation(s) @ within(t), t), fixed, atol=1e-10)
+
+
+@pytest.mark.parametrize("t", TIMES)
+def test_an_acceleration_is_the_sum_of_its_five_shares_63_65(t):
+    assert_allclose(along(origin, t, 2) + sum(shares(t).values()), along(place, t, 2), atol=1e-8)
+
+
+@pytest.mark.parametrize("t", TIMES)
+def test_both_forms_of_an_acceleration_are_the_same_65_66(t):
+    def velocity_in_b(s):
+        return rotation(s).T @ along(origin, s)
+
+    first = along(origin, t, 2)
+    second = rotation(t) @ along(velocity_in_b, t) + np.cross(spin(t), along(origin, t))
+    assert_allclose(second, first, atol=1e-8)
+
+
+def test_both_forms_follow_from_55_in_symbols_65_66():
+    """In coordinates of b, of any motion: twice (55) of the place, term by term."""
+    sympy = pytest.importorskip("sympy", reason="symbols are a second proof of what differences show")
+    t = sympy.symbols("t")
+    w, v, r = (sympy.Matrix([sympy.Function(f"{name}{k}")(t) for k in "xyz"]) for name in "wvr")  # v of the origin
+
+    def seen_from_i(u):
+        return u.diff(t) + w.cross(u)
+
+    behind = r.diff(t, 2) + 2 * w.cross(r.diff(t)) + w.diff(t).cross(r) + w.cross(w.cross(r))
+    exact = seen_from_i(v + seen_from_i(r))
+    for form in (seen_from_i(v) + behind, v.diff(t) + w.cross(v) + behind):  # (65), (66)
+        assert (exact - form).expand() == sympy.zeros(3, 1)
+    assert (seen_from_i(w) - w.diff(t)).expand() == sympy.zeros(3, 1)  # (64): from either axes the same
+
+
+@pytest.mark.parametrize("t", TIMES)
+def test_angular_acceleration_is_the_first_derivative_from_either_axes_64(t):
+    """And no second one, as the summary prints it: that has another unit."""
+    from_i = along(spin, t)
+    from_b = rotation(t) @ along(lambda s: rotation(s).T @ spin(s), t)
+    assert_allclose(from_b, from_i, atol=1e-7)
+    assert np.abs(along(spin, t, 2) - from_i).max() > 0.1
+
+
+@pytest.mark.parametrize("t", TIMES)
+def test_torque_turns_the_moment_of_momentum_68(t):
+    inertia = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.3], [-0.2, 0.3, 4.0]])  # of a body, in its axes
+
+    def moment(s):
+        return rotation(s) @ inertia @ rotation(s).T @ spin(s)
+
+    w = rotation(t).T @ spin(t)
+    alpha = rotation(t).T @ along(spin, t)
+    torque = inertia @ alpha + np.cross(w, inertia @ w)
+    assert_allclose(rotation(t) @ torque, along(moment, t), atol=1e-7)
