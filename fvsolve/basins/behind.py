@@ -13,6 +13,18 @@ def to_be_had(depth):
     return s * s * (3.0 - 2.0 * s)
 
 
+@njit(forceinline=True)
+def area_of(tables, patch):
+    """Area of the cells behind a patch [m2]."""
+    return tables.plane[patch["sizes"]]
+
+
+@njit(forceinline=True)
+def length_of(tables, patch):
+    """Length of the faces of a patch [m]."""
+    return tables.plane[patch["sizes"] + 1]
+
+
 @njit
 def depth_behind(plane, basin, i, y):
     """Depth of cell i of a basin of water."""
@@ -39,7 +51,7 @@ def counted(tables, patch, leaves, y):
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
         total += plane[basin["area"] + i] * weight(plane, basin, leaves, i, y)
-    return max(total, HARDLY * patch["area"])
+    return max(total, HARDLY * area_of(tables, patch))
 
 
 @njit(forceinline=True)

@@ -52,7 +52,8 @@ class BasinRows:
         self.is_grid = is_grid(self.mesh)
         self.scalars = list(case.scalars) if self.part.own.carries else []
         self.quantities = tuple(self.part.own.states)  # of cells, as states have them; the first is what is stored
-        self.stretches: list[tuple[int, np.ndarray]] = []  # of walls that move: state, and per travel [1/m]
+        # of walls that move: state, stretch of cells per travel [1/m], and of corners how far they go with it
+        self.stretches: list[tuple[int, np.ndarray, np.ndarray]] = []
 
     # what a physics says ------------------------------------------------------------------------------------
 
@@ -220,7 +221,11 @@ class BasinRows:
 
     def stretched(self, y: np.ndarray) -> np.ndarray:
         """Areas of cells over those as drawn, in a state of a model : float64[n]."""
-        return 1.0 + sum((y[at] * per for at, per in self.stretches), np.zeros(self.n))
+        return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
+
+    def points_at(self, y: np.ndarray) -> np.ndarray:
+        """Corners of cells in a state of a model : float64[p, 2] [m]."""
+        return self.mesh.points + sum((y[at] * goes for at, _, goes in self.stretches), np.zeros((1, 2)))
 
     def at_rest(self) -> np.ndarray | float:
         """Its first quantity at rest."""
@@ -354,17 +359,18 @@ class BasinRows:
     def lower_patch(self, draft, patch: str, row) -> None:
         """Fill the row of a patch that links may join."""
         cells = behind(self.mesh, patch)
-        row["first"], row["count"], row["area"] = len(draft.integers), cells.size, self.mesh.area[cells].sum()
+        row["first"], row["count"] = len(draft.integers), cells.size
         draft.integers += cells.tolist()
         own, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner
         numbers = np.argsort(self.ring())[own - outer] if self.is_grid else own - outer
         row["ring"], row["faces"], behind_faces = len(draft.integers), own.size, self.mesh.left[own]
         draft.integers += [*numbers.tolist(), *behind_faces.tolist()]
         length = self.mesh.length[own]
-        row["length"] = length.sum()
-        row["normals"] = draft.to_plane(np.array([*self.mesh.normal[own].T, length / self.mesh.area[behind_faces]]))
+        row["sizes"] = draft.to_plane(np.array([self.mesh.area[cells].sum(), length.sum()]))
+        per_area = [length / self.mesh.area[behind_faces]] * (2 if self.moves else 1)
+        row["normals"] = draft.to_plane(np.array([*self.mesh.normal[own].T, *per_area]))
         stated = self.part.patches.get(patch)
-        row["open"] = self.opens(patch)
+        row["open"], row["moves"] = self.opens(patch), patch in self.walls
         given = stated.scalars if stated is not None else {}
         row["values"] = len(draft.integers)
         draft.integers += [draft.schedules.add(given[name]) if name in given else -1 for name in self.scalars]

@@ -26,7 +26,8 @@ def lower_walls(draft) -> None:
         per = np.diff(goes) / np.diff(lines)
         grid = basin.mesh.grid
         per_cell = np.repeat(per, grid.nx) if axis == 1 else np.tile(per, grid.ny)
-        basin.stretches.append((int(row["y"]), per_cell))
+        with_it = case.weights(basin.part, basin.mesh, patch, basin.mesh.points[:, axis])
+        basin.stretches.append((int(row["y"]), per_cell, np.outer(with_it, np.eye(2)[axis])))
         row["weights"] = draft.to_plane(np.concatenate([goes, per]))
         faces = np.arange(basin.mesh.left.size)[basin.mesh.patch(patch)]
         length, behind = basin.mesh.length[faces], basin.mesh.left[faces]

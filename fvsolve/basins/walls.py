@@ -55,6 +55,25 @@ def stretch_cells(tables, basin, y):
         plane[spacing + i] = plane[drawn + i] / plane[at + i]
     for i in range(basin["n"]):
         plane[basin["area"] + i] = plane[basin["drawn"] + i] * stretched(plane, basin, i)
+    for p in range(tables.patches.size):
+        if tables.basins[tables.patches[p]["basin"]]["y"] == basin["y"]:
+            stretch_patch(tables, basin, tables.patches[p])
+
+
+@njit
+def stretch_patch(tables, basin, patch):
+    """Sizes of a patch that rides on a side along which lines move, or stands before cells that stretch."""
+    plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
+    for m in range(patch["count"]):
+        area += plane[basin["area"] + integers[patch["first"] + m]]
+    at, many = patch["normals"], patch["faces"]
+    for m in range(many):
+        i = integers[patch["ring"] + many + m]
+        rides = abs(plane[at + (1 if basin["turn"] == 1 else 0) * many + m]) < 0.5
+        per_area = plane[at + 3 * many + m] * (1.0 if rides else 1.0 / stretched(plane, basin, i))
+        plane[at + 2 * many + m] = per_area
+        length += per_area * plane[basin["area"] + i]
+    plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
 
 
 @njit(forceinline=True)

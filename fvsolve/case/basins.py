@@ -185,8 +185,8 @@ def _patches(basin: Basin, known: tuple[str, ...], wanted: str) -> str:
     return f"{name} names no groups of lines; Gmsh does by Physical Curve({show(wanted)}) = {{1, 2}};"
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any) -> Found:
-    """Faults of patches, and of what basins do not go with."""
+def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple) -> Found:
+    """Faults of patches, and of what basins do not go with; times : of start and end [s]."""
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in found.items():
@@ -198,7 +198,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
-        yield from walls.misfits(name, basin, meshes[name], nodes, joined)
+        yield from walls.misfits(name, basin, meshes[name], nodes, joined, times)
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"

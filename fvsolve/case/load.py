@@ -131,7 +131,7 @@ class _Reader:
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
-            self.add(basins.misfits(*parts.values(), meshes, properties))
+            self.add(basins.misfits(*parts.values(), meshes, properties, (numerics.start, numerics.end)))
             self.add(check.claims(expect, numerics))
             carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
             numerics = numerics.filled(has_cells, carries)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.exact.schedule import value
 from fvsolve.parts.formula import Formula
 from fvsolve.units import show
 
-AXES = {"west": 0, "east": 0, "south": 1, "north": 1}
+SAMPLES = 1001  # of a travel
 FLAT = 1e-12  # of the height of a bed, what counts as none of it
 
 
@@ -40,15 +41,17 @@ def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
     return np.clip(1.0 - (high - at if side > 0.0 else at - low) / zone, 0.0, 1.0)
 
 
-def misfits(name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str]) -> Iterator[tuple[tuple, str]]:
-    """Faults of walls that move."""
+def misfits(
+    name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str], times: tuple[float, float]
+) -> Iterator[tuple[tuple, str]]:
+    """Faults of walls that move; times : of start and end [s]."""
     key = ("nodes", name, "patches")
     for patch, one in basin.patches.items():
         if one.zone is not None and not one.moves:
             yield (*key, patch, "zone"), "goes with a wall that moves; give it body or travel"
     walls = {patch: one for patch, one in moving(basin).items() if patch in mesh.patches[:-1]}
     for patch, one in walls.items():
-        yield from (((*key, patch, *below), text) for below, text in wall_faults(name, basin, mesh, patch, one, nodes))
+        yield from (((*key, patch, *below), text) for below, text in wall_faults(basin, mesh, patch, one, nodes, times))
         if f"{name}.{patch}" in joined:
             yield (*key, patch), "a link joins here, and it is a wall that moves; join a patch that stands still"
     yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls))
@@ -56,7 +59,7 @@ def misfits(name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set
         yield ("nodes", name, "holes"), "would be drawn out where lines move; wanted none beside a wall that moves"
 
 
-def wall_faults(name: str, basin: Any, mesh: Any, patch: str, one: Any, nodes: dict) -> Iterator[tuple[tuple, str]]:
+def wall_faults(basin: Any, mesh: Any, patch: str, one: Any, nodes: dict, times: tuple) -> Iterator[tuple[tuple, str]]:
     """Faults of one wall, as keys below it."""
     if not basin.own.moves:
         yield (), f"walls do not move in physics {show(basin.physics)}"
@@ -77,7 +80,7 @@ def wall_faults(name: str, basin: Any, mesh: Any, patch: str, one: Any, nodes: d
     if zone > size * (1.0 + 1e-9):
         yield ("zone",), f"{zone:g} m is more than there is along {'xy'[axis]}, {size:g} m"
     if one.travel is not None:
-        yield from ((("travel",), text) for text in travel_faults(one.travel, side, zone))
+        yield from ((("travel",), text) for text in travel_faults(one.travel, side, zone, times))
     if isinstance(getattr(basin, "bed", None), Formula):
         yield from bed_faults(basin, mesh, patch)
 
@@ -93,12 +96,13 @@ def body_faults(name: str, nodes: dict[str, Any]) -> Iterator[str]:
         yield f"{name} is {still}; wanted a mass, or travel in its place"
 
 
-def travel_faults(travel: Any, side: float, zone: float) -> Iterator[str]:
+def travel_faults(travel: Any, side: float, zone: float, times: tuple[float, float]) -> Iterator[str]:
     """Faults of how far a wall is to move: jumps, and all of its zone used up."""
     if travel.kind == "step":
         yield "jumps, and a wall has a speed; wanted one without jumps, for example a ramp"
-    mean, amplitude, _, phase = travel.wave or (travel.first, 0.0, 1.0, 0.0)
-    inward = float((-side * (travel.value - mean - amplitude * np.sin(phase))).max())
+    inside = travel.time[(travel.time > times[0]) & (travel.time < times[1])]
+    places = value(travel, np.concatenate([np.linspace(*times, SAMPLES), inside]))
+    inward = float((side * (places[0] - places)).max())
     if inward >= zone:
         yield f"comes {inward:g} m inward, and the zone behind it is {zone:g} m wide; wanted less, or a wider zone"
 

@@ -385,15 +385,16 @@ PATCHES = np.dtype(
         ("node", "i8"),
         ("first", "i8"),  # of its cells in `integers`
         ("count", "i8"),
-        ("area", "f8"),  # of these [m2]
+        ("sizes", "i8"),  # in `plane`: area of these [m2] and length of its faces [m], now
         (
             "ring",
             "i8",
         ),  # of its faces' numbers in `integers`, as the boundary has them; of cells behind these after them
         ("faces", "i8"),  # how many these are
-        ("length", "f8"),  # of these [m]
-        ("normals", "i8"),  # in `plane`: outward normals along x, along y, and length over area of cells, of each
+        ("normals", "i8"),  # in `plane`: outward normals along x, along y, and length over area of cells, of each; with
+        # walls that move these as drawn besides
         ("open", "i8"),  # 1 where it is no wall and no link joins: what passes is the boundary's
+        ("moves", "i8"),  # 1 where it is a wall that moves
         ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
     ],
     align=True,

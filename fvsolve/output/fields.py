@@ -37,8 +37,9 @@ class FieldSeries:
         self.folder = folder
         self.frames = 0
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
+        self.places = places
         if model.pipes:
-            places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
+            self.places = places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = geometry(model, places)
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
@@ -76,6 +77,8 @@ class FieldSeries:
         for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
             file = f"fields/{basin}-{self.frames:06d}.vtu"
             found = {key: parted(value, cells) for key, value in frame[basin].items()}
+            if basin in frame["points"]:  # between walls that move
+                points = np.column_stack([self.places[basin] + frame["points"][basin], points[:, 2]])
             write_frame(self.folder / file, points, cells, found, units)
             self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
         if not self.pipes:

@@ -113,3 +113,32 @@ def test_a_free_piston_on_a_spring_swings_at_the_root_of_the_cotangent_law(metho
         errors.append(np.abs(result["lid.velocity"] - wanted).max() / 1e-4)
     assert errors[1] < 0.3 * errors[0]
     assert errors[1] < 4e-3
+
+
+# what is carried, and what rides ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
+@pytest.mark.parametrize("method", ["ssp-rk3", "radau-iia-3"])
+def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_that_swing(scheme, method):
+    swings = {"mean": 0.1, "amplitude": 0.25, "period": 1.1, "phase": 0.4}
+    patches = {
+        "left": {"side": "west", "travel": swings, "zone": 0.9},
+        "right": {"side": "east", "travel": straight(-0.3)},
+    }
+    more = {"start": {"level": "1 + 0.1 * cos(3 * x) * cos(2 * y)", "u": "0.2 * x", "v": "0.1 * y"}}
+    nodes = {"b": flume(patches, 24, 4, **more, scalars={"even": 3.0, "patchy": "1 + x"})}
+    scalars = {"even": {"initial": 3.0}, "patchy": {"initial": 1.0}}
+    step = {"courant": 0.5} if method == "ssp-rk3" else {"step": 0.01}
+    case = scene(nodes, {}, 0.8, {"scheme": scheme, "method": method, **step}, scalars=scalars)
+    model, state = moved(case, 0.8)
+    basin = model.basins[0]
+    values = basin.values(state.y)
+    close = 1e-12 if method == "ssp-rk3" else 1e-8
+    assert values["even"] == pytest.approx(3.0, abs=close)
+    held = basin.held()
+    for first, last in zip(basin.amounts(model.start), basin.amounts(state.y), strict=True):
+        assert np.sum(held * last) == pytest.approx(np.sum(held * first), rel=close)
+    mass, change = model.contents(state.y)
+    assert abs(change) < close * mass
+    assert np.ptp(values["patchy"]) > 0.5

@@ -5,7 +5,7 @@ It stores rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)) per area. Rows: see `basin
 
 from math import sqrt
 
-from fvsolve.basins.behind import counted, weight
+from fvsolve.basins.behind import area_of, counted, length_of, weight
 from fvsolve.basins.energy import at_rest, row_of
 from fvsolve.basins.free_surface.friction import FASTEST
 from fvsolve.basins.free_surface.rows import THIN
@@ -35,7 +35,7 @@ def add_power(t, y, dydt, out, handle, power):
             water_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
     for k in range(patches.size):
         patch, node = patches[k], patches[k]["node"]
-        if tables.basins[patch["basin"]]["kind"] == MINE:
+        if tables.basins[patch["basin"]]["kind"] == MINE and patch["moves"] == 0:
             flow = out[layout["net"] + node] + out[layout["supply"] + node]
             power[row_of(tables, power, patch["basin"]) + 1] += patch_loss(tables, patch, flow, y)
 
@@ -93,7 +93,7 @@ def patch_loss(tables, patch, flow, y):
         depth = max(depths[i] + y[o + i], 0.0)
         share, wide = per_flow(depth), plane[at + 2 * many + m] * area[i]
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
-        away = -each * weight(plane, basin, leaves, i, y) * patch["area"] / patch["length"]
+        away = -each * weight(plane, basin, leaves, i, y) * area_of(tables, patch) / length_of(tables, patch)
         along = u * plane[at + m] + v * plane[at + many + m]
         held = away - st["rho"] * depth * along  # against a wall all that runs into it is lost
         lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * held

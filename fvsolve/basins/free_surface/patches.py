@@ -2,7 +2,17 @@
 
 from math import inf, sqrt
 
-from fvsolve.basins.behind import HARDLY, SHALLOW, counted, depth_behind, to_be_had, weight, weight_out
+from fvsolve.basins.behind import (
+    HARDLY,
+    SHALLOW,
+    area_of,
+    counted,
+    depth_behind,
+    length_of,
+    to_be_had,
+    weight,
+    weight_out,
+)
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import give_way
@@ -36,7 +46,7 @@ def water_behind(tables, patch, y):
         volume, squares = volume + part, squares + part * weight_out(h)
         rise += part * (plane[plan + n + i] + y[basin["y"] + i] - rest)
         depth += part * h
-    hardly = max(HARDLY * patch["area"] - volume, 0.0)
+    hardly = max(HARDLY * area_of(tables, patch) - volume, 0.0)
     total = volume + hardly
     return (rise + hardly * (lowest - rest)) / total, depth / total, volume, squares
 
@@ -52,8 +62,9 @@ def patch_pressures(t, y, dydt, out, handle):
             continue
         node = tables.nodes[patch["node"]]
         stored, depth, volume, squares = water_behind(tables, patch, y)
-        slope, content = st["rho"] * st["gravity"], st["rho"] * patch["area"]
-        spread = patch["area"] * squares / (volume * volume) if volume > HARDLY * patch["area"] else 1.0
+        area = area_of(tables, patch)
+        slope, content = st["rho"] * st["gravity"], st["rho"] * area
+        spread = area * squares / (volume * volume) if volume > HARDLY * area else 1.0
         out[layout["pressure"] + patch["node"]] = slope * stored
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["had"] + node["row"]] = to_be_had(depth)
@@ -87,7 +98,7 @@ def pass_patch(tables, patch, asked, y, dydt, out):
     flow = had * asked / (rho * total)  # of depth, over weights [1/s]
     for m in range(patch["count"] if dydt.size > 0 else 0):
         dydt[o + integers[first + m]] += flow * weight(plane, basin, leaves, integers[first + m], y)
-    per_width = -flow * patch["area"] / patch["length"]  # over weights [m/s]
+    per_width = -flow * area_of(tables, patch) / length_of(tables, patch)  # over weights [m/s]
     for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
         k = integers[patch["ring"] + patch["faces"] + m]
         out_per_width = per_width * weight(plane, basin, leaves, k, y)
@@ -113,5 +124,5 @@ def quickest_inflow(t, y, dydt, out, handle):
         taker = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
         for p in range(patches.size if tables.nodes[taker]["kind"] == PATCH else 0):
             if patches[p]["node"] == taker and tables.basins[patches[p]["basin"]]["kind"] == MINE:
-                wide = sqrt(patches[p]["area"] / patches[p]["count"])
+                wide = sqrt(area_of(tables, patches[p]) / patches[p]["count"])
                 out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)

@@ -2,6 +2,7 @@
 
 from math import log1p
 
+from fvsolve.basins.behind import area_of, length_of
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import give_way
 from fvsolve.jit import njit
@@ -18,7 +19,7 @@ def mean_deviation(tables, patch, y):
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
         total += tables.plane[basin["area"] + i] * y[basin["y"] + i]
-    return total / patch["area"]
+    return total / area_of(tables, patch)
 
 
 @njit
@@ -39,7 +40,7 @@ def patch_pressures(t, y, dydt, out, handle):
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["had"] + node["row"]] = 1.0
-        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch["area"])
+        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of(tables, patch))
 
 
 @njit
@@ -52,10 +53,10 @@ def patch_flows(t, y, dydt, out, handle):
         if basin["kind"] != MINE:
             continue
         asked = out[tables.layout[0]["net"] + patch["node"]]
-        n, flow = basin["n"], asked / (basin["thickness"] * patch["area"])
+        n, flow = basin["n"], asked / (basin["thickness"] * area_of(tables, patch))
         for m in range(patch["count"]):
             dydt[basin["y"] + tables.integers[patch["first"] + m]] += flow
         for m in range(patch["faces"]):
             i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
-            push = -basin["speed"] * asked / (basin["thickness"] * patch["length"])
+            push = -basin["speed"] * asked / (basin["thickness"] * length_of(tables, patch))
             give_way(tables.plane, patch, m, push, dydt, i + n, i + 2 * n)

@@ -1,5 +1,6 @@
 """Liquids under law `table`: rates, pressures of patches, probes. Knows the tables; knows no flux."""
 
+from fvsolve.basins.behind import area_of
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.liquid.observe import PRESSURE
 from fvsolve.basins.liquid.patches import mean_deviation
@@ -46,7 +47,7 @@ def patch_pressures(t, y, dydt, out, handle):
         table = tables.plane[basin["table"] :]
         found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, y))
         out[layout["pressure"] + patch["node"]] = found
-        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch["area"])
+        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of(tables, patch))
 
 
 @njit
