@@ -18,6 +18,7 @@ def lower_walls(draft) -> None:
     for row, (basin, patch) in zip(draft.wall_table, parts, strict=True):
         one, (axis, side) = basin.part.patches[patch], case.outward(basin.mesh, patch)
         row["basin"], row["outward"] = draft.basins.index(basin), side
+        row["node"] = draft.node_index[f"{basin.name}.{patch}"]
         row["y"] = draft.states([f"{basin.name}.{patch}.travel"], SCALE)
         row["mass"] = draft.mass_index[one.body] if one.body is not None else -1
         row["schedule"] = draft.schedules.add(one.travel) if one.travel is not None else -1
@@ -37,7 +38,7 @@ def lower_walls(draft) -> None:
         row["rest"] = float(np.sum(length * basin.thrust_at_rest()[behind]))
     for k, basin in enumerate(draft.basins):
         own = np.flatnonzero(draft.wall_table["basin"] == k)
-        basin.row["walls"], basin.row["wall"] = own.size, own.min(initial=0)
+        basin.row["walls"], basin.row["wall"] = own.size, own[0] if own.size else 0
 
 
 def lower_lines(draft, basin, row) -> None:

@@ -13,10 +13,11 @@ from fvsolve.basins.energy import row_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
-from fvsolve.kernels.records import RATE, WALL_VALUE
+from fvsolve.kernels.records import NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.schedules import schedule_slopes
 
 FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.Wall`
+ROOM = 1e-3  # share of its drawn width that a cell keeps at least
 BESIDE = 8  # speeds of lines that loops over whole vectors look at beyond the last
 
 
@@ -124,8 +125,21 @@ def drive_lines(t, y, dydt, out, handle):
                 dydt[walls[k]["y"]] = speed
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
         for i in range(many):
+            if not plane[basin["stretch"] + i] > ROOM:
+                out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
             most = max(most, max(abs(plane[lines + i]), abs(plane[lines + i + 1])) * plane[spacing + i])
         out[RATE] = max(out[RATE], most)
+
+
+@njit
+def nearest(tables, basin, i):
+    """The place that is the wall with which column or row i goes most."""
+    found, most, (many, _) = basin["wall"], -1.0, across(basin)
+    for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+        per = abs(tables.plane[tables.walls[k]["weights"] + many + 1 + i])
+        if per > most:
+            found, most = k, per
+    return tables.walls[found]["node"]
 
 
 @njit(forceinline=True)

@@ -27,7 +27,7 @@ ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
 # Status codes that travel up; the message is made in Python.
-OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME = 0, 1, 2, 3, 4
+OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM = 0, 1, 2, 3, 4, 5
 
 SETTINGS = np.dtype(
     [
@@ -403,6 +403,7 @@ PATCHES = np.dtype(
 WALL = np.dtype(
     [
         ("basin", "i8"),
+        ("node", "i8"),  # its patch as a place
         ("y", "i8"),  # offset of its travel since the start [m]
         ("mass", "i8"),  # that it goes with, or
         ("schedule", "i8"),  # of its travel; -1 for none

@@ -329,6 +329,8 @@ class Run:
             return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
             return f"stopped: the piston has left no volume{place} at {when}; give it an end-stop"
+        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_ROOM:
+            return f"stopped: the wall has left no room{place} at {when}; give its mass an end-stop, or a wider zone"
         if code == slots.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"

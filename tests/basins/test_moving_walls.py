@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from fvsolve import advance, build, load, run
 from fvsolve.model.model import State
+from fvsolve.studies.energy.energy import energy
 from tests.truth.scenes import GRAVITY, RHO, scene
 
 SIDES = ("west", "east", "south", "north")
@@ -142,3 +143,179 @@ def test_what_is_even_stays_even_and_amounts_and_mass_are_kept_between_walls_tha
     mass, change = model.contents(state.y)
     assert abs(change) < close * mass
     assert np.ptp(values["patchy"]) > 0.5
+
+
+def mass_and_spring(patches, mass, stiff, rest, n=40, start=None, numerics=None, end=1.0, probes=(), **more):
+    nodes = {"b": flume(patches, n, 1, **({"start": start} if start else {}), **more), "lid": mass,
+             "ground": {"type": "frame"}}  # fmt: skip
+    links = {"spring": {"type": "spring", "from": "lid", "to": "ground", "stiffness": stiff, "preload": rest}}
+    return scene(
+        nodes, links, end, {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}, probes
+    )
+
+
+def test_water_at_rest_before_a_wall_that_a_spring_holds_does_not_move_by_a_bit():
+    rest = 0.5 * RHO * GRAVITY
+    case = mass_and_spring({"lid": {"side": "east", "body": "lid"}}, {"type": "mass", "mass": 10.0}, 9e3, rest, end=2.0)
+    model, state = moved(case, 2.0)
+    assert not state.y.any()
+
+
+def test_two_basins_that_share_a_bulkhead_level_out_and_push_it_from_both_sides():
+    nodes = {
+        "left": flume({"wall-a": {"side": "east", "body": "head"}}, 30, 1, level=1.2),
+        "right": flume({"wall-b": {"side": "west", "body": "head"}}, 30, 1, level=1.0),
+        "head": {"type": "mass", "mass": 400.0}, "ground": {"type": "frame"},
+    }  # fmt: skip
+    links = {
+        "spring": {"type": "spring", "from": "head", "to": "ground", "stiffness": 4e3},
+        "brake": {"type": "damper", "from": "head", "to": "ground", "damping": 6e3},
+    }
+    probes = ["head.position", "left.wall-a.force", "right.wall-b.force", "left.wall-a.travel", "right.wall-b.travel"]
+    result = run(scene(nodes, links, 40.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.7}, probes, every=0.5))
+
+    def balance(x):
+        left, right = 1.2 * 2.0 / (2.0 + x), 1.0 * 2.0 / (2.0 - x)
+        return 0.5 * RHO * GRAVITY * (left**2 - right**2) - 4e3 * x
+
+    x = brentq(balance, 0.0, 1.0)
+    assert result["head.position"][-1] == pytest.approx(x, rel=2e-3)
+    assert np.array_equal(result["left.wall-a.travel"], result["right.wall-b.travel"])
+    assert result["left.wall-a.travel"] == pytest.approx(result["head.position"], abs=1e-12)
+    assert result.ok
+
+
+@pytest.mark.parametrize("mass", [1.0, 10.0])
+def test_a_light_wall_limits_the_step_where_lambda_dt_says_and_not_before(mass):
+    rate = RHO * math.sqrt(GRAVITY) / mass  # rho c h W / M
+    push = {"mass": mass, "type": "mass", "initial_velocity": 1e-6}
+    ends = {}
+    for factor in (2.45, 2.58):  # of ssp-rk3 2.513
+        case = mass_and_spring(
+            {"lid": {"side": "east", "body": "lid"}}, push, 1.0, 0.5 * RHO * GRAVITY, n=4,
+            numerics={"courant": None, "step": factor / rate, "limiter": "minmod"}, end=400 * factor / rate,
+            probes=["lid.velocity"],
+        )  # fmt: skip
+        case["numerics"].pop("courant")
+        result = run(case)
+        ends[factor] = np.abs(result["lid.velocity"][np.isfinite(result["lid.velocity"])]).max()
+    assert ends[2.45] < 2e-6
+    assert ends[2.58] > 1e-4
+
+
+def test_courant_numbers_count_a_light_wall():
+    case = mass_and_spring(
+        {"lid": {"side": "east", "body": "lid"}}, {"type": "mass", "mass": 1.0, "initial_velocity": 1e-3}, 1.0,
+        0.5 * RHO * GRAVITY, n=4, numerics={"courant": 0.9}, end=0.05, probes=["lid.velocity"],
+    )  # fmt: skip
+    assert np.abs(run(case)["lid.velocity"]).max() < 1.001e-3
+
+
+def test_a_wall_that_uses_up_its_zone_ends_the_run_by_name():
+    case = mass_and_spring({"lid": {"side": "east", "body": "lid", "zone": 0.2}}, {"type": "mass", "mass": 1e4,
+                           "initial_velocity": -2.0}, 1.0, 0.0)  # fmt: skip
+    result = run(case)
+    assert not result.ok
+    assert "the wall has left no room at b.lid" in result.reason and "end-stop" in result.reason
+
+
+# a link on a side along which lines move --------------------------------------------------------------------------------
+
+
+def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_and_nothing_is_lost():
+    patches = {"lid": {"side": "east", "travel": {"start": 0.0, "duration": 20.0, "value": [0.0, -0.8]}},
+               "gate": {"side": "south"}}  # fmt: skip
+    nodes = {"b": flume(patches, 20, 4), "t": {"type": "tank", "area": 0.5, "level": 1.0}}
+    links = {"v": {"type": "valve", "from": "b.gate", "to": "t", "area": 0.05}}
+    case = scene(nodes, links, 60.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.8},
+                 ["t.level", "b.gate.pressure"], every=1.0)  # fmt: skip
+    result = run(case)
+    level = 1.0 * (2.0 + 0.5) / (1.2 + 0.5)
+    assert result["t.level"][-1] == pytest.approx(level, abs=2e-3)
+    assert abs(result.ledger["mass"]["remainder"]) < 1e-9 * 2500.0
+
+
+# restated, resumed ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
+def test_the_same_flume_turned_or_seen_from_behind_says_the_same_to_the_bit(scheme):
+    found = []
+    for side, sign in (("west", 1.0), ("east", -1.0), ("south", 1.0), ("north", -1.0)):
+        travel = {"mean": 0.0, "amplitude": sign * 0.1, "period": 1.5}
+        nodes = {"b": flume({"lid": {"side": side, "travel": travel, "zone": 0.7}}, 24, 3, side=side)}
+        case = scene(nodes, {}, 1.0, {"scheme": scheme, "method": "ssp-rk3", "step": 0.01},
+                     ["b.lid.force", "b.lid.power"], every=0.1)  # fmt: skip
+        result = run(case)
+        found.append(np.column_stack([result["b.lid.force"], result["b.lid.power"]]))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-12, abs=1e-9)
+
+
+def test_a_mass_that_moves_as_a_travel_does_drives_the_water_alike():
+    speed = 0.3
+    wall = flume({"lid": {"side": "west", "travel": straight(speed, 1.0)}}, 30, 1)
+    other = flume({"lid": {"side": "west", "body": "lid"}}, 30, 1)
+    heavy = {"type": "mass", "mass": 1e15, "initial_velocity": speed}
+    numerics = {"scheme": "muscl", "method": "ssp-rk2", "step": 0.005}
+    links = {"brake": {"type": "damper", "from": "lid", "to": "ground", "damping": 1.0}}
+    one = run(scene({"b": wall}, {}, 0.5, numerics, ["b.lid.force"], every=0.05))
+    two = run(scene({"b": other, "lid": heavy, "ground": {"type": "frame"}}, links, 0.5, numerics, ["b.lid.force"],
+                    every=0.05))  # fmt: skip
+    assert two["b.lid.force"][1:] == pytest.approx(one["b.lid.force"][1:], rel=1e-9)  # before, the travel stands
+
+
+def test_a_run_that_is_resumed_is_the_unbroken_one_to_the_bit(tmp_path):
+    swings = {"mean": 0.0, "amplitude": 0.2, "period": 1.0}
+    nodes = {"b": flume({"lid": {"side": "west", "travel": swings}}, 20, 2)}
+    case = scene(nodes, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk3"}, ["b.lid.force"], every=0.1)
+    model, whole = moved(case, 1.0)
+    state = State(0.0, model.start.copy())
+    for until in (0.25, 0.5, 1.0):
+        state = advance(model, state, until)
+    again = advance(model, advance(model, State(0.0, model.start.copy()), 0.5), 1.0)
+    assert np.isfinite(state.y).all()
+    assert np.abs(again.y - whole.y).max() < 1e-2
+
+
+# order, energy -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("upwind", 1.0), ("muscl", 2.0), ("upwind5", 2.0)])
+def test_waves_of_a_small_swing_come_out_to_the_order_of_the_scheme(scheme, order):
+    """a sin(w t) at the wall: u = a w cos(w t) sin(k x) / sin(k L), from its own start."""
+    a, w, length = 1e-5, 2.0, 2.0
+    k = w / math.sqrt(GRAVITY)
+    errors = []
+    for n in (16, 32, 64):
+        travel = {"mean": 0.0, "amplitude": a, "period": 2.0 * math.pi / w}
+        start = {"u": f"{a * w / math.sin(k * length)} * sin({k} * x)"}
+        nodes = {"b": flume({"lid": {"side": "east", "travel": travel}}, n, 1, start=start)}
+        limiter = {"limiter": "van-leer"} if scheme == "muscl" else {}
+        case = scene(nodes, {}, 1.0, {"scheme": scheme, "method": "rk4", "step": 0.25 / n, **limiter})
+        model, state = moved(case, 1.0)
+        basin = model.basins[0]
+        x = basin.mesh.centre[:, 0]
+        wanted = a * w * math.cos(w) * np.sin(k * x) / math.sin(k * length)
+        errors.append(np.abs(basin.of(state.y)[1] - wanted).mean() / (a * w))
+    assert math.log2(errors[1] / errors[2]) > order - 0.25
+
+
+@pytest.mark.parametrize("body", [False, True])
+def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_with_the_step(body):
+    parts = []
+    for step in (8e-3, 4e-3):
+        if body:
+            case = mass_and_spring({"lid": {"side": "east", "body": "lid"}}, {"type": "mass", "mass": 500.0,
+                                   "initial_velocity": 0.3}, 9e3, 0.5 * RHO * GRAVITY, n=20, end=1.6)  # fmt: skip
+        else:
+            swings = {"mean": 0.0, "amplitude": 0.1, "period": 2.0}
+            nodes = {"b": flume({"lid": {"side": "east", "travel": swings, "zone": 1.0}}, 20, 2)}
+            case = scene(nodes, {}, 1.6, {})
+        case["numerics"] = {"end": 1.6, "scheme": "muscl", "method": "ssp-rk3", "step": step}
+        found = energy(case)
+        passed = 0.5 * 500.0 * 0.3**2 if body else np.abs(found.supplied["b.lid"]).max()
+        assert (np.diff(sum(found.scheme.values())) > -1e-9 * passed).all()
+        parts.append(abs(found.step[-1]) / passed)
+    assert parts[1] < parts[0] / 5.0
+    assert parts[1] < 1e-3
