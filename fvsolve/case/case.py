@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import basins, ranges, text
+from fvsolve.case import basins, bodies, ranges, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
@@ -104,9 +104,18 @@ class Case(Shown):
         for name, link in self.links.items():
             found |= link.inner(name)[0]
             if "A" in link.owns:
-                rod, case = (self.nodes[link.ports[port]].initial_position for port in ("rod", "case"))
-                found |= {f"{name}.{place}": chamber for place, chamber in link.chambers(rod - case).items()}
+                x = self.ahead(link.ports["case"], link.ports["rod"]) - link.closed_length
+                found |= {f"{name}.{place}": chamber for place, chamber in link.chambers(x).items()}
         return found
+
+    @cached_property
+    def poses(self) -> dict[str, Any]:
+        """Where bodies stand at the start, name -> `bodies.Pose`, each behind the one that it hangs on."""
+        return bodies.poses(self.nodes, self.numerics.start)
+
+    def ahead(self, first: str, second: str) -> float:
+        """How far place `second` lies ahead of `first` at the start [m]; of points their distance."""
+        return bodies.ahead(self.nodes, self.poses, first, second)
 
     @cached_property
     def conduits(self) -> dict[str, Link]:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
+from fvsolve.case import bodies
+from fvsolve.case.bodies import WORLD
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
 from fvsolve.case.sections import CAVITY_SCHEMES, Numerics
@@ -27,12 +29,18 @@ def network(table: dict[str, Any]) -> Found:
     ends: dict[str, list[str]] = {}
     complete = True
     for name, link in links.items():
-        found = _ports(_dict(link))
+        found, fits = _ports(_dict(link)), True
         for keys, place, domain in found:
             if isinstance(place, str) and place not in places:
                 yield ("links", name, *keys), _unknown_place(place, places, nodes, links)
-            elif isinstance(place, str) and None not in (domain, places[place]) and places[place] != domain:
+            elif isinstance(place, str) and None not in (domain, places[place]) and not _fits(places[place], domain):
+                fits = False
                 yield ("links", name, *keys), _unlike_place(place, domain, places, nodes, _dict(link))
+        sorts = {places.get(place): (keys, place) for keys, place, _ in found if isinstance(place, str)}
+        if fits and {"translational", "spatial"} <= set(sorts):
+            keys, place = sorts["translational"]
+            text = f"{show(place)} is a place on the axis of masses, {show(sorts['spatial'][1])} one in space"
+            yield ("links", name, *keys), f"{text}; wanted both of one kind, of a frame one of its points"
         joined = [place for _, place, _ in found if isinstance(place, str)]
         for k, (keys, place, _) in enumerate(found):
             if isinstance(place, str) and place in [other for _, other, _ in found[:k]]:
@@ -40,22 +48,27 @@ def network(table: dict[str, Any]) -> Found:
         complete = complete and len(set(joined)) == len(found) and all(place in places for place in joined)
         ends[name] = [place for place in [*joined, *_owned(name, link)] if place in places]
     for group in ("nodes", "links"):
-        if table.get(group) == {} and not any(own_places(name, node) is not None for name, node in nodes.items()):
+        kinds = [_dict(node).get("type") for node in nodes.values()]
+        alone = "body" in kinds or any(own_places(name, node) is not None for name, node in nodes.items())
+        if table.get(group) == {} and not alone:
             yield (group,), "is empty; wanted two places and a link between them at least"
     tied = {name: _tied(name, node, places) for name, node in nodes.items()}
-    touched = {place for some in (ends, tied) for places in some.values() for place in places}
+    hanging = _hanging(nodes)
+    touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
     for name, node in nodes.items():
-        if own_places(name, node) is None and name not in touched:
+        if own_places(name, node) is None and not touched & {name, *_points(name, node)}:
             yield ("nodes", name), "no link touches it"
     if not complete:
         return  # what hangs together is not known
     own = {name: places for name, places in tied.items() if places}
+    own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := _points(name, node))}
+    own |= {f"{k}..": group for k, group in enumerate(hanging)}
     islands = _islands(own | {f"links.{name}": places for name, places in ends.items()})
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
         yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
     for island in islands:
-        wet = [name for name in island if places[name] not in ("translational", "rotational")]
+        wet = [name for name in island if places[name] in ("hydraulic", None)]
         kinds = [_kind("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
         if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(islands) == 1 else f" of {listing(island, 6)}"
@@ -64,7 +77,13 @@ def network(table: dict[str, Any]) -> Found:
 
 
 def parts(
-    nodes: dict[str, Any], links: dict[str, Any], ambient: float, gravity: float | None, fluid: Any, raw: Raw
+    nodes: dict[str, Any],
+    links: dict[str, Any],
+    ambient: float,
+    gravity: float | None,
+    fluid: Any,
+    raw: Raw,
+    start: float,
 ) -> Found:
     """Faults of elevations, and what each part finds wrong beside the others."""
     yield from _elevations(nodes, links)
@@ -74,7 +93,9 @@ def parts(
             for keys, text in _vacuum((group, name, key), pressures, fluid, raw):
                 yield (ROOT, *keys), text
 
-    around = Around(nodes, links, ambient, gravity, fluid, vacuum)
+    yield from bodies.misfits(nodes)
+    poses = bodies.poses(nodes, start)
+    around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():
             for keys, text in part.faults(name, around):
@@ -146,12 +167,36 @@ def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:
     return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
 
 
+def _points(name: str, node: Any) -> list[str]:
+    """Points of a node, as others name them."""
+    kind = _kind("nodes", node)
+    return [f"{name}.{one}" for one in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
+
+
+def _hanging(nodes: dict[str, Any]) -> list[list[str]]:
+    """Of every body what it is joined to, and of every frame with points the world."""
+    found = []
+    for name, node in nodes.items():
+        kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
+        if kind == "body":
+            found.append([name, on] if isinstance(on, str) and on.partition(".")[0] in nodes else [name, WORLD])
+        elif kind == "frame" and _points(name, node):
+            found.append([_points(name, node)[0], WORLD])
+    return found
+
+
+def _fits(domain: str, wanted: str) -> bool:
+    """Whether a place of a domain suits a port that takes one of some."""
+    return domain in wanted.split(" or ")
+
+
 def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | None]:
     """Every place -> its domain, None where its type is at fault."""
     found: dict[str, str | None] = {}
     for name, node in nodes.items():
         kind, own = _kind("nodes", node), own_places(name, node)
         found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
+        found |= dict.fromkeys(_points(name, node), "spatial")
     return found | {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
 
 
@@ -181,8 +226,9 @@ def chambers_of(link: Any) -> list[str]:
 
 def _unlike_place(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
     owned = "shaft" if places[place] == "rotational" else "chamber"
+    owned = "point" if places[place] == "spatial" else owned
     what = f"is a {nodes[place]['type']}" if place in nodes else f"is a {owned}"
-    alike = [name for name, other in places.items() if other == domain]
+    alike = [name for name, other in places.items() if _fits(other or "", domain)]
     has = f"; {domain} places are {listing(alike)}" if alike else ""
     return f"{show(place)} {what}, a {places[place]} place, and this port of a {link['type']} a {domain} one{has}"
 
@@ -203,7 +249,7 @@ def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
     islands: dict[str, list[str]] = {}
     for name in list(root):
         islands.setdefault(find(name), []).append(name)
-    return list(islands.values())
+    return [[name for name in island if name != WORLD] for island in islands.values()]
 
 
 def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Found:

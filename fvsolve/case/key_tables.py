@@ -16,7 +16,9 @@ from fvsolve.case.sections import FluidSpec, Line, Numerics, Output
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
+from fvsolve.parts.attitude import Attitude
 from fvsolve.parts.basin.part import Patch, StartOfFields
+from fvsolve.parts.body.part import Joint
 from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
@@ -29,7 +31,7 @@ from fvsolve.units import DIMENSIONS, show
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "every link": TwoPort, "friction": Friction, "connection": Connection, "wall": Wall,
     "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec, "numerics": Numerics,
-    "output": Output,
+    "output": Output, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 SHARED = {Node: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}  # whose keys -> the part that has them in full
 LEFT_OUT = " if left out"

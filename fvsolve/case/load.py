@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, check, scalars, shipped, size, text
+from fvsolve.case import basins, bodies, check, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
@@ -20,6 +20,7 @@ from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
+from fvsolve.parts.body.part import Body, BodyPoint
 from fvsolve.parts.meant import MEANT
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
@@ -44,6 +45,7 @@ GROUPS = {
     "links": "what lies between them",
     "numerics": "how it is solved",
 }
+ALONE = ("basin", "body")  # nodes that need no link
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
     "signals", "scalars", "numerics", "output", "expect", "compare", "exact",
@@ -113,6 +115,10 @@ class _Reader:
         has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
+        for name, node in parts["nodes"].items():
+            if isinstance(node, Body):
+                kinds["nodes"][name] = bodies.Riding(node)
+            kinds["nodes"] |= {f"{name}.{point}": BodyPoint for point in getattr(node, "points", {})}
         for name, kind in [*kinds["nodes"].items()]:
             if kind is Basin and name not in meshes:
                 kinds["nodes"][name] = None  # at fault itself
@@ -125,9 +131,8 @@ class _Reader:
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.with_patches(meshes)))
-        self.add(
-            check.parts(parts["nodes"], parts["links"], self.setting.ambient, top.get("gravity"), properties, self.raw)
-        )
+        about = self.setting.ambient, top.get("gravity"), properties, self.raw
+        self.add(check.parts(*parts.values(), *about, numerics.start if numerics is not None else 0.0))
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
@@ -278,7 +283,7 @@ class _Reader:
         return found
 
     def parts(self, group: str) -> dict[str, Any]:
-        basin = any(isinstance(one, dict) and one.get("type") == "basin" for one in self.group("nodes").values())
+        basin = any(isinstance(one, dict) and one.get("type") in ALONE for one in self.group("nodes").values())
         if group not in self.raw.table and not (group == "links" and basin):
             self.fault((), f"[{group}] is missing: {GROUPS[group]}")
         made = {}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*))?")
 
 
-DEFAULT_OF_NODES = ("pressure", "head", "level", "position", "velocity")
+DEFAULT_OF_NODES = ("pressure", "head", "level", "position", "velocity", "angle", "travel")
 DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 
 

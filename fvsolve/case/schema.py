@@ -7,7 +7,7 @@ from collections import Counter
 from json import dumps, loads
 from typing import Any
 
-from fvsolve.case.load import GROUPS, KEYS, TOP
+from fvsolve.case.load import ALONE, GROUPS, KEYS, TOP
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
@@ -54,9 +54,9 @@ def whole() -> dict[str, Any]:
         "properties": properties,
         "required": [group for group in GROUPS if group != "links"],
         "if": {
-            "properties": {"nodes": {"additionalProperties": {"properties": {"type": {"not": {"const": "basin"}}}}}}
+            "properties": {"nodes": {"additionalProperties": {"properties": {"type": {"not": {"enum": list(ALONE)}}}}}}
         },
-        "then": {"required": ["links"]},  # without a basin
+        "then": {"required": ["links"]},  # without a basin or a body
         "additionalProperties": False,
         "$defs": definitions,
     }

@@ -17,7 +17,7 @@ import numpy as np
 from fvsolve.jit import njit
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.masses import between, contact, motion
+from fvsolve.kernels.masses import contact, motion, piston_travel, stop_travel, travel_of
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import CHAMBER, MUSCL, SHORT, TANK, UPWIND, WENO5
 from fvsolve.kernels.rigid import column_drag
@@ -173,7 +173,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
         at += MASS
     for k in range(braces.size):
         brace = braces[k]
-        speed = between(tables, y, brace["from_mass"], brace["to_mass"])[1]
+        speed = travel_of(out, tables, k)[1]
         power[at] = out[layout["push"] + k] * speed
         if brace["schedule"] < 0:
             power[at] = -power[at]
@@ -181,7 +181,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
     first = armed.size - 2 * stops.size
     for k in range(stops.size):
         stop = stops[k]
-        x, speed = between(tables, y, stop["from_mass"], stop["to_mass"])
+        x, speed = stop_travel(out, tables, k)
         into, rate = 0.0, 0.0
         for side in range(2):
             if armed[first + 2 * k + side] > 0.0:
@@ -209,7 +209,7 @@ def power_pistons(y, dydt, out, tables, power, at):
     per = 1.0 / st["rho"]
     for k in range(pistons.size):
         piston = pistons[k]
-        speed = between(tables, y, piston["case"], piston["rod"])[1]
+        speed = piston_travel(out, tables, k)[1]
         a, b = piston["a"], piston["b"]
         drop = potential(tables, out, a) - potential(tables, out, b)
         law = 0.0
@@ -242,7 +242,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
             stored[i] = tank_energy(st, tables.floats, node, st["rho"], y[node["y"]])
     for k in range(pistons.size):
         piston = pistons[k]
-        x = between(tables, y, piston["case"], piston["rod"])[0]
+        x = piston_travel(out, tables, k)[0]
         for side in range(2):
             i, area, sweep = moving_side(tables, piston, side)
             change, p0 = out[layout["pressure"] + i], nodes[i]["pressure"] - st["ambient"]
@@ -261,7 +261,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
         change = y[column["y"]]
         stored[at] = per * column["length"] / column["area"] * change * (column["flow"] + 0.5 * change)
         at += 1
-    stored_masses(y, tables, stored, at)
+    stored_masses(y, out, tables, stored, at)
 
 
 @njit
@@ -295,7 +295,7 @@ def level_moment(floats, shape, rows, level):
 
 
 @njit
-def stored_masses(y, tables, stored, at):
+def stored_masses(y, out, tables, stored, at):
     """Rows of masses, braces and stops from row `at` on."""
     masses, braces, stops = tables.masses, tables.braces, tables.stops
     for i in range(masses.size):
@@ -305,14 +305,14 @@ def stored_masses(y, tables, stored, at):
             stored[at] = change * (masses[i]["velocity"] + 0.5 * change) / masses[i]["lightness"]
         at += 1
     for k in range(braces.size):
-        x = between(tables, y, braces[k]["from_mass"], braces[k]["to_mass"])[0]
+        x = travel_of(out, tables, k)[0]
         stored[at] = x * (0.5 * braces[k]["stiffness"] * x - braces[k]["force"])
         if braces[k]["stiffness"] == 0.0:
             stored[at] = 0.0
         at += 1
     for k in range(stops.size):
         stop = stops[k]
-        x = between(tables, y, stop["from_mass"], stop["to_mass"])[0]
+        x = stop_travel(out, tables, k)[0]
         now, then = (
             max(0.0, max(-(stop["below"] + x), x - stop["above"])),
             max(0.0, max(-stop["below"], -stop["above"])),

@@ -28,7 +28,7 @@ from fvsolve.kernels.energy import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.masses import between, leak_flow
+from fvsolve.kernels.masses import leak_flow, piston_travel
 from fvsolve.kernels.records import CHAMBER, JUNCTION, LAW_LINEAR, TANK
 from fvsolve.kernels.rigid import column_drag
 
@@ -175,7 +175,7 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
     pressure = tables.layout[0]["pressure"]
     for k in range(pistons.size):
         piston = pistons[k]
-        speed = between(tables, y, piston["case"], piston["rod"])[1]
+        speed = piston_travel(out, tables, k)[1]
         a, b = piston["a"], piston["b"]
         for side in range(2):
             i, area, sweep = moving_side(tables, piston, side)
@@ -212,7 +212,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
             stored[i] = tank_energy(st, floats, node, node["density"], y[node["y"]])
     for k in range(pistons.size):
         piston = pistons[k]
-        x = between(tables, y, piston["case"], piston["rod"])[0]
+        x = piston_travel(out, tables, k)[0]
         for side in range(2):
             i, area, sweep = moving_side(tables, piston, side)
             node, p0 = nodes[i], nodes[i]["pressure"]
@@ -233,7 +233,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
         size = column["length"] / (column["area"] * st["rho"])
         stored[at] = size * change * (column["flow"] + 0.5 * change)
         at += 1
-    stored_masses(y, tables, stored, at)
+    stored_masses(y, out, tables, stored, at)
 
 
 @njit

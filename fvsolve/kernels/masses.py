@@ -1,9 +1,11 @@
-"""Masses on one axis and what pushes them: pistons, springs, dampers, forces, stops. Knows the tables; solves no step.
+"""Masses on one axis, and pistons, springs, dampers, forces, stops, which may push bodies as well. Solves no step.
 
 Wraps the rhs of the fluid: first the pressures of moving chambers and what their pistons sweep, then the fluid, then
 forces and accelerations. A chamber's state is its excess mass e over what its volume V would hold at the density
 m0 / V0 of the start, so that it is the pressure that is stepped and not the small difference of two large masses:
 p - p0 = beta e / (rho0 V) under `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under `log` and `table`.
+A push goes by its travel in `out`, wherever it acts: on the axis that of two masses, of bodies that of two points,
+which `kernels.mechanism.lines` has written. Its masses are then one that stands still, and it pushes none.
 """
 
 from math import log, log1p, sqrt
@@ -40,6 +42,44 @@ def between(tables, y, i, j):
     x_i, v_i = motion(tables.masses[i], y)
     x_j, v_j = motion(tables.masses[j], y)
     return x_j - x_i, v_j - v_i
+
+
+@njit(forceinline=True)
+def travel_of(out, tables, k):
+    """(change of length, its rate) of push k: of springs and their like, then of stops, then of pistons."""
+    at = tables.layout[0]["travel"] + 2 * k
+    return out[at], out[at + 1]
+
+
+@njit
+def travels(y, out, tables):
+    """Travel of all pushes on the axis into `out`; those on lines between points stand there."""
+    braces, stops, pistons = tables.braces, tables.stops, tables.pistons
+    at = tables.layout[0]["travel"]
+    for k in range(braces.size):
+        if braces[k]["line"] < 0:
+            out[at], out[at + 1] = between(tables, y, braces[k]["from_mass"], braces[k]["to_mass"])
+        at += 2
+    for k in range(stops.size):
+        if stops[k]["line"] < 0:
+            out[at], out[at + 1] = between(tables, y, stops[k]["from_mass"], stops[k]["to_mass"])
+        at += 2
+    for k in range(pistons.size):
+        if pistons[k]["line"] < 0:
+            out[at], out[at + 1] = between(tables, y, pistons[k]["case"], pistons[k]["rod"])
+        at += 2
+
+
+@njit(forceinline=True)
+def stop_travel(out, tables, k):
+    """Travel of stop k."""
+    return travel_of(out, tables, tables.braces.size + k)
+
+
+@njit(forceinline=True)
+def piston_travel(out, tables, k):
+    """Travel of piston k."""
+    return travel_of(out, tables, tables.braces.size + tables.stops.size + k)
 
 
 @njit(forceinline=True)
@@ -80,9 +120,10 @@ def chambers(t, y, dydt, out, handle):
     """Pressures and stiffness of moving chambers, and the flow that the piston and its leak take from each."""
     tables = open_tables(handle)
     layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
+    travels(y, out, tables)
     for k in range(pistons.size):
         piston = pistons[k]
-        x, speed = between(tables, y, piston["case"], piston["rod"])
+        x, speed = piston_travel(out, tables, k)
         for side in range(2):
             i = piston["b"] if side == 1 else piston["a"]
             area = -piston["area_b"] if side == 1 else piston["area_a"]
@@ -118,7 +159,7 @@ def forces(t, y, out, tables):
         out[layout["net_force"] + i] = masses[i]["force"]
     for k in range(braces.size):
         brace = braces[k]
-        x, speed = between(tables, y, brace["from_mass"], brace["to_mass"])
+        x, speed = travel_of(out, tables, k)
         change = -brace["stiffness"] * x - brace["damping"] * (speed - brace["speed"])
         if brace["schedule"] >= 0:
             change += schedule_value(tables, brace["schedule"], t) - brace["given"]
@@ -126,7 +167,7 @@ def forces(t, y, out, tables):
     first = armed.size - 2 * stops.size
     for k in range(stops.size):
         stop = stops[k]
-        x, speed = between(tables, y, stop["from_mass"], stop["to_mass"])
+        x, speed = stop_travel(out, tables, k)
         total = 0.0
         if armed[first + 2 * k] > 0.0:
             total += contact(stop["stiffness"], stop["damping"], -(stop["below"] + x), -speed)
@@ -136,7 +177,7 @@ def forces(t, y, out, tables):
         push(out, tables, at, stop["from_mass"], stop["to_mass"], total - stop["force"], stop["force"])
     for k in range(pistons.size):
         piston = pistons[k]
-        _, speed = between(tables, y, piston["case"], piston["rod"])
+        _, speed = piston_travel(out, tables, k)
         change = piston["area_a"] * out[layout["pressure"] + piston["a"]]
         change -= piston["area_b"] * out[layout["pressure"] + piston["b"]]
         change -= piston["damping"] * (speed - piston["speed"])
@@ -154,25 +195,35 @@ def load(tables, i, j, stiffness, damping):
 
 
 @njit
+def held_by(out, tables, k):
+    """(stiffness, damping) of push k now: a spring's, a stop's that is in touch, a piston's between its chambers."""
+    braces, stops, pistons, armed = tables.braces, tables.stops, tables.pistons, tables.armed
+    if k < braces.size:
+        return braces[k]["stiffness"], braces[k]["damping"]
+    k -= braces.size
+    if k < stops.size:
+        first = armed.size - 2 * (stops.size - k)
+        if armed[first] + armed[first + 1] > 0.0:
+            return stops[k]["stiffness"], stops[k]["damping"]
+        return 0.0, 0.0
+    piston, stiffness, nodes = pistons[k - stops.size], tables.layout[0]["stiffness"], tables.nodes
+    stiff_a, stiff_b = out[stiffness + nodes[piston["a"]]["row"]], out[stiffness + nodes[piston["b"]]["row"]]
+    spring = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
+    return spring, piston["damping"]
+
+
+@njit
 def mechanical_rate(out, tables):
     """Greatest rate of a mass [1/s], c / 2 + sqrt(c^2 / 4 + k) with all springs k, fluid ones too, and dampers c."""
-    layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
-    braces, stops, pistons = tables.braces, tables.stops, tables.pistons
-    armed, work = tables.armed, tables.scratch
+    masses, braces, stops, pistons, work = tables.masses, tables.braces, tables.stops, tables.pistons, tables.scratch
     for i in range(2 * masses.size):
         work[i] = 0.0
     for k in range(braces.size):
-        load(tables, braces[k]["from_mass"], braces[k]["to_mass"], braces[k]["stiffness"], braces[k]["damping"])
-    first = armed.size - 2 * stops.size
+        load(tables, braces[k]["from_mass"], braces[k]["to_mass"], *held_by(out, tables, k))
     for k in range(stops.size):
-        if armed[first + 2 * k] + armed[first + 2 * k + 1] > 0.0:
-            load(tables, stops[k]["from_mass"], stops[k]["to_mass"], stops[k]["stiffness"], stops[k]["damping"])
+        load(tables, stops[k]["from_mass"], stops[k]["to_mass"], *held_by(out, tables, braces.size + k))
     for k in range(pistons.size):
-        piston = pistons[k]
-        stiff_a = out[layout["stiffness"] + nodes[piston["a"]]["row"]]
-        stiff_b = out[layout["stiffness"] + nodes[piston["b"]]["row"]]
-        spring = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
-        load(tables, piston["case"], piston["rod"], spring, piston["damping"])
+        load(tables, pistons[k]["case"], pistons[k]["rod"], *held_by(out, tables, braces.size + stops.size + k))
     rate = 0.0
     for i in range(masses.size):
         if masses[i]["y"] >= 0:
@@ -215,9 +266,9 @@ def observe_masses(t, y, out, handle, values):
         elif kind == FORCE:
             values[k] = out[layout["push"] + i]
         elif kind == PISTON_POSITION:
-            values[k] = pistons[i]["position"] + between(tables, y, pistons[i]["case"], pistons[i]["rod"])[0]
+            values[k] = pistons[i]["position"] + piston_travel(out, tables, i)[0]
         elif kind == PISTON_VELOCITY:
-            values[k] = between(tables, y, pistons[i]["case"], pistons[i]["rod"])[1]
+            values[k] = piston_travel(out, tables, i)[1]
 
 
 @njit
@@ -228,7 +279,7 @@ def record_masses(t, y, out, handle, values):
     first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size
     for k in range(pistons.size):
         piston, at = pistons[k], first + k
-        x = piston["position"] + between(tables, y, piston["case"], piston["rod"])[0]
+        x = piston["position"] + piston_travel(out, tables, k)[0]
         if not 0.0 <= x <= piston["stroke"] and marks[at] != marks[at]:
             marks[at] = t
 
@@ -238,7 +289,8 @@ def mass_events(t, y, out, handle, g):
     """The room that is left before each side of a stop."""
     tables = open_tables(handle)
     stops = tables.stops
+    travels(y, out, tables)
     first = g.size - 2 * stops.size
     for k in range(stops.size):
-        x, _ = between(tables, y, stops[k]["from_mass"], stops[k]["to_mass"])
+        x, _ = stop_travel(out, tables, k)
         g[first + 2 * k], g[first + 2 * k + 1] = stops[k]["below"] + x, stops[k]["above"] - x

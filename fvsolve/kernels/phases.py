@@ -34,6 +34,7 @@ class Pieces:
     move: str = ""  # rates of what stands between nodes: columns, bodies, devices
     rates: str = ""  # of cells, in pipes and basins
     enter: str = ""  # what comes into these by patches
+    accelerate: str = ""  # bodies, once all that pushes them is known
     leave: str = ""  # values of scalars with which water leaves pipes and cells
     mix: str = ""  # and their values at nodes
     carry: str = ""  # rates of what is carried in cells
@@ -89,6 +90,13 @@ MEMBERS = {
         hold="barotropic_columns: hold_columns_barotropic", move="barotropic_columns: column_rates_barotropic",
         **COLUMNS,
     ),
+    "bodies": Pieces(
+        prepare="mechanism.joints: kinematics", accelerate="mechanism.matrix: accelerate",
+        observe="mechanism.observe: observe_bodies", power="mechanism.energy: power_bodies",
+        stored="mechanism.energy: stored_bodies",
+    ),
+    "stretches": Pieces(events="mechanism.joints: stretch_again"),
+    "lines": Pieces(move="mechanism.lines: push_bodies"),
     "masses": Pieces(
         prepare="masses: chambers", move="masses: finish_masses", observe="masses: observe_masses",
         record="masses: record_masses", events="masses: mass_events",
@@ -123,6 +131,8 @@ class Cast:
     clusters: bool = False
     columns: bool = False
     masses: bool = False
+    bodies: bool = False
+    lines: bool = False
     memory: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
@@ -151,8 +161,14 @@ class Cast:
             yield MEMBERS["clusters"]
         if self.columns:
             yield MEMBERS["columns" if linear else "columns, barotropic"]
+        if self.bodies:
+            yield MEMBERS["bodies"]
+        if self.lines:
+            yield MEMBERS["stretches"]
         if self.masses:
             yield MEMBERS["masses"]
+        if self.lines:
+            yield MEMBERS["lines"]
         if self.devices:
             yield MEMBERS["devices"]
         if self.memory:

@@ -191,6 +191,57 @@ COLUMN = np.dtype(
     align=True,
 )
 
+BODY = np.dtype(  # axes of its own, its origin at its joint
+    [
+        ("parent", "i8"),  # row of the body that it is joined to, a lesser one; -1 for the world
+        ("root", "i8"),  # row of the first body of its tree
+        ("joint", "i8"),  # REVOLUTE ...
+        ("y", "i8"),  # offsets of its coordinates and of its velocities, both as deviations; -1 for none
+        ("rate", "i8"),
+        ("freedom", "i8"),  # first of its rows of `freedoms`
+        ("freedoms", "i8"),  # how many it has
+        ("schedule", "i8"),  # of a driven joint, its angle [rad] or travel [m]; -1 for none
+        ("at", "f8", (3,)),  # place of the joint in the parent's axes [m]
+        ("attitude", "f8", (9,)),  # of the joint's axes in the parent's, by rows
+        ("axis", "f8", (3,)),  # in the joint's axes and its own
+        ("mass", "f8"),
+        ("centre", "f8", (3,)),  # of mass [m]
+        ("inertia", "f8", (9,)),  # about it [kg m2]
+        ("damping", "f8"),  # of its joint [N m s] or [N s/m]
+        ("start", "f8", (7,)),  # coordinates at the start
+        ("speed", "f8", (6,)),  # velocities at the start
+        ("height", "f8"),  # of its centre of mass at the start [m], and
+        ("energy", "f8"),  # its kinetic energy [J]
+    ],
+    align=True,
+)
+REVOLUTE, PRISMATIC, BALL, FREE, WELD = 0, 1, 2, 3, 4  # joints
+
+FREEDOM = np.dtype(
+    [
+        ("depth", "i8"),  # how many freedoms its own hangs on
+        ("path", "i8"),  # offset in `integers` of these, from the root on, and of itself
+        ("row", "i8"),  # offset of its row of the mass matrix, of those on its path
+        ("balance", "f8"),  # force of the start that is rounding [N] or [N m]
+    ],
+    align=True,
+)
+
+POINT = np.dtype([("body", "i8"), ("place", "f8", (3,))], align=True)  # body -1: the world; in axes of the body
+
+LINE = np.dtype(  # a push on points of bodies
+    [
+        ("push", "i8"),
+        ("from_point", "i8"),  # -1 for none
+        ("to_point", "i8"),
+        ("acts", "i8"),  # ALONG the line between the points, ON a direction of the world, ABOUT one
+        ("direction", "f8", (3,)),
+        ("length", "f8"),  # at the start [m]
+    ],
+    align=True,
+)
+ALONG, TOWARD, ABOUT = 0, 1, 2
+
 MASS = np.dtype(
     [
         ("y", "i8"),  # offset of its position, velocity follows; both as deviations; -1 for a frame
@@ -212,6 +263,7 @@ BRACE = np.dtype(  # springs, dampers and forces: push = force + (schedule - giv
         ("damping", "f8"),
         ("speed", "f8"),  # v_to - v_from at the start [m/s]
         ("force", "f8"),  # push at the start [N]
+        ("line", "i8"),  # its row of `lines` where it joins points of bodies; -1 on the axis of masses
     ],
     align=True,
 )
@@ -225,6 +277,7 @@ STOP = np.dtype(
         ("below", "f8"),  # room at the start before it pushes forward, infinite for none [m]
         ("above", "f8"),  # and before it holds back
         ("force", "f8"),
+        ("line", "i8"),  # its row of `lines` where it joins points of bodies; -1 on the axis of masses
     ],
     align=True,
 )
@@ -246,6 +299,7 @@ PISTON = np.dtype(
         ("damping", "f8"),
         ("speed", "f8"),
         ("force", "f8"),
+        ("line", "i8"),  # its row of `lines` where it joins points of bodies; -1 on the axis of masses
     ],
     align=True,
 )
@@ -298,10 +352,14 @@ LAYOUT = np.dtype(
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
+        ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
+        ("along", "i8"),  # of lines, from the one point to the other, of length 1
+        ("body", "i8"),  # of bodies, as `kernels.mechanism.room` says
         ("size", "i8"),
     ],
     align=True,
 )
+BODY_OUT = 45  # numbers of each body in `out`
 RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # first entries of `out`
 OUT_HEAD = 4
 
@@ -327,6 +385,7 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
 GIVEN_FLOW = 18  # of a patch that a given velocity passes
 WALL_VALUE = 19  # of a wall that moves
+BODY_VALUE, POINT_VALUE = 20, 21  # `side` says which, as `kernels.mechanism.observe` numbers them
 
 BASIN = np.dtype(
     [
@@ -451,6 +510,10 @@ RECORDS = {
     "clusters": CLUSTER_RECORD,
     "schedules": SCHEDULE,
     "probes": PROBE,
+    "bodies": BODY,
+    "freedoms": FREEDOM,
+    "points": POINT,
+    "lines": LINE,
     "masses": MASS,
     "braces": BRACE,
     "stops": STOP,

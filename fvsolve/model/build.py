@@ -17,6 +17,7 @@ from fvsolve.model.device import lower_devices
 from fvsolve.model.draft import Draft
 from fvsolve.model.lowering import lowering_of
 from fvsolve.model.masses import lower_masses
+from fvsolve.model.mechanism import lower_bodies, lower_lines
 from fvsolve.model.model import Model
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
@@ -66,7 +67,9 @@ def fill_links(draft: Draft) -> None:
     for row in draft.pipe_table:
         draft.node_table["admittance"][row["from_node"]] += row["admittance"]
         draft.node_table["admittance"][row["to_node"]] += row["admittance"]
+    lower_bodies(draft)
     lower_masses(draft)
+    lower_lines(draft)
 
 
 def profile_size(draft: Draft) -> int:
@@ -90,7 +93,9 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
     layout = layout_of(draft)
     draft.tables = rec.Tables(
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
-        draft.cluster_table, schedules, draft.probe_table, draft.mass_table, draft.brace_table, draft.stop_table,
+        draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
+        np.array(draft.points, rec.POINT), draft.line_table, draft.mass_table,
+        draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
         draft.wall_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
@@ -138,6 +143,8 @@ def layout_of(draft: Draft) -> np.ndarray:
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", many * nodes), ("edge", 2 * pipes * many),
         ("carried", 2 * pipes * many), ("brought", many * nodes), ("wall", len(draft.wall_table)),
+        ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
+        ("body", rec.BODY_OUT * len(draft.body_table)),
     ):  # fmt: skip
         found[name], at = at, at + size
     found["size"] = at
@@ -159,7 +166,9 @@ def scratch_of(draft: Draft) -> int:
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))
     system += 6 * nodes + 2 * len(draft.valve_table) + 4 * len(draft.cluster_table)
-    return int(max((5 if many else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * many * nodes))
+    spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
+    spatial = max(spatial, 18 if len(draft.body_table) else 0)
+    return int(max(spatial, (5 if many else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * many * nodes))
 
 
 def model_of(draft: Draft) -> Model:
@@ -174,7 +183,8 @@ def model_of(draft: Draft) -> Model:
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,
-        draft.mass_names, {name: case.elevation(name) for name in case.places}, case.probes, draft.warnings,
+        draft.mass_names, draft.body_names,
+        {name: case.elevation(name) for name in case.places}, case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins,
     )  # fmt: skip

@@ -56,6 +56,11 @@ class Draft:
     pipe_names: list[str] = field(default_factory=list)
     column_names: list[str] = field(default_factory=list)
     valve_names: list[str] = field(default_factory=list)
+    body_names: list[str] = field(default_factory=list)
+    point_index: dict[str, int] = field(default_factory=dict)
+    points: list[tuple] = field(default_factory=list)  # rows, as they are asked for
+    lines: list[tuple] = field(default_factory=list)
+    factor_size: int = 0  # entries of a mass matrix
     mass_names: list[str] = field(default_factory=list)
     mass_index: dict[str | None, int] = field(default_factory=dict)
     piston_names: list[str] = field(default_factory=list)
@@ -74,6 +79,9 @@ class Draft:
     valve_table: np.ndarray = rows(rec.VALVE)
     cluster_table: np.ndarray = rows(rec.CLUSTER_RECORD)
     device_table: np.ndarray = rows(rec.DEVICE)
+    body_table: np.ndarray = rows(rec.BODY)
+    freedom_table: np.ndarray = rows(rec.FREEDOM)
+    line_table: np.ndarray = rows(rec.LINE)
     mass_table: np.ndarray = rows(rec.MASS)
     brace_table: np.ndarray = rows(rec.BRACE)
     stop_table: np.ndarray = rows(rec.STOP)
@@ -105,10 +113,10 @@ class Draft:
         if self.faults:
             raise CaseError(self.faults, str(self.case.path or self.case.name))
 
-    def states(self, names: list[str], scale: float) -> int:
-        """Offset of new states."""
+    def states(self, names: list[str], scale: float | list[float]) -> int:
+        """Offset of new states, `scale` of each or of all of them."""
         self.state_names += names
-        self.scale += [scale] * len(names)
+        self.scale += scale if isinstance(scale, list) else [scale] * len(names)
         self.size += len(names)
         return self.size - len(names)
 

@@ -56,6 +56,7 @@ class Accounts:
             self.hold(name, "rigid column", at + 2)
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.mechanics()
+        self.bodies()
         self.devices()
         self.walls()
         self.basins()
@@ -118,6 +119,15 @@ class Accounts:
             self.add("dissipated", name, "leak", at)
             self.add("dissipated", name, "friction", at + 1)
             self.add("law", name, "cylinder", at + 2)
+
+    def bodies(self) -> None:
+        for name, row in zip(self.model.body_names, self.model.tables.bodies, strict=True):
+            at = self.take(3)
+            self.hold(name, "body", at)
+            if row["damping"] > 0.0:
+                self.add("dissipated", name, "joint", at + 1)
+            if row["schedule"] >= 0:
+                self.add("supplied", name, "drive", at + 2)
 
     def devices(self) -> None:
         for name, part, _ in self.model.devices:

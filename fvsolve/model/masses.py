@@ -8,6 +8,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering, rows_in
+from fvsolve.model.mechanism import add_line, apart
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
 SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses that no chamber holds, of masses that nothing holds
@@ -33,9 +34,10 @@ def lower_masses(draft) -> None:
     """Fill the tables of masses, braces, stops and pistons of a model."""
     case = draft.case
     draft.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
-    outside = any(link.from_ is None for _, link, _ in rows_in(case, "brace"))
-    draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
     draft.mass_index = {name: i for i, name in enumerate(draft.mass_names)}
+    pushes = [link for table in ("brace", "stop", "piston") for _, link, _ in rows_in(case, table)]
+    outside = any(None in ends(link) or spatial(draft, *ends(link)) for link in pushes)
+    draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
     draft.mass_index |= {None: len(draft.mass_names)}
     for name, row in zip(draft.mass_names, draft.mass_table, strict=False):
         node = case.nodes[name]
@@ -49,8 +51,28 @@ def lower_masses(draft) -> None:
     add_states(draft)
 
 
-def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str]) -> tuple[float, float]:
-    """Write the masses at two ports; how far the second lies ahead at the start [m], and its speed ahead [m/s]."""
+def ends(link) -> tuple[str | None, str]:
+    """The places that a push joins; the first may be none."""
+    return (
+        (link.ports["case"], link.ports["rod"]) if "rod" in link.ports else (link.ports.get("from"), link.ports["to"])
+    )
+
+
+def spatial(draft, *places: str | None) -> bool:
+    """Whether places are points of bodies, or of the world."""
+    return any(place is not None and place not in draft.mass_index for place in places)
+
+
+def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str], *how) -> tuple[float, float]:
+    """Write what two ports join; how far the second lies ahead at the start [m], and its speed ahead [m/s].
+
+    how : of places that are points, as `mechanism.add_line` takes it
+    """
+    row["line"] = -1
+    if spatial(draft, *places):
+        row["line"] = add_line(draft, places, *how)
+        row[ports[0]] = row[ports[1]] = draft.mass_index[None]
+        return apart(draft, places, draft.lines[-1])
     for port, place in zip(ports, places, strict=True):
         row[port] = draft.mass_index[place]
     first, second = (draft.mass_table[int(row[port])] for port in ports)

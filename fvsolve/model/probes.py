@@ -6,6 +6,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import lowering_of
+from fvsolve.model.mechanism import point_row
 from fvsolve.model.reading import along
 
 
@@ -18,6 +19,8 @@ def lower_probes(draft) -> np.ndarray:
             lower_point(draft, row, probe)
         elif probe.quantity in draft.case.scalars:
             scalar_probe(draft, row, probe)
+        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # of a body, or of the world
+            lower_point_of_body(draft, row, probe)
         else:
             part = parts[probe.part][probe.name]
             lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
@@ -32,6 +35,14 @@ def scalar_probe(draft, row, probe) -> None:
     else:
         row["kind"], row["index"] = rec.PIPE_SCALAR, draft.pipe_names.index(probe.name)
         along(draft, row, probe.fraction, 1)
+
+
+def lower_point_of_body(draft, row, probe) -> None:
+    """A quantity of a point by name."""
+    from fvsolve.kernels.mechanism.observe import POINT_QUANTITIES
+
+    row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
+    row["index"] = point_row(draft, probe.name)
 
 
 def lower_point(draft, row, probe) -> None:

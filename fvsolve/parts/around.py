@@ -15,6 +15,7 @@ class Around:
 
     ambient : [Pa]; gravity : [m/s2], None where it is at fault; fluid : its properties, None where they are at fault
     vacuum : (part's group, its name, key, pressures [Pa]) -> faults of those at which the fluid boils
+    between : (place, place) -> how far the second lies ahead of the first at the start [m], None where that is unknown
     """
 
     nodes: dict[str, Any]
@@ -23,11 +24,12 @@ class Around:
     gravity: float | None
     fluid: Any
     vacuum: Callable[[str, str, str, list[float]], Faults]
+    between: Callable[[str, str], float | None]
 
-    def starts(self, link: Any) -> list[float] | None:
-        """Where the bodies that a link joins stand at the start [m], by port; None unless all are known."""
-        ports = [port for port, domain in link.joins.items() if domain == "translational"]
-        bodies = [self.nodes.get(link.ports.get(port)) for port in ports]
-        if not bodies or any(getattr(body, "domain", "") != "translational" for body in bodies):
-            return None
-        return [body.initial_position for body in bodies]
+    def ahead(self, link: Any, first: str, second: str) -> float | None:
+        """How far the place at port `second` lies ahead of that at `first` at the start [m]; None unless known.
+
+        Of masses on the axis the difference of their positions, of points in space their distance.
+        """
+        ends = [link.ports.get(port) for port in (first, second)]
+        return None if None in ends else self.between(*ends)

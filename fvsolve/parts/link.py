@@ -58,9 +58,12 @@ class TwoPort(Link):
 
 
 class Coupling(TwoPort):
-    """A link between bodies on one axis; its force [N] pushes `to` forward and `from` back by as much."""
+    """A link between masses on one axis, or points in space; its force [N] pushes `to` forward and `from` back as much.
 
-    joins: ClassVar[dict[str, str]] = {"from": "translational", "to": "translational"}
+    Between points x_to - x_from is their distance, and forward is away from the other one.
+    """
+
+    joins: ClassVar[dict[str, str]] = {"from": "translational or spatial", "to": "translational or spatial"}
     quantities: ClassVar[dict[str, str]] = {"force": "force"}
 
 

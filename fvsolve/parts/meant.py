@@ -32,5 +32,7 @@ MEANT = {
     "manifold": 'a "junction", or a "chamber" with a volume',
     "volume": 'a "chamber"',
     "wall": 'a "frame"',
-    "body": 'a "mass"',
+    "rigid-body": 'a "body"',
+    "hinge": 'a "body" with joint = { kind = "revolute", axis = [..] }',
+    "joint": 'a "body" with its joint, or a "pin" between two bodies',
 }

@@ -86,6 +86,9 @@ DIMENSIONS = {
     "torque": Dimension("a torque", "N m", "200 N m"),
     "inertia": Dimension("a moment of inertia", "kg m2", "12 kg m2"),
     "angle": Dimension("an angle", "rad", "3 deg"),
+    "rotational_damping": Dimension("a damping of rotation", "N m s", "20 N m s"),
+    "momentum": Dimension("a momentum", "N s", "3 N s"),
+    "angular_momentum": Dimension("an angular momentum", "kg m2/s", "3 kg m2/s"),
     "charge": Dimension("a charge", "C", "3 C"),
     "capacitance": Dimension("a capacitance", "F", "3 F"),
 }
@@ -191,12 +194,15 @@ SPELLINGS: dict[str, dict[str, Any]] = {
         "m3/s/Pa": 1, "l/s/bar": (1, 10**8), "l/min/bar": (1, 6 * 10**9), "L/min/bar": (1, 6 * 10**9),
         "ml/min/bar": (1, 6 * 10**12), "cm3/s/bar": (1, 10**11), "cm3/min/bar": (1, 6 * 10**12),
     },
-    "angular_velocity": {"rad/s": 1, "rpm": (math.pi, 30), "RPM": (math.pi, 30)},
+    "angular_velocity": {"rad/s": 1, "deg/s": (math.pi, 180), "rpm": (math.pi, 30), "RPM": (math.pi, 30)},
     "torque": {
         "N m": 1, "Nm": 1, "kN m": 1000, "kNm": 1000, "lbf ft": POUND_FORCE * FOOT, "lbf in": POUND_FORCE * INCH,
     },
-    "inertia": {"kg m2": 1, "kgm2": 1, "g m2": (1, 1000), "lb ft2": POUND * FOOT**2},
+    "inertia": {"kg m2": 1, "kgm2": 1, "t m2": 1000, "g m2": (1, 1000), "lb ft2": POUND * FOOT**2},
     "angle": {"rad": 1, "deg": (math.pi, 180)},
+    "rotational_damping": {"N m s": 1, "N m s/rad": 1, "Nms": 1, "kN m s": 1000},
+    "momentum": {"N s": 1, "kg m/s": 1, "kN s": 1000},
+    "angular_momentum": {"kg m2/s": 1},
     "charge": {"C": 1},
     "capacitance": {"F": 1},
 }  # fmt: skip

@@ -394,7 +394,7 @@ def test_what_the_schema_refers_to_is_what_it_says_unshared():
 
     assert expanded({**made, "$defs": {name: defs[name] for name in unshared["$defs"]}}) == unshared
     assert json.loads(printed(made)) == made
-    assert len(printed(made).splitlines()) < 2600 and len(printed(made)) < 0.7 * len(printed(unshared))
+    assert len(printed(made).splitlines()) < 3000 and len(printed(made)) < 0.7 * len(printed(unshared))
 
 
 def test_a_parts_key_is_documented_with_its_unit():
@@ -405,14 +405,14 @@ def test_a_parts_key_is_documented_with_its_unit():
     assert made["required"] == ["fluid", "nodes", "numerics"]
 
 
-def test_the_schema_wants_links_but_beside_a_basin():
+def test_the_schema_wants_links_but_beside_a_basin_or_a_body():
     """As `load` does; an editor that reads the schema says no more of the shipped cases than `check`."""
     made = schema()
     (group,) = made["if"]["properties"]
-    excluded = made["if"]["properties"][group]["additionalProperties"]["properties"]["type"]["not"]["const"]
+    excluded = made["if"]["properties"][group]["additionalProperties"]["properties"]["type"]["not"]["enum"]
     for path in (Path(__file__).parents[1] / "cases").glob("*.toml"):
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-        plain = all(one["type"] != excluded for one in table[group].values())
+        plain = all(one["type"] not in excluded for one in table[group].values())
         assert {*made["required"], *(made["then"]["required"] if plain else ())} <= {*table}, path.name
 
 

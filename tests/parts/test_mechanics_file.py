@@ -115,8 +115,8 @@ BAD = {
     "a rod on a reservoir": (
         swap('rod = "load"', 'rod = "pump"'),
         'links.cyl.ports.rod: "pump" is a reservoir, a hydraulic place, and this port of a cylinder '
-        "a translational one; "
-        "translational places are ground, load",
+        "a translational or spatial one; "
+        "translational or spatial places are ground, load",
     ),
     "a spool on a mass": (
         swap('A = "cyl.A"', 'A = "load"'),
@@ -125,7 +125,8 @@ BAD = {
     ),
     "a spring on a chamber": (
         swap('from = "ground"', 'from = "cyl.A"'),
-        'links.spring.from: "cyl.A" is a chamber, a hydraulic place, and this port of a spring a translational one',
+        'links.spring.from: "cyl.A" is a chamber, a hydraulic place, and this port of a spring '
+        "a translational or spatial one",
     ),
     "a cylinder for its chamber": (swap('"cyl.A"', '"cyl"'), '"cyl" is a cylinder; its places are cyl.A, cyl.B'),
     "no such chamber": (swap('"cyl.A"', '"cyl.C"'), 'no place named "cyl.C"; places are cyl.A, cyl.B, ground, load'),

@@ -7,13 +7,14 @@ from fvsolve.model.masses import Push, join
 
 
 class CylinderRows(Push, kind="cylinder"):
-    """A piston between two chambers and two bodies."""
+    """A piston between two chambers and two masses or points."""
 
     table = "piston"
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        row["position"], row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        apart, row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        row["position"] = apart - link.closed_length
         row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
         row["area_a"], row["area_b"] = link.areas()
         row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction

@@ -8,14 +8,15 @@ from typing import Annotated, Any, ClassVar
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.chamber.part import Chamber
 from fvsolve.parts.link import Link, Ports
-from fvsolve.parts.value import VALUE, Quantity, Usual, nonnegative, positive
+from fvsolve.parts.value import PROFILE, VALUE, Quantity, Usual, nonnegative, positive
 
 SIZES = Usual(5e-4, 30.0, "micro-hydraulics to ship lifts")
 AREAS = Usual(1e-7, 30.0, "micro-hydraulics to presses")
 
 
 class Cylinder(Link, kind="cylinder"):
-    """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x), x = x_rod - x_case.
+    """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x), x = x_rod - x_case -
+    closed_length, between points of bodies their distance less closed_length.
 
     The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p from ambient,
     and the case back by as much. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored energy: that
@@ -24,12 +25,15 @@ class Cylinder(Link, kind="cylinder"):
 
     no_scalars: ClassVar[str] = "its chambers carry no scalars yet"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
-    joins: ClassVar[dict[str, str]] = {"rod": "translational", "case": "translational"}
+    joins: ClassVar[dict[str, str]] = {"rod": "translational or spatial", "case": "translational or spatial"}
     owns: ClassVar[dict[str, str]] = {"A": "hydraulic", "B": "hydraulic"}
     quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
 
     ports: Annotated[dict[str, str], Ports(("rod", "case"))]
     stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]", SIZES, VALUE)]
+    closed_length: Annotated[
+        float, Quantity("length", nonnegative, "from case to rod with the rod in, x = 0 [m]", changes=PROFILE)
+    ] = 0.0
     area_A: Annotated[
         float | None,
         Quantity("area", positive, "of the piston at A [m2]; piston_diameter is needed if left out", AREAS),
@@ -81,11 +85,12 @@ class Cylinder(Link, kind="cylinder"):
         for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
             if pressure is not None:
                 yield from around.vacuum("links", name, f"initial_pressure_{place}", [pressure])
-        if (at := around.starts(self)) is None:
+        if (apart := around.ahead(self, "case", "rod")) is None:
             return
-        x, (rod, case) = at[0] - at[1], (self.ports["rod"], self.ports["case"])
+        x, (rod, case) = apart - self.closed_length, (self.ports["rod"], self.ports["case"])
         if not 0.0 <= x <= self.stroke:
-            text = f"the piston starts at {x:g} m, {rod} less {case}; wanted 0 to {self.stroke:g} m"
+            closed = ", less closed_length" if self.closed_length else ""
+            text = f"the piston starts at {x:g} m, {rod} less {case}{closed}; wanted 0 to {self.stroke:g} m"
             yield ("stroke",), text
         if min(self.areas()) <= 0.0:
             yield ("rod_diameter",), "leaves no area at B; wanted one below piston_diameter"

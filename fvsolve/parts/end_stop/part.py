@@ -28,5 +28,5 @@ class EndStop(Coupling, kind="end-stop"):
     ] = None
 
     def faults(self, name: str, around: Around) -> Faults:
-        if around.starts(self) is not None and None not in (self.least, self.greatest) and self.least >= self.greatest:
+        if None not in (self.least, self.greatest) and self.least >= self.greatest:
             yield ("greatest",), f"{self.greatest:g} m is not above least, {self.least:g} m"

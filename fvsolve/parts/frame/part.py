@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
+from fvsolve.parts.body.points import PlacesByName
 from fvsolve.parts.node import Node
 from fvsolve.parts.value import Quantity
 
@@ -18,3 +19,4 @@ class Frame(Node, kind="frame"):
     quantities: ClassVar[dict[str, str]] = {"position": "position"}
 
     initial_position: Annotated[float, Quantity("position", about="where it stands on the common axis [m]")] = 0.0
+    points: Annotated[dict[str, tuple[float, ...]], PlacesByName("places in the world that links push at [m]")] = {}

@@ -1,4 +1,4 @@
-"""A linear spring between two bodies. Knows its stiffness and where it is slack; computes no force."""
+"""A linear spring between two masses or points. Knows its stiffness and where it is slack; computes no force."""
 
 from __future__ import annotations
 
@@ -33,6 +33,6 @@ class Spring(Coupling, kind="spring"):
             object.__setattr__(self, "free_length", 0.0)
 
     def faults(self, name: str, around: Around) -> Faults:
-        at = around.starts(self)
-        if at is not None and at[1] < at[0] and (self.free_length or self.preload):
+        apart = around.ahead(self, "from", "to")
+        if apart is not None and apart < 0.0 and (self.free_length or self.preload):
             yield ("to",), f"{self.to} lies behind {self.from_} at the start; exchange from and to"

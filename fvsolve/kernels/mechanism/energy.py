@@ -1,0 +1,71 @@
+"""Power and stored energy of bodies and of their joints. Knows the tables; adds nothing up over time.
+
+Rows of `power` [W] a body, before those of devices and basins: rate of what it stores, what its joint dissipates, what
+drives its joint; of `stored` [J] its kinetic energy and m g z of its centre, since the start.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanism.joints import angle_of, centre_of
+from fvsolve.kernels.mechanism.observe import acceleration_at, joint_load, kinetic, spread_inertia
+from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, SPIN, TURNING, dot, row_of, turned
+from fvsolve.kernels.records import FREE, PRISMATIC
+
+ROWS, OF_DEVICES, OF_BASINS = 3, 3, 4  # rows of `power`
+
+
+@njit
+def gained(body, out, here, gravity):
+    """d/dt of what a body stores: m v_c . a_c + w . J alpha + m g dz_c/dt [W]."""
+    x, y, z, u, v, w = centre_of(body, out, here)
+    a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y, z)
+    s = here + TURNING
+    turn = spread_inertia(body["inertia"], out, here + ATTITUDE, out[s], out[s + 1], out[s + 2])
+    return body["mass"] * (u * a + v * b + w * (c + gravity)) + dot(out, here + SPIN, turn[0], turn[1], turn[2])
+
+
+@njit
+def driven(t, y, out, tables, i):
+    """Power that comes in by a driven joint [W]."""
+    body = tables.bodies[i]
+    rate = angle_of(body, t, y, tables)[1]
+    x, y0, z = turned(out, row_of(tables, i) + ATTITUDE, body["axis"], 0)
+    load = joint_load(out, tables, i)
+    if body["joint"] == PRISMATIC:
+        return rate * (load[0] * x + load[1] * y0 + load[2] * z)
+    return rate * (load[3] * x + load[4] * y0 + load[5] * z)
+
+
+@njit
+def rubbed(body, y):
+    """What damping of a joint takes [W]."""
+    total, first = 0.0, 3 if body["joint"] == FREE else 0
+    for k in range(first, body["freedoms"]):
+        rate = body["speed"][k] + y[body["rate"] + k]
+        total += body["damping"] * rate * rate
+    return total
+
+
+@njit
+def power_bodies(t, y, dydt, out, handle, power):
+    """Rows of bodies."""
+    tables = open_tables(handle)
+    bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
+    at = power.size - OF_BASINS * tables.basins.size - OF_DEVICES * tables.devices.size - ROWS * bodies.size
+    for i in range(bodies.size):
+        power[at] = gained(bodies[i], out, row_of(tables, i), gravity)
+        power[at + 1] = rubbed(bodies[i], y) if bodies[i]["damping"] > 0.0 else 0.0
+        power[at + 2] = driven(t, y, out, tables, i) if bodies[i]["schedule"] >= 0 else 0.0
+        at += ROWS
+
+
+@njit
+def stored_bodies(t, y, dydt, out, handle, stored):
+    """Rows of bodies."""
+    tables = open_tables(handle)
+    bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
+    at = stored.size - tables.basins.size - tables.devices.size - bodies.size
+    for i in range(bodies.size):
+        body, here = bodies[i], row_of(tables, i)
+        z = out[here + PLACE + 2] + centre_of(body, out, here)[2]
+        stored[at + i] = kinetic(body, out, here) - body["energy"] + body["mass"] * gravity * (z - body["height"])

@@ -1,0 +1,221 @@
+"""Where bodies are and how they move, as (t, y) tell: attitudes, places, velocities, weight. Solves nothing.
+
+(45), (52), (59) to (67): a body's axes are its parent's, turned by its joint. Velocities and accelerations are carried
+along the tree as those that a body's axes have at o (see `room`), of which S q' of a joint is a sum: revolute (a, r x
+a), prismatic (0, a), a ball the three (R e, r x R e), free the centre's velocity in the world and R w. With
+V = V_parent + S q', A = A_parent + S q'' + V x S q' the acceleration at o, as in Featherstone, 2008, chapter 2.
+"""
+
+from math import cos, sin
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanism.lines import stretch
+from fvsolve.kernels.mechanism.room import (
+    APPARENT,
+    ARM,
+    ATTITUDE,
+    BIAS,
+    FORCE,
+    PLACE,
+    SPIN,
+    SPIN_BIAS,
+    STREAM,
+    TORQUE,
+    VELOCITY,
+    cross,
+    put,
+    row_of,
+    turned,
+)
+from fvsolve.kernels.records import BALL, FREE, PRISMATIC, REVOLUTE
+from fvsolve.kernels.schedules import schedule_slopes, schedule_value
+
+
+@njit(forceinline=True)
+def angle_of(body, t, y, tables):
+    """Angle [rad] or travel [m] of a joint with one axis, its rate, and its acceleration where it is driven."""
+    if body["schedule"] >= 0:
+        rate, change = schedule_slopes(tables, body["schedule"], t)
+        return schedule_value(tables, body["schedule"], t), rate, change
+    return body["start"][0] + y[body["y"]], body["speed"][0] + y[body["rate"]], 0.0
+
+
+@njit(forceinline=True)
+def times(a, i, b, j, c, k):
+    """C = A B of 3 x 3 matrices by rows."""
+    for row in range(i, i + 9, 3):
+        x, y, z = a[row], a[row + 1], a[row + 2]
+        c[k] = x * b[j] + y * b[j + 3] + z * b[j + 6]
+        c[k + 1] = x * b[j + 1] + y * b[j + 4] + z * b[j + 7]
+        c[k + 2] = x * b[j + 2] + y * b[j + 5] + z * b[j + 8]
+        k += 3
+
+
+@njit
+def turn_about(q, k, angle, axis):
+    """Rotation about an axis, (43)."""
+    c, s, x, y, z = cos(angle), sin(angle), axis[0], axis[1], axis[2]
+    rest = 1.0 - c
+    put(q, k, c + x * x * rest, x * y * rest - z * s, x * z * rest + y * s)
+    put(q, k + 3, x * y * rest + z * s, c + y * y * rest, y * z * rest - x * s)
+    put(q, k + 6, x * z * rest - y * s, y * z * rest + x * s, c + z * z * rest)
+
+
+@njit
+def turn_by(q, k, h, a, b, c):
+    """Rotation of Euler parameters over their length, (45): none that has drifted is another than a rotation."""
+    s = 2.0 / (h * h + a * a + b * b + c * c)
+    put(q, k, 1.0 - s * (b * b + c * c), s * (a * b - h * c), s * (a * c + h * b))
+    put(q, k + 3, s * (a * b + h * c), 1.0 - s * (a * a + c * c), s * (b * c - h * a))
+    put(q, k + 6, s * (a * c - h * b), s * (b * c + h * a), 1.0 - s * (a * a + b * b))
+
+
+@njit(forceinline=True)
+def parameters(body, first, y):
+    """Euler parameters (eta, eps) of a joint, whose coordinates they are from `first` on."""
+    at, e = body["y"] + first, body["start"]
+    return e[first] + y[at], e[first + 1] + y[at + 1], e[first + 2] + y[at + 2], e[first + 3] + y[at + 3]
+
+
+@njit(forceinline=True)
+def rates(body, first, y):
+    """Three of a joint's velocities."""
+    at, v = body["rate"] + first, body["speed"]
+    return v[first] + y[at], v[first + 1] + y[at + 1], v[first + 2] + y[at + 2]
+
+
+@njit
+def set_free(body, y, out, here):
+    """Attitude, place and motion of a free body; o is its centre of mass."""
+    turn_by(out, here + ATTITUDE, *parameters(body, 3, y))
+    cx, cy, cz = turned(out, here + ATTITUDE, body["centre"], 0)
+    at, x0 = body["y"], body["start"]
+    put(out, here + ARM, -cx, -cy, -cz)
+    put(out, here + PLACE, x0[0] + y[at] - cx, x0[1] + y[at + 1] - cy, x0[2] + y[at + 2] - cz)
+    vx, vy, vz = rates(body, 0, y)
+    put(out, here + STREAM, vx, vy, vz)
+    put(out, here + SPIN, *turned(out, here + ATTITUDE, rates(body, 3, y), 0))
+    ax, ay, az = cross(out, here + SPIN, vx, vy, vz)
+    put(out, here + APPARENT, -ax, -ay, -az)
+    put(out, here + SPIN_BIAS, 0.0, 0.0, 0.0)
+
+
+@njit
+def set_joined(body, t, y, out, tables, here):
+    """Attitude, place and motion of a body from those of the one that it is joined to."""
+    work, kind, own = tables.scratch, body["joint"], here + ATTITUDE
+    if body["parent"] < 0:
+        for k in range(9):
+            work[9 + k] = body["attitude"][k]
+        for k in range(3):
+            out[here + PLACE + k], out[here + ARM + k] = body["at"][k], 0.0
+            out[here + SPIN + k] = out[here + STREAM + k] = 0.0
+            out[here + SPIN_BIAS + k] = out[here + APPARENT + k] = 0.0
+    else:
+        up = row_of(tables, body["parent"])
+        times(out, up + ATTITUDE, body["attitude"], 0, work, 9)
+        x, y0, z = turned(out, up + ATTITUDE, body["at"], 0)
+        for k, far in ((0, x), (1, y0), (2, z)):
+            out[here + PLACE + k] = out[up + PLACE + k] + far
+            out[here + ARM + k] = out[up + ARM + k] + far
+            out[here + SPIN + k], out[here + STREAM + k] = out[up + SPIN + k], out[up + STREAM + k]
+            out[here + SPIN_BIAS + k], out[here + APPARENT + k] = out[up + SPIN_BIAS + k], out[up + APPARENT + k]
+    wx = wy = wz = vx = vy = vz = 0.0
+    if kind == REVOLUTE:
+        angle, rate, change = angle_of(body, t, y, tables)
+        turn_about(work, 0, angle, body["axis"])
+        times(work, 9, work, 0, out, own)
+        x, y0, z = turned(out, own, body["axis"], 0)
+        wx, wy, wz = x * rate, y0 * rate, z * rate
+        vx, vy, vz = cross(out, here + ARM, wx, wy, wz)
+        if change != 0.0:
+            joint_acceleration(out, here, x * change, y0 * change, z * change, 1)
+    elif kind == PRISMATIC:
+        travel, rate, change = angle_of(body, t, y, tables)
+        for k in range(9):
+            out[own + k] = work[9 + k]
+        x, y0, z = turned(out, own, body["axis"], 0)
+        for k, a in ((0, x), (1, y0), (2, z)):
+            out[here + PLACE + k] += a * travel
+            out[here + ARM + k] += a * travel
+        vx, vy, vz = x * rate, y0 * rate, z * rate
+        if change != 0.0:
+            joint_acceleration(out, here, x * change, y0 * change, z * change, 0)
+    elif kind == BALL:
+        turn_by(work, 0, *parameters(body, 0, y))
+        times(work, 9, work, 0, out, own)
+        wx, wy, wz = turned(out, own, rates(body, 0, y), 0)
+        vx, vy, vz = cross(out, here + ARM, wx, wy, wz)
+    else:
+        for k in range(9):
+            out[own + k] = work[9 + k]
+        return
+    for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
+        out[here + SPIN + k] += w
+        out[here + STREAM + k] += v
+    ax, ay, az = cross(out, here + SPIN, wx, wy, wz)
+    bx, by, bz = cross(out, here + SPIN, vx, vy, vz)
+    dx, dy, dz = cross(out, here + STREAM, wx, wy, wz)
+    for k, a, b in ((0, ax, bx + dx), (1, ay, by + dy), (2, az, bz + dz)):
+        out[here + SPIN_BIAS + k] += a
+        out[here + APPARENT + k] += b
+
+
+@njit
+def joint_acceleration(out, here, x, y, z, turns):
+    """Add the acceleration of a driven joint, S q''."""
+    if turns == 1:
+        out[here + SPIN_BIAS] += x
+        out[here + SPIN_BIAS + 1] += y
+        out[here + SPIN_BIAS + 2] += z
+        x, y, z = cross(out, here + ARM, x, y, z)
+    out[here + APPARENT] += x
+    out[here + APPARENT + 1] += y
+    out[here + APPARENT + 2] += z
+
+
+@njit(forceinline=True)
+def at_origin(out, here, wide, spin):
+    """Acceleration of a body's origin from that of its axes at o: a + alpha x r + w x v, v the origin's velocity."""
+    ax, ay, az = cross(out, here + spin, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
+    v = here + VELOCITY
+    bx, by, bz = cross(out, here + SPIN, out[v], out[v + 1], out[v + 2])
+    return out[wide] + ax + bx, out[wide + 1] + ay + by, out[wide + 2] + az + bz
+
+
+@njit
+def centre_of(body, out, here):
+    """Where the centre of mass lies from the body's origin, and its velocity, in axes of the world."""
+    x, y, z = turned(out, here + ATTITUDE, body["centre"], 0)
+    u, v, w = cross(out, here + SPIN, x, y, z)
+    s = here + VELOCITY
+    return x, y, z, out[s] + u, out[s + 1] + v, out[s + 2] + w
+
+
+@njit
+def kinematics(t, y, dydt, out, handle):
+    """All that (t, y) tell of bodies, with their weight as the first of their forces, and of lines between points."""
+    tables = open_tables(handle)
+    bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
+    for i in range(bodies.size):
+        body, here = bodies[i], row_of(tables, i)
+        if body["joint"] == FREE:
+            set_free(body, y, out, here)
+        else:
+            set_joined(body, t, y, out, tables, here)
+        x, y0, z = cross(out, here + SPIN, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
+        v = here + STREAM
+        put(out, here + VELOCITY, out[v] + x, out[v + 1] + y0, out[v + 2] + z)
+        put(out, here + BIAS, *at_origin(out, here, here + APPARENT, SPIN_BIAS))
+        weight = -body["mass"] * gravity
+        x, y0, z = turned(out, here + ATTITUDE, body["centre"], 0)
+        put(out, here + FORCE, 0.0, 0.0, weight)
+        put(out, here + TORQUE, y0 * weight, -x * weight, 0.0)
+    stretch(out, tables)
+
+
+@njit
+def stretch_again(t, y, out, handle, g):
+    """The same before event functions, which no right-hand side precedes."""
+    kinematics(t, y, y[:0], out, handle)

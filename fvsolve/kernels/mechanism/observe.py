@@ -1,0 +1,224 @@
+"""What probes read of bodies and of their points, from what `out` says of bodies. Changes nothing.
+
+Codes of what is read stand in the order of `BODY_QUANTITIES` and `POINT_QUANTITIES`, in axes of the world.
+"""
+
+from math import atan2, hypot, sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanism.joints import angle_of, centre_of, parameters
+from fvsolve.kernels.mechanism.lines import point_at
+from fvsolve.kernels.mechanism.room import (
+    ACCELERATION,
+    ATTITUDE,
+    FORCE,
+    PLACE,
+    SPIN,
+    TORQUE,
+    TURNING,
+    VELOCITY,
+    cross,
+    dot,
+    row_of,
+    turned,
+)
+from fvsolve.kernels.records import BODY_VALUE, FREE, POINT_VALUE, PRISMATIC
+
+BODY_QUANTITIES = (
+    "x", "y", "z", "roll", "pitch", "yaw", "eta", "eps_x", "eps_y", "eps_z", "vx", "vy", "vz", "wx", "wy", "wz",
+    "ax", "ay", "az", "angle", "rate", "joint_fx", "joint_fy", "joint_fz", "joint_tx", "joint_ty", "joint_tz",
+    "kinetic_energy", "momentum_x", "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y",
+    "angular_momentum_z",
+)  # fmt: skip
+SHARES = ("", "_relative", "_coriolis", "_transversal", "_centripetal")  # of an acceleration, (65)
+POINT_QUANTITIES = (
+    *"xyz", "vx", "vy", "vz", *(f"a{axis}{share}" for share in SHARES for axis in "xyz"),
+)  # fmt: skip
+
+
+@njit
+def angular(body, out, here):
+    """Angular momentum about the centre of mass, J w (68) [kg m2/s]."""
+    r, w = here + ATTITUDE, here + SPIN
+    return spread_inertia(body["inertia"], out, r, out[w], out[w + 1], out[w + 2])
+
+
+@njit
+def spread_inertia(own, out, r, x, y, z):
+    """R J R' times a vector."""
+    a, b, c = (
+        out[r] * x + out[r + 3] * y + out[r + 6] * z,
+        out[r + 1] * x + out[r + 4] * y + out[r + 7] * z,
+        out[r + 2] * x + out[r + 5] * y + out[r + 8] * z,
+    )
+    p, q, s = dot(own, 0, a, b, c), dot(own, 3, a, b, c), dot(own, 6, a, b, c)
+    return dot(out, r, p, q, s), dot(out, r + 3, p, q, s), dot(out, r + 6, p, q, s)
+
+
+@njit
+def kinetic(body, out, here):
+    """m v_c^2 / 2 + w J w / 2 [J]."""
+    _, _, _, u, v, w = centre_of(body, out, here)
+    x, y, z = angular(body, out, here)
+    return 0.5 * (body["mass"] * (u * u + v * v + w * w) + dot(out, here + SPIN, x, y, z))
+
+
+@njit
+def acceleration_at(out, here, at, x, y, z):
+    """Acceleration of a point that lies at (x, y, z) from a body's origin and does not move in it, (65)."""
+    a, b, c = cross(out, here + TURNING, x, y, z)
+    u, v, w = cross(out, here + SPIN, x, y, z)
+    p, q, r = cross(out, here + SPIN, u, v, w)
+    return out[at] + a + p, out[at + 1] + b + q, out[at + 2] + c + r
+
+
+@njit
+def joint_load(out, tables, i):
+    """(force, torque about its origin) by which its joint pushes body i: what all that hangs on it lacks, (68)."""
+    bodies, first = tables.bodies, row_of(tables, i)
+    fx = fy = fz = tx = ty = tz = 0.0
+    for j in range(i, bodies.size):
+        k = j
+        while k > i:
+            k = bodies[k]["parent"]
+        if k != i:
+            continue
+        body, here = bodies[j], row_of(tables, j)
+        dx, dy, dz = (
+            out[here + PLACE] - out[first + PLACE],
+            out[here + PLACE + 1] - out[first + PLACE + 1],
+            out[here + PLACE + 2] - out[first + PLACE + 2],
+        )
+        x, y, z, _, _, _ = centre_of(body, out, here)
+        a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y, z)
+        a, b, c = body["mass"] * a, body["mass"] * b, body["mass"] * c
+        s, r, t = here + TURNING, here + ATTITUDE, here + TORQUE
+        lx, ly, lz = spread_inertia(body["inertia"], out, r, out[s], out[s + 1], out[s + 2])
+        hx, hy, hz = cross(out, here + SPIN, *angular(body, out, here))
+        f, g, h = out[here + FORCE], out[here + FORCE + 1], out[here + FORCE + 2]
+        fx, fy, fz = fx + a - f, fy + b - g, fz + c - h
+        x, y, z = x + dx, y + dy, z + dz
+        tx += lx + hx + (y * c - z * b) - out[t] - (dy * h - dz * g)
+        ty += ly + hy + (z * a - x * c) - out[t + 1] - (dz * f - dx * h)
+        tz += lz + hz + (x * b - y * a) - out[t + 2] - (dx * g - dy * f)
+    return fx, fy, fz, tx, ty, tz
+
+
+@njit
+def roll_pitch_yaw(out, r):
+    """Angles of (40), R = R_z(yaw) R_y(pitch) R_x(roll)."""
+    return (
+        atan2(out[r + 7], out[r + 8]),
+        atan2(-out[r + 6], hypot(out[r + 7], out[r + 8])),
+        atan2(out[r + 3], out[r]),
+    )
+
+
+@njit
+def euler_parameters(body, y, out, here):
+    """(eta, eps) of (44), of length 1: of a free body as its states go on, of others with eta not negative."""
+    if body["joint"] == FREE:
+        h, a, b, c = parameters(body, 3, y)
+        size = sqrt(h * h + a * a + b * b + c * c)
+        return h / size, a / size, b / size, c / size
+    r = here + ATTITUDE
+    xx, yy, zz = out[r], out[r + 4], out[r + 8]
+    x, y0, z = out[r + 7] - out[r + 5], out[r + 2] - out[r + 6], out[r + 3] - out[r + 1]
+    p, q, s = out[r + 1] + out[r + 3], out[r + 2] + out[r + 6], out[r + 5] + out[r + 7]
+    h, a, b, c = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz  # 4 e^2
+    most = max(max(h, a), max(b, c))
+    if most == h:
+        a, b, c = x, y0, z
+    elif most == a:
+        h, b, c = x, p, q
+    elif most == b:
+        h, a, c = y0, p, s
+    else:
+        h, a, b = z, q, s
+    size = sqrt(h * h + a * a + b * b + c * c)
+    if h < 0.0:
+        size = -size
+    return h / size, a / size, b / size, c / size
+
+
+@njit
+def body_value(t, y, out, tables, i, which):
+    """A quantity of body i."""
+    body, here = tables.bodies[i], row_of(tables, i)
+    if which < 3:
+        return out[here + PLACE + which]
+    if which < 6:
+        return roll_pitch_yaw(out, here + ATTITUDE)[which - 3]
+    if which < 10:
+        return euler_parameters(body, y, out, here)[which - 6]
+    if which < 13:
+        return out[here + VELOCITY + which - 10]
+    if which < 16:
+        return out[here + SPIN + which - 13]
+    if which < 19:
+        return out[here + ACCELERATION + which - 16]
+    if which < 21:
+        return angle_of(body, t, y, tables)[which - 19] if body["joint"] <= PRISMATIC else 0.0
+    if which < 27:
+        return joint_load(out, tables, i)[which - 21]
+    if which == 27:
+        return kinetic(body, out, here)
+    x, y0, z, u, v, w = centre_of(body, out, here)
+    u, v, w = body["mass"] * u, body["mass"] * v, body["mass"] * w
+    if which < 31:
+        return (u, v, w)[which - 28]
+    lx, ly, lz = angular(body, out, here)
+    x, y0, z = x + out[here + PLACE], y0 + out[here + PLACE + 1], z + out[here + PLACE + 2]
+    return (lx + y0 * w - z * v, ly + z * u - x * w, lz + x * v - y0 * u)[which - 31]
+
+
+@njit
+def point_value(out, tables, k, which):
+    """A quantity of point k.
+
+    The shares of its acceleration are those of (65) in the axes of what its body hangs on, and beside them stands the
+    acceleration of the origin there; of a body that hangs on the world, in its own.
+    """
+    moved = point_at(out, tables, k, PLACE)
+    if which < 6:
+        return moved[which]
+    i = tables.points[k]["body"]
+    if i < 0:
+        return 0.0
+    here = row_of(tables, i)
+    x, y, z = turned(out, here + ATTITUDE, tables.points[k]["place"], 0)
+    found = acceleration_at(out, here, here + ACCELERATION, x, y, z)
+    axis, share = (which - 6) % 3, (which - 6) // 3
+    if share == 0:
+        return found[axis]
+    b = row_of(tables, tables.bodies[i]["parent"]) if tables.bodies[i]["parent"] >= 0 else here
+    x, y, z = moved[0] - out[b + PLACE], moved[1] - out[b + PLACE + 1], moved[2] - out[b + PLACE + 2]
+    dragged = cross(out, b + SPIN, x, y, z)
+    u, v, w = (
+        moved[3] - out[b + VELOCITY] - dragged[0],
+        moved[4] - out[b + VELOCITY + 1] - dragged[1],
+        moved[5] - out[b + VELOCITY + 2] - dragged[2],
+    )
+    coriolis, transversal = cross(out, b + SPIN, 2.0 * u, 2.0 * v, 2.0 * w), cross(out, b + TURNING, x, y, z)
+    centripetal = cross(out, b + SPIN, dragged[0], dragged[1], dragged[2])
+    if share == 2:
+        return coriolis[axis]
+    if share == 3:
+        return transversal[axis]
+    if share == 4:
+        return centripetal[axis]
+    rest = transversal[axis] + centripetal[axis] + coriolis[axis]
+    return found[axis] - out[b + ACCELERATION + axis] - rest if b != here else 0.0
+
+
+@njit
+def observe_bodies(t, y, out, handle, values):
+    """Values of the probes that read bodies and their points."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        if probes[k]["kind"] == BODY_VALUE:
+            values[k] = body_value(t, y, out, tables, probes[k]["index"], probes[k]["side"])
+        elif probes[k]["kind"] == POINT_VALUE:
+            values[k] = point_value(out, tables, probes[k]["index"], probes[k]["side"])

@@ -1,0 +1,228 @@
+"""Bodies, their joints, points and lines lowered to tables, and what balances at the start. Knows names; no rhs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.case import bodies
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.handle import make_handle
+from fvsolve.model.slate import wiped
+from fvsolve.parts.body.part import Body
+
+SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
+SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
+SNAP = 1e-12  # share of what makes up a joint's force below which their sum is rounding
+KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
+ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
+STATES = {  # of each kind: coordinates, then velocities; with how small each is
+    "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
+    "prismatic": ({"travel": SMALL_TRAVEL}, {"rate": SMALL_SPEED}),
+    "ball": (dict.fromkeys(ANGLES, SMALL_ANGLE), dict.fromkeys(SPINS, SMALL_SPIN)),
+    "free": (dict.fromkeys(("centre_x", "centre_y", "centre_z"), SMALL_TRAVEL) | dict.fromkeys(ANGLES, SMALL_ANGLE),
+             dict.fromkeys(("centre_vx", "centre_vy", "centre_vz"), SMALL_SPEED) | dict.fromkeys(SPINS, SMALL_SPIN)),
+    "fixed": ({}, {}),
+}  # fmt: skip
+
+
+def lower_bodies(draft) -> None:
+    """Fill the tables of bodies and of their freedoms, each body behind the one that it hangs on."""
+    nodes = draft.case.nodes
+    draft.body_names = list(draft.case.poses)
+    table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
+    paths: list[list[int]] = []
+    hung: list[list[int]] = []  # of each body, the freedoms from its root to it
+    for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
+        body = nodes[name]
+        up = bodies.hangs_on(body)[0]
+        row["parent"] = draft.body_names.index(up) if isinstance(nodes.get(up), Body) else -1
+        row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
+        fill_body(draft, name, body, row)
+        row["freedom"] = len(paths)
+        path = list(hung[row["parent"]]) if row["parent"] >= 0 else []
+        for _ in range(row["freedoms"]):
+            path = [*path, len(paths)]
+            paths.append(path)
+        hung.append(path)
+    freedoms = draft.freedom_table = np.zeros(len(paths), rec.FREEDOM)
+    at = 0
+    for row, path in zip(freedoms, paths, strict=True):
+        row["depth"], row["path"], row["row"] = len(path) - 1, len(draft.integers), at
+        draft.integers += path
+        at += len(path)
+    draft.factor_size = at
+
+
+def fill_body(draft, name: str, body: Body, row) -> None:
+    """What one body's row says of itself, and its states."""
+    joint, t = body.joint, draft.case.numerics.start
+    row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
+    row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
+    row["at"], row["attitude"] = bodies.joint_place(draft.case.nodes, body), joint.attitude.rotation.ravel()
+    row["damping"], pose = joint.damping, draft.case.poses[name]
+    row["height"] = pose.at(body.centre_of_mass)[2]
+    speed, spin = pose.moves(body.centre_of_mass), pose.attitude.T @ pose.spin
+    row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.moment() @ spin)
+    row["y"] = row["rate"] = row["schedule"] = -1
+    if joint.driven is not None:
+        row["schedule"] = draft.schedules.add(joint.driven)
+        return
+    coordinates, velocities = STATES[joint.kind]
+    if not coordinates:
+        return
+    row["freedoms"] = len(velocities)
+    row["y"] = draft.states([f"{name}.{key}" for key in coordinates], list(coordinates.values()))
+    row["rate"] = draft.states([f"{name}.{key}" for key in velocities], list(velocities.values()))
+    if joint.kind == "free":
+        row["start"] = [*pose.at(body.centre_of_mass), *joint.attitude.parameters]
+        row["speed"] = [*joint.velocity, *joint.turning]
+    elif joint.kind == "ball":
+        row["start"][0], row["speed"][:3] = 1.0, joint.turning
+    else:
+        row["start"][0], row["speed"][0] = bodies.coordinate(joint, t), joint.rate
+
+
+def point_row(draft, place: str) -> int:
+    """Row of the point that a link, or a probe, names."""
+    if place not in draft.point_index:
+        name, where = bodies.point_of(draft.case.nodes, place)
+        draft.point_index[place] = len(draft.points)
+        draft.points.append((draft.body_names.index(name) if name != bodies.WORLD else -1, tuple(where)))
+    return draft.point_index[place]
+
+
+def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
+    """Row of a line between two points, whose push is numbered later."""
+    ends = [-1 if place is None else point_row(draft, place) for place in places]
+    draft.lines.append((-1, *ends, acts, tuple(direction), 0.0))
+    return len(draft.lines) - 1
+
+
+def lower_lines(draft) -> None:
+    """Number pushes as `lines` name them."""
+    draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
+    rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
+    for k, row in enumerate(rows):
+        if row["line"] >= 0:
+            draft.line_table[row["line"]]["push"] = k
+
+
+def apart(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
+    """How far the second of two points lies from the first at the start [m], and how fast that grows [m/s]."""
+    ends = []
+    for place in places:
+        name, where = (bodies.WORLD, np.zeros(3)) if place is None else bodies.point_of(draft.case.nodes, place)
+        pose = draft.case.poses.get(name, bodies.AT_REST)
+        ends.append((pose.at(where), pose.moves(where), pose.spin))
+    (x, u, a), (z, v, b) = ends
+    _, _, _, acts, direction, _ = line
+    if acts == rec.ABOUT:
+        return 0.0, float(np.dot(direction, b - a))
+    if acts == rec.TOWARD:
+        return 0.0, float(np.dot(direction, v - u))
+    length = float(np.linalg.norm(z - x))
+    return length, float(np.dot(z - x, v - u)) / length if length > 0.0 else 0.0
+
+
+class Statics:
+    """Forces of joints at the start, as the kernels have them: which are balanced, and what is left."""
+
+    def __init__(self, draft, t: float) -> None:
+        self.draft, self.t = draft, t
+        self.written = wiped(draft.shapes)
+        self.written.clock["limit"] = t
+        self.layout = draft.tables.layout[0]
+        self.out = np.zeros(int(self.layout["size"]))
+        self.run("joints: kinematics")
+
+    def run(self, *pieces: str) -> None:
+        """Call pieces of the room of mechanisms as a right-hand side does."""
+        from fvsolve.kernels import calls
+        from fvsolve.kernels.phases import found
+
+        addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
+        for k, piece in enumerate(pieces):
+            addresses[calls.RHS, k] = calls.addressed(found("fvsolve.kernels.mechanism", piece), calls.RATES)
+        handle = make_handle((*self.draft.tables, *self.written, addresses, calls.empty_calls(0, len(calls.HOOKS))))
+        calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
+        calls.rhs_in_turn(self.t, np.zeros(self.draft.size), np.zeros(0), self.out, handle)
+
+    def forces(self) -> np.ndarray:
+        """Forces of all freedoms under what `out` says of bodies, what their motion asks for taken off."""
+        n = len(self.draft.freedom_table)
+        self.run("matrix: weigh")
+        return self.written.scratch[6 * n : 7 * n].copy()
+
+    def accelerations(self) -> np.ndarray:
+        """Of all freedoms, where `accelerate` has just been run [rad/s2] or [m/s2]."""
+        n = len(self.draft.freedom_table)
+        return self.written.scratch[6 * n : 7 * n].copy()
+
+    def loads(self) -> np.ndarray:
+        """Force and torque of every body, as `out` holds them : float64[bodies, 6]."""
+        from fvsolve.kernels.mechanism.room import FORCE
+
+        first, many = int(self.layout["body"]), len(self.draft.body_table)
+        return self.out[first : first + rec.BODY_OUT * many].reshape(many, rec.BODY_OUT)[:, FORCE : FORCE + 6]
+
+    def shares(self, pushes: np.ndarray) -> np.ndarray:
+        """Forces of freedoms by each body's weight, then by each line's push : float64[bodies + lines, freedoms]."""
+        weights, found = self.loads().copy(), []
+        bias = self.by(np.zeros_like(weights))
+        for i in range(len(weights)):
+            alone = np.zeros_like(weights)
+            alone[i] = weights[i]
+            found.append(self.by(alone) - bias)
+        at = int(self.layout["push"])
+        for row in self.draft.line_table:
+            self.loads()[:] = 0.0
+            self.out[at : at + pushes.size] = 0.0
+            self.out[at + row["push"]] = pushes[row["push"]]
+            self.run("lines: push_bodies")
+            found.append(self.forces() - bias)
+        self.loads()[:] = weights
+        return np.array(found).reshape(len(found), len(self.draft.freedom_table))
+
+    def by(self, loads: np.ndarray) -> np.ndarray:
+        """Forces of freedoms under these forces and torques of bodies."""
+        self.loads()[:] = loads
+        return self.forces()
+
+
+def start_bodies(draft, start) -> list[str]:
+    """Lengths of lines, and of joints what is balanced at the start; returns what moves, in words."""
+    if not len(draft.body_table):
+        return []
+    at = Statics(draft, start.t)
+    tables = (draft.brace_table, draft.stop_table, draft.piston_table)
+    pushes = np.array([row["force"] for table in tables for row in table])
+    travel, first = int(at.layout["travel"]), int(at.layout["push"])
+    rows = [row for table in tables for row in table]
+    for line in draft.line_table:
+        line["length"] = at.out[travel + 2 * line["push"]] if line["acts"] == rec.ALONG else 0.0
+        if "speed" in rows[line["push"]].dtype.names:
+            rows[line["push"]]["speed"] = at.out[travel + 2 * line["push"] + 1]
+    size = np.abs(at.shares(pushes)).sum(axis=0)
+    at.out[first : first + pushes.size] = pushes
+    at.run("joints: kinematics", "lines: push_bodies")
+    left = at.forces()
+    freedoms = draft.freedom_table
+    freedoms["balance"] = np.where(np.abs(left) <= SNAP * size, left, 0.0)
+    at.run("joints: kinematics", "lines: push_bodies", "matrix: accelerate")
+    return moves(draft, at.accelerations())
+
+
+def moves(draft, accelerations: np.ndarray) -> list[str]:
+    """What moves at the start, and what begins to, in words."""
+    found = []
+    for name, row in zip(draft.body_names, draft.body_table, strict=True):
+        pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
+        if (fast := np.linalg.norm(pose.spin)) > 0.0:
+            found.append(f"body {name} turns at {fast:.4g} rad/s")
+        if (fast := np.linalg.norm(pose.velocity)) > 0.0:
+            found.append(f"body {name} moves at {fast:.4g} m/s")
+        slides = 0 if row["joint"] in (rec.REVOLUTE, rec.BALL) else 3 if row["joint"] == rec.FREE else 1
+        for part, unit in ((own[:slides], "m/s2"), (own[slides:], "rad/s2")):
+            if np.any(part):
+                found.append(f"body {name} accelerates at {np.linalg.norm(part):.4g} {unit}")
+    return found
