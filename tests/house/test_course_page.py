@@ -24,7 +24,9 @@ STATEMENTS = {  # without a number, in sections 2 to 5: words that a heading has
 }  # fmt: skip
 NOT_YET = "not modelled yet"
 PROMPT = ">>>"
-SLOW = {"(6) The global error", "(13) Stability of a step", "Rotational ports"}  # runs that take more than seconds
+SLOW = {  # what they run, or compile
+    "(6) The global error", "(13) Stability of a step", "Rotational ports", "(71) A volume that moves as it likes",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def of(*keys: str) -> list:
     """Entries that have a field, or Python, slow ones marked."""
     some = [one for one in ENTRIES if any(key in one.fields or (key == "python" and one.python) for key in keys)]
     return [
-        pytest.param(one, id=one.title, marks=[pytest.mark.slow] if one.title in SLOW and "run" in keys else [])
+        pytest.param(one, id=one.title, marks=[pytest.mark.slow] if one.title in SLOW and "where" not in keys else [])
         for one in some
     ]
 
