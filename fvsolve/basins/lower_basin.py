@@ -223,9 +223,16 @@ class BasinRows:
         """Areas of cells over those as drawn, in a state of a model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
-    def points_at(self, y: np.ndarray) -> np.ndarray:
-        """Corners of cells in a state of a model : float64[p, 2] [m]."""
-        return self.mesh.points + sum((y[at] * goes for at, _, goes in self.stretches), np.zeros((1, 2)))
+    def points_at(self, y: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
+        """Corners of cells in a state of a model, of what rides on a body in the world : float64[p, 3] [m]."""
+        x, z = np.ascontiguousarray(self.mesh.points.T)
+        plan = self.mesh.points + sum((y[at] * goes for at, _, goes in self.stretches), np.zeros((1, 2)))
+        points = np.column_stack([plan, self.ground(x, z)])
+        if self.part.on is None:
+            return points
+        from fvsolve.basins.lower_frames import corners
+
+        return corners(self, points, out, layout)
 
     def at_rest(self) -> np.ndarray | float:
         """Its first quantity at rest."""
@@ -269,7 +276,12 @@ class BasinRows:
             from fvsolve.basins.lower_walls import lower_lines
 
             lower_lines(draft, self, row)
+        row["body"] = row["frame"] = -1
         self.lower(draft, row)
+        if self.part.on is not None:
+            from fvsolve.basins.lower_frames import lower_frame
+
+            lower_frame(draft, self, row)
         if self.scalars:
             self.lower_scalars(draft, row)
         row["y"] = draft.size

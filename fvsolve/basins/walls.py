@@ -16,7 +16,7 @@ from fvsolve.kernels.masses import motion
 from fvsolve.kernels.records import NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.schedules import schedule_slopes
 
-FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.Wall`
+FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.MovingWall`
 ROOM = 1e-3  # share of its drawn width that a cell keeps at least
 BESIDE = 8  # speeds of lines that loops over whole vectors look at beyond the last
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case import walls
+from fvsolve.case import riding, walls
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import Place, StartOfFields, Wall
+from fvsolve.parts.basin.part import MovingWall, Place, StartOfFields
 from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show
@@ -164,7 +164,7 @@ def means(found: np.ndarray) -> np.ndarray:
 def place_kind(basin: Basin, patch: str) -> type[Place]:
     """What a patch is as a place."""
     stated = basin.patches.get(patch)
-    return Wall if stated is not None and stated.moves else Place
+    return MovingWall if stated is not None and stated.moves else Place
 
 
 def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
@@ -198,6 +198,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
+        yield from riding.misfits(name, basin, nodes, joined)
         yield from walls.misfits(name, basin, meshes[name], nodes, joined, times)
         for patch, one in basin.patches.items():
             if patch not in known:

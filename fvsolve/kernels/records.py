@@ -27,7 +27,7 @@ ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
 # Status codes that travel up; the message is made in Python.
-OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM = 0, 1, 2, 3, 4, 5
+OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM, NO_WEIGHT = 0, 1, 2, 3, 4, 5, 6
 
 SETTINGS = np.dtype(
     [
@@ -434,6 +434,8 @@ BASIN = np.dtype(
         ("lines", "i8"),  # speeds of lines [m/s]
         ("thrust", "i8"),  # and in `work`: on faces of the boundary, see `free_surface.grid`
         ("turn", "i8"),  # 0 where lines along x move, 1 where those along y do
+        ("body", "i8"),  # that it rides on; -1 for none
+        ("frame", "i8"),  # in `plane`: where and how it stands there, and how its axes move; see `basins.frames`
     ],
     align=True,
 )

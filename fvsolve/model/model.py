@@ -325,7 +325,8 @@ class Model(Shown):
         at = int(self.layout["pressure"])
         for basin in self.basins:
             found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
-        found["points"] = {basin.name: basin.points_at(y) for basin in self.basins if basin.moves}
+        found["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
+                           if basin.moves or basin.part.on is not None}  # fmt: skip
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])

@@ -39,7 +39,7 @@ class Slate:
 
     def __init__(self, model: Model) -> None:
         self.model, self.written, self.tables = model, wiped(model.shapes), model.tables
-        if len(model.tables.walls) > 0:  # what is drawn moves: a run has its own
+        if len(model.tables.walls) > 0 or (model.tables.basins["frame"] >= 0).any():  # what is drawn moves
             self.tables = model.tables._replace(plane=lined(model.tables.plane.size))
             self.tables.plane[:] = model.tables.plane
         self.clock = self.written.clock[0]

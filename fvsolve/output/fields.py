@@ -77,8 +77,8 @@ class FieldSeries:
         for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
             file = f"fields/{basin}-{self.frames:06d}.vtu"
             found = {key: parted(value, cells) for key, value in frame[basin].items()}
-            if basin in frame["points"]:  # between walls that move
-                points = np.column_stack([self.places[basin] + frame["points"][basin], points[:, 2]])
+            if basin in frame["points"]:  # what moves
+                points = np.append(self.places[basin], 0.0) + frame["points"][basin]
             write_frame(self.folder / file, points, cells, found, units)
             self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
         if not self.pipes:

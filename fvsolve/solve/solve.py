@@ -304,7 +304,7 @@ class Run:
         if code == slots.BAD_VALUE:
             bad = np.flatnonzero(~np.isfinite(loop.now))
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0:
+        elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {loop.t:.6g} s"
         if code == slots.CHATTERS:
@@ -331,6 +331,9 @@ class Run:
             return f"stopped: the piston has left no volume{place} at {when}; give it an end-stop"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_ROOM:
             return f"stopped: the wall has left no room{place} at {when}; give its mass an end-stop, or a wider zone"
+        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
+            name = model.basins[int(loop.out[rec.WHERE])].name
+            return f"stopped: the water in {name} has no weight left at {when}; wanted a body that falls less fast"
         if code == slots.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"

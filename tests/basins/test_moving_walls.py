@@ -116,7 +116,7 @@ def test_a_free_piston_on_a_spring_swings_at_the_root_of_the_cotangent_law(metho
     assert errors[1] < 4e-3
 
 
-# what is carried, and what rides ------------------------------------------------------------------------------------
+# what is carried, and what rides ----------
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
@@ -219,7 +219,7 @@ def test_a_wall_that_uses_up_its_zone_ends_the_run_by_name():
     assert "the wall has left no room at b.lid" in result.reason and "end-stop" in result.reason
 
 
-# a link on a side along which lines move --------------------------------------------------------------------------------
+# a link on a side along which lines move ----------
 
 
 def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_and_nothing_is_lost():

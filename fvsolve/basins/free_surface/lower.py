@@ -18,6 +18,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces
 
 HOME = __package__
+FRAMES = Pieces(home="fvsolve.basins", prepare="frames: set_frames", enter="frames: turn_water")
 WATER = Pieces(
     home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_water",
     power="energy: add_power", stored="energy: add_stored",
@@ -62,6 +63,8 @@ class FreeSurfaceRows(BasinRows):
         kind = "grids" if self.is_grid else "meshes"
         yield Pieces(home=HOME, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}")
         yield WATER
+        if self.part.on is not None:
+            yield FRAMES
         if self.moves:
             yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
@@ -98,6 +101,11 @@ class FreeSurfaceRows(BasinRows):
     def start(self) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
         depth = self.depth
+        if self.part.on is not None:
+            from fvsolve.basins.lower_frames import level_at_start
+
+            depth = level_at_start(self)
+            found[0] = depth - self.depth
         if given is not None and given.level is not None:
             depth = depth_at_start(samples(given.level, self.mesh), samples(self.part.bed, self.mesh))
             found[0] = depth - self.depth

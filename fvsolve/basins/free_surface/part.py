@@ -26,6 +26,7 @@ class FreeSurface(Physics, name="free-surface"):
     starts: ClassVar[type[MovingStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     moves: ClassVar[bool] = True
+    rides: ClassVar[bool] = True
     described: ClassVar[str] = "a free surface, whose water has one density"
     steep: ClassVar[bool] = True
 

@@ -8,6 +8,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import NO_DRAG, RATE
 
+GN = 14  # place of g_n among the numbers of a frame
 MINE = kind_of(__package__)
 
 
@@ -23,6 +24,12 @@ def through_faces(kx, ky, flow_x, flow_y):
         wide = 1.0 / kx[i]
         for j in range(ky.size + 1):
             flow_y[j * nx + i] *= wide
+
+
+@njit(forceinline=True)
+def weight_of(st, plane, basin):
+    """Gravity along the normal of a basin [m/s2], which on a body is what it feels there; see `basins.frames`."""
+    return st["gravity"] if basin["frame"] < 0 else plane[basin["frame"] + GN]
 
 
 @njit
@@ -44,7 +51,7 @@ def on_grid(tables, b, y, dydt, out, moves):
     """Rates of cells of a rectangle; moves : None, or as `grid.grid_rates` has it."""
     st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
     n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
-    nx, ny, through = basin["nx"], basin["ny"], basin["through"]
+    nx, ny, through, g = basin["nx"], basin["ny"], basin["through"], weight_of(st, plane, basin)
     plan, many = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), ny * (nx + 1)
     flow_x, flow_y = work[:0], work[:0]
     if f >= 0:  # scalars are carried by them
@@ -54,7 +61,7 @@ def on_grid(tables, b, y, dydt, out, moves):
     rates = to[first : first + 3 * n]
     rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
     rate = grid.grid_rates(
-        st["gravity"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
+        g, basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
         work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y, moves,
     )  # fmt: skip
@@ -92,7 +99,8 @@ def rates_on_meshes(t, y, dydt, out, handle):
         if f >= 0:  # scalars are carried by them
             flow = work[f : f + basin["faces"]]
         rate = faces.shallow_rates(
-            st["gravity"], basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
+            weight_of(st, plane, basin), basin["scheme"], basin["wide"],
+            plane[basin["mesh"] :], integers[basin["links"] :],
             plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
             work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
         )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic.fields import FieldInfo
 
 from fvsolve.errors import FvsolveError, listing
+from fvsolve.parts.attitude import Attitude
 from fvsolve.parts.formula import Formula, Shaped, even
 from fvsolve.parts.node import Node
 from fvsolve.parts.scalar import Carried
@@ -154,7 +155,7 @@ class Place(Node):
     pressure: float | None = None  # of a liquid at rest [Pa]
 
 
-class Wall(Place):
+class MovingWall(Place):
     """A patch that is a wall that moves: force on the water, inward, power that it brings, how far it has moved."""
 
     own: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
@@ -170,7 +171,7 @@ class Physics(Table):
     dimensions; starts : keys of `start`
     laws : of density that it goes with, all if left out; described : what other laws do not go with, in words
     joined : whether links may join its patches; a given velocity passes others
-    moves : whether its walls may move
+    moves : whether its walls may move; rides : whether it may ride on bodies
     carries : whether it carries scalars; echoes : whether its boundary may have an impedance
     steep : whether its fronts steepen into jumps that keep, and smooth flow in the plane is of second order at most
     """
@@ -184,6 +185,7 @@ class Physics(Table):
     described: ClassVar[str] = "basins"
     joined: ClassVar[bool] = True
     moves: ClassVar[bool] = False
+    rides: ClassVar[bool] = False
     carries: ClassVar[bool] = True
     echoes: ClassVar[bool] = False
     steep: ClassVar[bool] = False
@@ -276,6 +278,12 @@ class Basin(Node, kind="basin"):
         Inside(StartOfFields, "level or pressure above that at rest, and velocities; at rest if left out"),
     ] = None
 
+    on: Annotated[str | None, Text("a body that it rides on; it stands still if left out")] = None
+    at: Annotated[
+        tuple[float, ...] | None,
+        Rows("position", length=3, about="its origin in axes of that body, in place of elevation [m]; 0 if left out"),
+    ] = None
+    attitude: Annotated[Attitude | None, Inside(Attitude, "of its axes in those of that body")] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
 
     @property
@@ -309,6 +317,7 @@ class Basin(Node, kind="basin"):
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
         patches = given.get("patches")
         stated = [one.get("body") for one in patches.values() if isinstance(one, dict)] if patches else []
+        stated.append(given.get("on"))
         return tuple(one for one in stated if isinstance(one, str))
 
 

@@ -1,0 +1,55 @@
+"""Basins that ride on bodies, as rows of tables. Knows names; knows no law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.basins.frames import FRAME, PLACES, SURFACE
+
+ENOUGH = 200  # halvings
+
+
+def attitude_of(part) -> np.ndarray:
+    """How a basin stands in the axes of its body : float64[3, 3]."""
+    return np.eye(3) if part.attitude is None else part.attitude.rotation
+
+
+def lower_frame(draft, basin, row) -> None:
+    """Reserve what is known of its axes, and keep the surface as drawn."""
+    part, grid, (x, y) = basin.part, basin.mesh.grid, basin.mesh.centre.T
+    places = np.concatenate([x, y])
+    if basin.is_grid:
+        places = np.concatenate([0.5 * (one[1:] + one[:-1]) for one in (grid.x, grid.y)])
+    numbers = np.zeros(FRAME)
+    numbers[:3] = part.at or (0.0, 0.0, 0.0)
+    numbers[3:12] = attitude_of(part).ravel()
+    numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
+    numbers[PLACES] = draft.to_plane(places)
+    row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
+
+
+def level_at_start(basin) -> np.ndarray:
+    """Depth of water that is level in the world though its basin is not, of the volume that it has at rest [m]."""
+    pose, part = basin.case.poses[basin.part.on], basin.part
+    down = (pose.attitude @ attitude_of(part)).T @ np.array([0.0, 0.0, -1.0])
+    ground = basin.bed - part.level + (down[0] * basin.x + down[1] * basin.y) / down[2]
+    area, volume = basin.mesh.area, float(np.sum(basin.mesh.area * basin.depth))
+    if not np.ptp(ground - (basin.bed - part.level)) > 0.0:
+        return basin.depth
+    low, high = float(ground.min()), float(ground.max()) + volume / float(area.sum())
+    for _ in range(ENOUGH):
+        middle = 0.5 * (low + high)
+        full = float(np.sum(area * np.maximum(middle - ground, 0.0))) > volume
+        low, high = (low, middle) if full else (middle, high)
+    return np.maximum(0.5 * (low + high) - ground, 0.0)
+
+
+def corners(basin, points: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
+    """Points in axes of a basin where they are in the world : float64[p, 3] [m]."""
+    from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE
+    from fvsolve.kernels.records import BODY_OUT
+
+    first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
+    turn = out[first + ATTITUDE :][:9].reshape(3, 3)
+    at = np.array(basin.part.at or (0.0, 0.0, 0.0))
+    return out[first + PLACE :][:3] + (at + points @ attitude_of(basin.part).T) @ turn.T

@@ -1,0 +1,191 @@
+"""Basins that ride on driven bodies: water at rest in boxes that turn, slow down or lean, sway, roll, bowls, faults."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fvsolve import advance, build, load, run
+from fvsolve.errors import CaseError
+from fvsolve.model.model import State
+from tests.truth.scenes import GRAVITY, scene
+
+HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
+METHODS = ("ssp-rk3", "gauss-4", "rodas-4")
+
+
+def turning(angle, axis=(0, 0, 1), **more):
+    return {**HEAVY, "joint": {"kind": "revolute", "axis": list(axis), "angle": angle, **more}}
+
+
+def sliding(travel, axis=(1, 0, 0), **more):
+    return {**HEAVY, "joint": {"kind": "prismatic", "axis": list(axis), "travel": travel, **more}}
+
+
+def tank(cells=(20, 20), size=(2.0, 2.0), level=0.3, on="body", **more):
+    return {"type": "basin", "on": on, "size": list(size), "cells": list(cells), "level": level, **more}
+
+
+def moved(body, basin, until, numerics=None, **nodes):
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}
+    model = build(load(scene({"body": body, "b": basin, **nodes}, {}, until, numerics)))
+    state = advance(model, State(0.0, model.start.copy()), until)
+    return model, state, model.basins[0].of(state.y)
+
+
+def steady(rate, span=100.0):
+    return {"time": [0.0, span], "value": [0.0, rate * span]}
+
+
+# water at rest ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("axis", [[0, 0, 1], [0, 0, -1]])
+def test_water_that_turns_with_its_box_rests_as_a_paraboloid_wherever_the_axis_is(method, axis):
+    rate, (cx, cy) = 2.0, (0.7, 1.3)
+    bowl = f"0.3 + {rate**2 / (2 * GRAVITY)} * ((x - {cx})**2 + (y - {cy})**2)"
+    basin = tank((10, 10), at=[-cx, -cy, 0.0], start={"level": bowl})
+    case = {"scheme": "muscl", "method": method, **({"courant": 0.5} if method == "ssp-rk3" else {"step": 0.05})}
+    model = build(load(scene({"body": turning(steady(rate), axis), "b": basin}, {}, 1.0, case)))
+    state = advance(model, State(0.0, model.start.copy()), 1.0)
+    found = model.basins[0].of(state.y)
+    assert np.abs(found[1:]).max() < (1e-13 if method == "ssp-rk3" else 1e-10)
+    assert found[0] == pytest.approx(model.basins[0].of(model.start)[0], abs=1e-10)
+
+
+def test_a_box_that_turns_so_fast_that_its_middle_is_dry_rests_too():
+    rate = 6.0
+    bowl = f"{rate**2 / (2 * GRAVITY)} * ((x - 1)**2 + (y - 1)**2) - 0.6"
+    flows = []
+    for n in (20, 40):  # cells at the shore are cut by a curve, and settle
+        basin = tank((n, n), at=[-1, -1, 0], start={"level": bowl})
+        flows.append(np.abs(moved(turning(steady(rate)), basin, 1.0)[2][1:]).mean())
+    assert flows[1] < 0.5 * flows[0] < 1e-3
+
+
+def test_a_box_that_slows_down_steadily_holds_its_water_aslant_and_a_tilted_one_level():
+    slows = 2.0 * 10.0 / 10.0**2  # x = 10 (1 - (1 - t / 10)^2)
+    travel = {"start": 0.0, "duration": 10.0, "value": [0.0, 10.0], "exponent": 2}
+    slope = slows / GRAVITY
+    _, _, found = moved(sliding(travel), tank(start={"level": f"0.3 + {slope} * (x - 1)"}), 2.0)
+    assert np.abs(found[1:]).max() < 1e-13
+    tilt = {"roll": "3 deg", "pitch": "-4 deg", "yaw": "30 deg"}
+    held = {**HEAVY, "joint": {"kind": "fixed", "attitude": tilt}}
+    model, _, found = moved(held, tank(), 2.0)
+    assert np.abs(found[1:]).max() < 1e-13
+    assert np.ptp(found[0]) > 0.1
+    assert abs(np.sum(found[0])) < 1e-9
+    again, _, same = moved({**HEAVY, "joint": {"kind": "fixed"}}, tank(attitude=tilt), 2.0)
+    assert same[0] == pytest.approx(found[0], abs=1e-12)
+
+
+# linear waves -----------------------------------------------------------------------------------------------------------
+
+
+def forced(x, length, w, push, depth=0.3):
+    """V(x) of u = V cos(w t) under the force push sin(w t) in a closed box, from u = V at the start [m/s]."""
+    k = w / math.sqrt(GRAVITY * depth)
+    a = push / w
+    return -a + a * np.cos(k * x) + a * (1.0 - math.cos(k * length)) / math.sin(k * length) * np.sin(k * x)
+
+
+def start_of(length, w, push, depth=0.3, along="x"):
+    k, a = w / math.sqrt(GRAVITY * depth), push / w
+    b = a * (1.0 - math.cos(k * length)) / math.sin(k * length)
+    return f"{-a} + {a} * cos({k} * {along}) + {b} * sin({k} * {along})"
+
+
+@pytest.mark.parametrize("way", ["sway", "surge", "roll", "pitch", "heading"])
+def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
+    a, w, length, high = 1e-5, 3.0, 2.0, 1.5
+    swing = {"mean": 0.0, "amplitude": a, "period": 2.0 * math.pi / w}
+    rolled = a * (GRAVITY + high * w**2)  # gravity along the box, and its bed's acceleration
+    push = {"sway": a * w**2, "surge": a * w**2, "heading": a * w**2, "roll": -rolled, "pitch": rolled}[way]
+    along = "y" if way in ("surge", "roll") else "x"
+    body = {
+        "sway": sliding(swing), "surge": sliding(swing, (0, 1, 0)), "heading": sliding(swing, (0, 1, 0)),
+        "pitch": turning(swing, (0, 1, 0)), "roll": turning(swing, (1, 0, 0)),
+    }[way]  # fmt: skip
+    errors = []
+    for n in (16, 32):
+        more = {"start": {"u" if along == "x" else "v": start_of(length, w, push, along=along)}}
+        if way in ("roll", "pitch"):
+            more["at"] = [-1.0, -1.0, high]
+        if way == "heading":
+            more["attitude"] = {"yaw": "90 deg"}
+        cells, size = ((n, 2), (length, 1.0)) if along == "x" else ((2, n), (1.0, length))
+        numerics = {"scheme": "upwind5", "method": "rk4", "step": 0.2 * length / n}
+        case = scene({"body": body, "b": tank(cells, size, **more)}, {}, 1.0, numerics)
+        model = build(load(case))
+        found = model.basins[0].of(advance(model, State(0.0, model.start.copy()), 1.0).y)
+        x = model.basins[0].mesh.centre[:, 0 if along == "x" else 1]
+        wanted = 0.3 * forced(x, length, w, push) * math.cos(w)
+        errors.append(np.abs(found[1 if along == "x" else 2] - wanted).max() / np.abs(wanted).max())
+    assert errors[1] < errors[0] / 3.0
+    assert errors[1] < 1e-2
+
+
+# nonlinear: a bowl that stands still, seen from axes that turn ----------
+
+
+def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still():
+    h0, a, eta = 0.5, 1.0, 0.25
+    w = math.sqrt(2.0 * GRAVITY * h0) / a
+    amplitude, period, end = 0.8, 2.0, 1.0
+
+    def depth(x, y, t):
+        return eta * h0 / a**2 * (2 * x * math.cos(w * t) + 2 * y * math.sin(w * t) - eta) + h0 * (
+            1 - (x**2 + y**2) / a**2
+        )
+
+    spin = amplitude * 2.0 * math.pi / period
+    swing = {"mean": 0.0, "amplitude": amplitude, "period": period}
+    bed = f"{h0 / a**2} * ((x - 2)**2 + (y - 2)**2)"
+    start = {
+        "level": f"{h0} + {eta * h0 / a**2} * (2 * (x - 2) - {eta})",
+        "u": f"{spin} * (y - 2)", "v": f"{eta * w} - {spin} * (x - 2)",
+    }  # fmt: skip
+    errors = []
+    for n in (30, 60):
+        basin = tank((n, n), (4.0, 4.0), level=h0, at=[-2.0, -2.0, 0.0], bed=bed, start=start)
+        model, _, found = moved(turning(swing), basin, end)
+        one = model.basins[0]
+        angle = amplitude * math.sin(2.0 * math.pi * end / period)
+        x, y = one.x - 2.0, one.y - 2.0
+        east, north = math.cos(angle) * x - math.sin(angle) * y, math.sin(angle) * x + math.cos(angle) * y
+        wanted = np.maximum(depth(east, north, end), 0.0)
+        errors.append(np.abs(one.depth + found[0] - wanted).sum() / wanted.sum())
+    assert errors[1] < errors[0] / 2.0
+    assert errors[1] < 2.5e-2
+
+
+def test_a_tank_that_falls_freely_ends_the_run_by_name():
+    travel = {"start": 0.0, "duration": 10.0, "value": [0.0, 600.0], "exponent": 2}  # slows by 12 m/s2 going up
+    basin = tank((4, 4))
+    case = scene({"body": sliding(travel, (0, 0, 1)), "b": basin}, {}, 1.0, {"scheme": "upwind"}, every=0.1)
+    result = run(case)
+    assert not result.ok and "the water in b has no weight left" in result.reason
+
+
+# faults ---------------------------------------------------------------------------------------------------------------
+
+FAULTS = {
+    "rides on body; say where with at": ({}, {"elevation": 1.0}),
+    "wanted a body: body; did you mean": ({}, {"on": "bdy"}),
+    "name that with on": ({}, {"on": None, "at": [0, 0, 1]}),
+    "moves freely": ({"joint": {"kind": "revolute", "axis": [0, 0, 1]}}, {}),
+    "rides on no body yet": ({}, {"physics": "liquid", "level": None, "pressure": 2e5, "thickness": 0.1}),
+    "one of both": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
+    "unknown key": ({}, {"attitude": {"rol": 0.1}}),
+}
+
+
+@pytest.mark.parametrize("text", FAULTS)
+def test_what_cannot_ride_is_refused_by_name(text):
+    body, keys = FAULTS[text]
+    basin = {key: value for key, value in {**tank(), **keys}.items() if value is not None}
+    with pytest.raises(CaseError, match=text):
+        load(scene({"body": {**turning(steady(1.0)), **body}, "b": basin}, {}, 1.0, {}))
