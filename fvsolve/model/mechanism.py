@@ -17,7 +17,7 @@ KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL,
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
 STATES = {  # of each kind: coordinates, then velocities; with how small each is
     "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
-    "prismatic": ({"travel": SMALL_TRAVEL}, {"rate": SMALL_SPEED}),
+    "prismatic": ({"travel": SMALL_TRAVEL}, {"travel_rate": SMALL_SPEED}),
     "ball": (dict.fromkeys(ANGLES, SMALL_ANGLE), dict.fromkeys(SPINS, SMALL_SPIN)),
     "free": (dict.fromkeys(("centre_x", "centre_y", "centre_z"), SMALL_TRAVEL) | dict.fromkeys(ANGLES, SMALL_ANGLE),
              dict.fromkeys(("centre_vx", "centre_vy", "centre_vz"), SMALL_SPEED) | dict.fromkeys(SPINS, SMALL_SPIN)),
@@ -117,7 +117,8 @@ def apart(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
     (x, u, a), (z, v, b) = ends
     _, _, _, acts, direction, _ = line
     if acts == rec.ABOUT:
-        return 0.0, float(np.dot(direction, b - a))
+        axis = draft.case.poses[bodies.point_of(draft.case.nodes, places[1])[0]].attitude @ direction
+        return 0.0, float(np.dot(axis, b - a))
     if acts == rec.TOWARD:
         return 0.0, float(np.dot(direction, v - u))
     length = float(np.linalg.norm(z - x))
