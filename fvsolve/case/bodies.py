@@ -66,14 +66,21 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
     Those that hang in a loop, or on what is not there, are left out.
     """
     waiting, found = {name: node for name, node in nodes.items() if isinstance(node, Body)}, {}
+    frames = [name for name, node in nodes.items() if node.kind == "frame"]
     while waiting:
-        ready = {name: one for name, one in waiting.items() if (up := hangs_on(one)[0]) not in waiting and (
-                 up == WORLD or up in found or getattr(nodes.get(up), "kind", "") == "frame")}  # fmt: skip
+        ready = {name: one for name, one in waiting.items() if hangs_on(one)[0] not in waiting and placed(nodes, one)
+                 and hangs_on(one)[0] in (WORLD, *found, *frames)}  # fmt: skip
         if not ready:
             return found
         found |= ready
         waiting = {name: one for name, one in waiting.items() if name not in ready}
     return found
+
+
+def placed(nodes: dict[str, Any], body: Body) -> bool:
+    """Whether what a body hangs on, and the point there, are known."""
+    name, point = hangs_on(body)
+    return name == WORLD or (hasattr(nodes.get(name), "points") and (not point or point in nodes[name].points))
 
 
 def hangs_on(body: Body) -> tuple[str, str]:
@@ -112,7 +119,7 @@ def joined(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
         return Pose(turn, place + far, velocity + np.cross(spin, far) + axis * rate(joint, t), spin)
     if joint.kind == "free":  # whose velocity is that of its centre of mass
         spin = turn @ joint.turning
-        centre = np.array(joint.velocity) - np.cross(spin, turn @ np.array(body.centre_of_mass))
+        centre = joint.speed - np.cross(spin, turn @ np.array(body.centre_of_mass))
         return Pose(turn, place, centre, spin)
     return Pose(turn, place, velocity, spin + turn @ joint.turning if joint.kind == "ball" else spin)
 
@@ -125,7 +132,7 @@ def coordinate(joint: Any, t: float) -> float:
 def rate(joint: Any, t: float) -> float:
     """Its rate then; of one that is driven by differences of what drives it, as far as pictures and checks need."""
     if joint.driven is None:
-        return float(joint.rate)
+        return float(joint.rate or 0.0)
     h = 1e-4
     return float(value(joint.driven, t + h) - value(joint.driven, t - h)) / (2.0 * h)
 
@@ -151,6 +158,17 @@ def ahead(nodes: dict[str, Any], found: dict[str, Pose], first: str, second: str
         return None
     here, there = (found.get(name, AT_REST).at(place) for name, place in points)
     return float(np.linalg.norm(there - here))
+
+
+def one_place(nodes: dict[str, Any], links: dict[str, Any], found: dict[str, Pose]) -> Found:
+    """Faults of links along a line between two points that lie in one place at the start: it has no direction."""
+    for name, link in links.items():
+        ends = [link.ports.get(port) for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))]
+        if None in ends or getattr(link, "direction", None) is not None or getattr(link, "axis", None) is not None:
+            continue
+        if None not in [point_of(nodes, end) for end in ends] and ahead(nodes, found, *ends) == 0.0:
+            text = f"{ends[0]} and {ends[1]} lie in one place at the start, so the line between them has no direction"
+            yield ("links", name), text
 
 
 def misfits(nodes: dict[str, Any]) -> Found:

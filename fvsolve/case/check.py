@@ -53,7 +53,7 @@ def network(table: dict[str, Any]) -> Found:
         if table.get(group) == {} and not alone:
             yield (group,), "is empty; wanted two places and a link between them at least"
     tied = {name: _tied(name, node, places) for name, node in nodes.items()}
-    hanging = _hanging(nodes)
+    hanging = _hanging(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
     for name, node in nodes.items():
         if own_places(name, node) is None and not touched & {name, *_points(name, node)}:
@@ -95,6 +95,7 @@ def parts(
 
     yield from bodies.misfits(nodes)
     poses = bodies.poses(nodes, start)
+    yield from bodies.one_place(nodes, links, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():
@@ -173,13 +174,13 @@ def _points(name: str, node: Any) -> list[str]:
     return [f"{name}.{one}" for one in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
 
 
-def _hanging(nodes: dict[str, Any]) -> list[list[str]]:
+def _hanging(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
     """Of every body what it is joined to, and of every frame with points the world."""
     found = []
     for name, node in nodes.items():
         kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
         if kind == "body":
-            found.append([name, on] if isinstance(on, str) and on.partition(".")[0] in nodes else [name, WORLD])
+            found.append([name, on] if isinstance(on, str) and on in places else [name, WORLD])
         elif kind == "frame" and _points(name, node):
             found.append([_points(name, node)[0], WORLD])
     return found

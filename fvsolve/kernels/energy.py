@@ -17,7 +17,7 @@ import numpy as np
 from fvsolve.jit import njit
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.masses import contact, motion, piston_travel, stop_travel, travel_of
+from fvsolve.kernels.masses import contact, excess_of, motion, piston_travel, stop_travel, travel_of
 from fvsolve.kernels.pipes import family_of
 from fvsolve.kernels.records import CHAMBER, MUSCL, SHORT, TANK, UPWIND, WENO5
 from fvsolve.kernels.rigid import column_drag
@@ -218,6 +218,8 @@ def power_pistons(y, dydt, out, tables, power, at):
             change = out[layout["pressure"] + i]
             p = (nodes[i]["pressure"] - st["ambient"]) + change
             excess, swept = dydt[nodes[i]["y"]], area * speed
+            if piston["line"] >= 0:
+                excess -= sweep * speed
             own = p * swept * (0.5 * p / st["beta"] - change / st["beta"])
             power[NODE * i + 1] = per * (p * excess + height_pressure(st, nodes[i]) * (excess + sweep * speed)) + own
             law += (per * p * sweep * speed - p * swept) - own
@@ -247,7 +249,8 @@ def stored_linear(t, y, dydt, out, handle, stored):
             i, area, sweep = moving_side(tables, piston, side)
             change, p0 = out[layout["pressure"] + i], nodes[i]["pressure"] - st["ambient"]
             squeezed = nodes[i]["volume"] * change * (2.0 * p0 + change) + area * x * (p0 + change) * (p0 + change)
-            height = per * height_pressure(st, nodes[i]) * (y[nodes[i]["y"]] + sweep * x)
+            gained = excess_of(y, tables, piston, i, sweep, x) + sweep * x
+            height = per * height_pressure(st, nodes[i]) * gained
             stored[i] = 0.5 * squeezed / st["beta"] + height
     at = nodes.size
     for k in range(pipes.size):

@@ -28,7 +28,7 @@ from fvsolve.kernels.energy import (
 )
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.masses import leak_flow, piston_travel
+from fvsolve.kernels.masses import excess_of, leak_flow, piston_travel
 from fvsolve.kernels.records import CHAMBER, JUNCTION, LAW_LINEAR, TANK
 from fvsolve.kernels.rigid import column_drag
 
@@ -179,7 +179,7 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
         a, b = piston["a"], piston["b"]
         for side in range(2):
             i, area, sweep = moving_side(tables, piston, side)
-            gained = dydt[nodes[i]["y"]] + sweep * speed
+            gained = dydt[nodes[i]["y"]] + (sweep * speed if piston["line"] < 0 else 0.0)
             power[NODE * i + 1] = total_head(tables, out, i) * gained - gauge(tables, out, i) * area * speed
         p_a, p_b = nodes[a]["pressure"] + out[pressure + a], nodes[b]["pressure"] + out[pressure + b]
         leak = leak_flow(tables, piston, p_a, p_b)
@@ -216,7 +216,8 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
         for side in range(2):
             i, area, sweep = moving_side(tables, piston, side)
             node, p0 = nodes[i], nodes[i]["pressure"]
-            mass, volume = node["mass"] + (y[node["y"]] + sweep * x), node["volume"] + area * x
+            gained = excess_of(y, tables, piston, i, sweep, x) + sweep * x
+            mass, volume = node["mass"] + gained, node["volume"] + area * x
             stored[i] = vessel_energy(st, floats, node, mass, volume, p0 + out[layout["pressure"] + i])
             stored[i] -= vessel_energy(st, floats, node, node["mass"], node["volume"], p0)
     at = nodes.size

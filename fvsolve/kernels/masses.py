@@ -4,6 +4,7 @@ Wraps the rhs of the fluid: first the pressures of moving chambers and what thei
 forces and accelerations. A chamber's state is its excess mass e over what its volume V would hold at the density
 m0 / V0 of the start, so that it is the pressure that is stepped and not the small difference of two large masses:
 p - p0 = beta e / (rho0 V) under `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under `log` and `table`.
+Of a piston between points the mass itself is stepped, which a shut chamber keeps to the last bit.
 A push goes by its travel in `out`, wherever it acts: on the axis that of two masses, of bodies that of two points,
 which `kernels.mechanism.lines` has written. Its masses are then one that stands still, and it pushes none.
 """
@@ -115,6 +116,13 @@ def chamber_state(tables, node, volume, excess):
     return p - pressure_of_log(st, floats, 0.0, q0), 1.0 / (log_density(st, floats, p)[1] * mass)
 
 
+@njit(forceinline=True)
+def excess_of(y, tables, piston, i, sweep, x):
+    """Excess mass of chamber i [kg]: its state, or on a line between points what that leaves of all that came in."""
+    held = y[tables.nodes[i]["y"]]
+    return held - sweep * x if piston["line"] >= 0 else held
+
+
 @njit
 def chambers(t, y, dydt, out, handle):
     """Pressures and stiffness of moving chambers, and the flow that the piston and its leak take from each."""
@@ -128,10 +136,11 @@ def chambers(t, y, dydt, out, handle):
             i = piston["b"] if side == 1 else piston["a"]
             area = -piston["area_b"] if side == 1 else piston["area_a"]
             sweep = piston["sweep_b"] if side == 1 else piston["sweep_a"]
-            p, stiffness = chamber_state(tables, nodes[i], nodes[i]["volume"] + area * x, y[nodes[i]["y"]])
+            excess = excess_of(y, tables, piston, i, sweep, x)
+            p, stiffness = chamber_state(tables, nodes[i], nodes[i]["volume"] + area * x, excess)
             out[layout["pressure"] + i] = p
             out[layout["stiffness"] + nodes[i]["row"]] = stiffness
-            out[layout["swept"] + nodes[i]["row"]] = sweep * speed
+            out[layout["swept"] + nodes[i]["row"]] = sweep * speed if piston["line"] < 0 else 0.0
         if piston["leakage"] > 0.0:
             a, b = piston["a"], piston["b"]
             p_a = nodes[a]["pressure"] + out[layout["pressure"] + a]

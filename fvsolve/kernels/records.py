@@ -234,7 +234,7 @@ LINE = np.dtype(  # a push on points of bodies
         ("push", "i8"),
         ("from_point", "i8"),  # -1 for none
         ("to_point", "i8"),
-        ("acts", "i8"),  # ALONG the line between the points, ON a direction of the world, ABOUT one
+        ("acts", "i8"),  # ALONG the line between both, TOWARD a direction of the world, ABOUT an axis of `to`
         ("direction", "f8", (3,)),
         ("length", "f8"),  # at the start [m]
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import rows_in
+from fvsolve.model.mechanism import factored
 from fvsolve.model.scalars import bounds
 from fvsolve.model.unsteady import memory_shares
 
@@ -79,7 +81,8 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
 
     A wave of r [kg/s] stores r^2 dx / (rho A), a flow that unsteady friction remembers (`kernels.unsteady`)
     g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a mass m v^2 / 2,
-    a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
+    bodies v' M v / 2, a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder
+    dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
     its excess at y. Exact under `linear` about a profile at rest. Devices store what their `squares` say, cells of
     basins what `basins.lower_energy` says. A scalar stores nothing; a deviation of its amount, over the greatest value
     that there can be, counts as 1e-6 of what so much mass would store, for nothing else hangs on it. Positions that
@@ -91,8 +94,9 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     own = energy_weights(model, y)
     names = [name.rsplit(".", 1)[0] for name in model.state_names]
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
-    stored |= {e: (names[e], row) for e, row in swept(model, y)}
-    found = [*stored.values(), *stretched(model, y), *of_devices(model, y)]
+    grows = Growth(model, y)
+    stored |= {e: (names[e], row) for e, row in swept(model, y, grows)}
+    found = [*stored.values(), *stretched(model, y, grows), *of_devices(model, y), *kinetic(model, y)]
     entries = [(k, i, value) for k, (_, row) in enumerate(found) for i, value in row.items()]
     row, column, value = (np.array(one) for one in zip(*entries, strict=True))
     matrix = csr_array((value, (row, column)), shape=(len(found), model.y_size))
@@ -193,15 +197,16 @@ def typical(model, q: int) -> float:
     return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
 
 
-def stretched(model, y: np.ndarray):
+def stretched(model, y: np.ndarray, grows: Growth):
     """(name, row of L) of springs and of stops in touch."""
-    for (name, *_), row in zip(rows_in(model.case, "brace"), model.tables.braces, strict=True):
+    braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
+    for k, ((name, *_), row) in enumerate(zip(braces, model.tables.braces, strict=True)):
         if row["stiffness"] > 0.0:
-            yield name, travel(model, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
-    for (name, *_), row in zip(rows_in(model.case, "stop"), model.tables.stops, strict=True):
-        x = distance(model, y, row["from_mass"], row["to_mass"])
+            yield name, grows.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
+    for k, ((name, *_), row) in enumerate(zip(stops, model.tables.stops, strict=True), len(braces)):
+        x = grows.travel(k)
         if row["below"] + x < 0.0 or x > row["above"]:
-            yield name, travel(model, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
+            yield name, grows.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
 
 
 def of_devices(model, y: np.ndarray):
@@ -214,33 +219,77 @@ def of_devices(model, y: np.ndarray):
             yield name, square
 
 
-def swept(model, y: np.ndarray):
-    """(state, row of L) of moving chambers at y: with less room the same excess e [kg] is more pressure."""
+def swept(model, y: np.ndarray, grows: Growth):
+    """(state, row of L) of moving chambers at y: with less room the same excess e [kg] is more pressure.
+
+    Between points the state is the mass, e and what its volume has gained at the density of the start.
+    """
     nodes, pistons = model.tables.nodes, model.tables.pistons
-    per_mass = model.evaluate(model.case.numerics.start, y)[1][model.layout["stiffness"] :] if len(pistons) else []
-    for row in pistons:
-        masses = row["case"], row["rod"]
-        x = distance(model, y, *masses)
+    per_mass, first = grows.out[int(model.layout["stiffness"]) :], len(model.tables.braces) + len(model.tables.stops)
+    for k, row in enumerate(pistons, first):
+        x = grows.travel(k)
         for name, sign in (("a", 1.0), ("b", -1.0)):
-            node, area = nodes[row[name]], sign * float(row[f"area_{name}"])
+            node, area, sweep = nodes[row[name]], sign * float(row[f"area_{name}"]), float(row[f"sweep_{name}"])
             at, volume = int(node["y"]), float(node["volume"] + area * x)
-            added = float(y[at]) / volume  # density, over that of the start
-            density = float(row[f"sweep_{name}"]) / area + added
-            root = float(np.sqrt(per_mass[node["row"]] / (2.0 * density)))
-            yield at, {at: root} | (travel(model, *masses, -root * added * area) if added else {})
+            excess = float(y[at]) - (sweep * x if row["line"] >= 0 else 0.0)
+            added = excess / volume  # density, over that of the start
+            root = float(np.sqrt(per_mass[node["row"]] / (2.0 * (sweep / area + added))))
+            per_travel = added * area + (sweep if row["line"] >= 0 else 0.0)
+            moved = grows.by(k, row["case"], row["rod"], -root * per_travel) if per_travel else {}
+            yield at, {at: root} | moved
 
 
-def travel(model, i: int, j: int, factor: float) -> dict[int, float]:
-    """Row of `factor` times (x_j - x_i), of those of the two masses that can move."""
-    places = model.tables.masses["y"]
-    return {int(places[k]): sign * factor for k, sign in ((i, -1.0), (j, 1.0)) if places[k] >= 0 and i != j}
+class Growth:
+    """By how much pushes have grown at a state, and what deviations of states add to that.
+
+    out : what the rhs writes beside dydt there
+    """
+
+    def __init__(self, model, y: np.ndarray) -> None:
+        self.model, self.y = model, y
+        self.t = model.case.numerics.start
+        self.out = model.evaluate(self.t, y)[1]
+        self.first = int(model.layout["travel"])
+
+    def travel(self, k: int) -> float:
+        """Of push k [m]."""
+        return float(self.out[self.first + 2 * k])
+
+    def by(self, k: int, i: int, j: int, factor: float) -> dict[int, float]:
+        """Row of `factor` times the growth of push k, between masses i and j, or two points."""
+        places = self.model.tables.masses["y"]
+        if i != j:
+            return {int(places[m]): sign * factor for m, sign in ((i, -1.0), (j, 1.0)) if places[m] >= 0}
+        return {at: factor * float(row[2 * k]) for at, row in self.slopes.items() if row[2 * k] != 0.0}
+
+    @cached_property
+    def slopes(self) -> dict[int, np.ndarray]:
+        """Coordinate of a joint -> d travel of all pushes / d coordinate."""
+        tables, found = self.model.tables, {}
+        last = self.first + 2 * (len(tables.braces) + len(tables.stops) + len(tables.pistons))
+        for body in tables.bodies:
+            many = int(body["freedoms"]) + (body["freedoms"] >= 3)
+            for at in range(int(body["y"]), int(body["y"]) + many):
+                step = 1e-6 * (self.model.scale[at] + abs(self.y[at])) * 1e2
+                high, low = self.y.copy(), self.y.copy()
+                high[at], low[at] = high[at] + step, low[at] - step
+                ends = [self.model.evaluate(self.t, one)[1][self.first : last] for one in (high, low)]
+                found[at] = (ends[0] - ends[1]) / (high[at] - low[at])
+        return found
 
 
-def distance(model, y: np.ndarray, i: int, j: int) -> float:
-    """By how much mass j has moved away from mass i since the start [m]."""
-    places = model.tables.masses["y"]
-    back, forth = (float(y[places[k]]) if places[k] >= 0 else 0.0 for k in (i, j))
-    return forth - back
+def kinetic(model, y: np.ndarray):
+    """(name, row of L) of bodies: v' M v / 2 = |L v|^2 / 2 with the factor of M that the kernels have."""
+    bodies, freedoms, n = model.tables.bodies, model.tables.freedoms, len(model.tables.freedoms)
+    if not n:
+        return
+    factor = factored(model, y)[8 * n :]
+    rate = [int(body["rate"]) + k for body in bodies for k in range(body["freedoms"])]
+    names = [name for name, body in zip(model.body_names, bodies, strict=True) for _ in range(body["freedoms"])]
+    for name, row in zip(names, freedoms, strict=True):
+        path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
+        entries = np.sqrt(0.5) * factor[row["row"] : row["row"] + row["depth"] + 1]
+        yield name, {rate[j]: float(entry) for j, entry in zip(path, entries, strict=True)}
 
 
 def stiffness(model, row) -> float:

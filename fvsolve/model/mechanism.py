@@ -7,6 +7,7 @@ import numpy as np
 from fvsolve.case import bodies
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
+from fvsolve.model.schedules import break_times
 from fvsolve.model.slate import wiped
 from fvsolve.parts.body.part import Body
 
@@ -17,7 +18,7 @@ KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL,
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
 STATES = {  # of each kind: coordinates, then velocities; with how small each is
     "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
-    "prismatic": ({"travel": SMALL_TRAVEL}, {"rate": SMALL_SPEED}),
+    "prismatic": ({"travel": SMALL_TRAVEL}, {"travel_rate": SMALL_SPEED}),
     "ball": (dict.fromkeys(ANGLES, SMALL_ANGLE), dict.fromkeys(SPINS, SMALL_SPIN)),
     "free": (dict.fromkeys(("centre_x", "centre_y", "centre_z"), SMALL_TRAVEL) | dict.fromkeys(ANGLES, SMALL_ANGLE),
              dict.fromkeys(("centre_vx", "centre_vy", "centre_vz"), SMALL_SPEED) | dict.fromkeys(SPINS, SMALL_SPIN)),
@@ -59,13 +60,13 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
     row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
     row["at"], row["attitude"] = bodies.joint_place(draft.case.nodes, body), joint.attitude.rotation.ravel()
-    row["damping"], pose = joint.damping, draft.case.poses[name]
+    row["damping"], pose = joint.damping or 0.0, draft.case.poses[name]
     row["height"] = pose.at(body.centre_of_mass)[2]
     speed, spin = pose.moves(body.centre_of_mass), pose.attitude.T @ pose.spin
     row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.moment() @ spin)
     row["y"] = row["rate"] = row["schedule"] = -1
     if joint.driven is not None:
-        row["schedule"] = draft.schedules.add(joint.driven)
+        drive(draft, name, joint.driven, row)
         return
     coordinates, velocities = STATES[joint.kind]
     if not coordinates:
@@ -75,11 +76,32 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     row["rate"] = draft.states([f"{name}.{key}" for key in velocities], list(velocities.values()))
     if joint.kind == "free":
         row["start"] = [*pose.at(body.centre_of_mass), *joint.attitude.parameters]
-        row["speed"] = [*joint.velocity, *joint.turning]
+        row["speed"] = [*joint.speed, *joint.turning]
     elif joint.kind == "ball":
         row["start"][0], row["speed"][:3] = 1.0, joint.turning
     else:
-        row["start"][0], row["speed"][0] = bodies.coordinate(joint, t), joint.rate
+        row["start"][0], row["speed"][0] = bodies.coordinate(joint, t), joint.rate or 0.0
+
+
+def drive(draft, name: str, schedule, row) -> None:
+    """Let a schedule drive a joint: one whose rate jumps would want a force without end, and is a fault."""
+    row["schedule"] = draft.schedules.add(schedule)
+    key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
+    kinks = [time for time, _ in sorted(rate_jumps(schedule))]
+    if kinks:
+        what = "it jumps" if schedule.kind == "step" else "its rate jumps"
+        text = f"drives the joint, and at t = {kinks[0]:g} s {what}, which asks for a force without end"
+        draft.fault(f"nodes.{name}.joint.{key}", f'{text}; wanted kind = "smooth", level at both ends, or a wave')
+    for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # its acceleration jumps
+        draft.schedules.breaks.setdefault(float(time), False)
+
+
+def rate_jumps(schedule) -> list[tuple[float, bool]]:
+    """Times at which the rate of a schedule jumps, or it itself does: a ramp may begin or end level."""
+    if schedule.kind != "ramp":
+        return break_times(schedule)
+    (first, last), n = break_times(schedule), schedule.exponent
+    return [first] + ([last] if n <= 1.0 else [])  # v1 + (v0 - v1) (1 - s)^n never begins level
 
 
 def point_row(draft, place: str) -> int:
@@ -117,11 +139,34 @@ def apart(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
     (x, u, a), (z, v, b) = ends
     _, _, _, acts, direction, _ = line
     if acts == rec.ABOUT:
-        return 0.0, float(np.dot(direction, b - a))
+        axis = draft.case.poses[bodies.point_of(draft.case.nodes, places[1])[0]].attitude @ direction
+        return 0.0, float(np.dot(axis, b - a))
     if acts == rec.TOWARD:
         return 0.0, float(np.dot(direction, v - u))
     length = float(np.linalg.norm(z - x))
     return length, float(np.dot(z - x, v - u)) / length if length > 0.0 else 0.0
+
+
+def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray) -> None:
+    """Call pieces of the room of mechanisms, and no others, as a right-hand side does."""
+    from fvsolve.kernels import calls
+    from fvsolve.kernels.phases import found
+
+    addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
+    for k, piece in enumerate(pieces):
+        addresses[calls.RHS, k] = calls.addressed(found("fvsolve.kernels.mechanism", piece), calls.RATES)
+    calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
+    handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
+    calls.rhs_in_turn(t, y, np.zeros(0), out, handle)
+
+
+def factored(model, y: np.ndarray) -> np.ndarray:
+    """What `accelerate` leaves in `scratch` at a state: the factor of the mass matrix from 8 freedoms on."""
+    written, t = wiped(model.shapes), model.case.numerics.start
+    written.clock["limit"] = np.inf
+    pieces = ("joints: kinematics", "matrix: accelerate")
+    call_pieces((*model.tables, *written), pieces, t, y, model.new_out())
+    return written.scratch
 
 
 class Statics:
@@ -137,15 +182,8 @@ class Statics:
 
     def run(self, *pieces: str) -> None:
         """Call pieces of the room of mechanisms as a right-hand side does."""
-        from fvsolve.kernels import calls
-        from fvsolve.kernels.phases import found
-
-        addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
-        for k, piece in enumerate(pieces):
-            addresses[calls.RHS, k] = calls.addressed(found("fvsolve.kernels.mechanism", piece), calls.RATES)
-        handle = make_handle((*self.draft.tables, *self.written, addresses, calls.empty_calls(0, len(calls.HOOKS))))
-        calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
-        calls.rhs_in_turn(self.t, np.zeros(self.draft.size), np.zeros(0), self.out, handle)
+        tables = (*self.draft.tables, *self.written)
+        call_pieces(tables, pieces, self.t, np.zeros(self.draft.size), self.out)
 
     def forces(self) -> np.ndarray:
         """Forces of all freedoms under what `out` says of bodies, what their motion asks for taken off."""

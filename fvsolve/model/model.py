@@ -354,7 +354,9 @@ class Model(Shown):
             for own, start in zip(basin.own(y)[:1], basin.own(self.start)[:1], strict=True):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
-        for row in self.tables.pistons:  # what moving chambers hold is their excess and what was swept
+        for row in self.tables.pistons:  # what chambers on the axis hold is their excess and what was swept
+            if row["line"] >= 0:
+                continue
             places = self.tables.masses[[row["case"], row["rod"]]]["y"]
             back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
             change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)

@@ -44,6 +44,7 @@ class Couplings:
         self.inner = self.nodes["kind"] == rec.JUNCTION
         self.masses, self.pistons = tables.masses["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
+        self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
         self.devices = tables.devices
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
@@ -114,9 +115,51 @@ class Couplings:
         return self.held_by(self.devices[link["device"]])
 
     def places(self, row, what: int) -> np.ndarray:
-        """Positions (`what` 0) or velocities (1) of the two masses that a row joins, where they are states."""
+        """Positions (`what` 0) or velocities (1) of what a row joins, where they are states."""
+        if row["line"] >= 0:
+            ends = (self.points[k]["body"] for k in self.ends_of_line(row) if k >= 0)
+            return states(*(self.of_chain(i, what) for i in ends if i >= 0))
         ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
         return np.array([self.masses[row[end]] + what for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
+
+    def ends_of_line(self, row) -> tuple[int, int]:
+        """Points that the line of a push joins."""
+        line = self.lines[row["line"]]
+        return int(line["from_point"]), int(line["to_point"])
+
+    def of_chain(self, i: int, what: int) -> np.ndarray:
+        """Coordinates (`what` 0) or velocities (1) of body i and of all that it hangs on."""
+        found = [states()]
+        while i >= 0:
+            found.append(self.of_joint(self.bodies[i], what))
+            i = self.bodies[i]["parent"]
+        return states(*found)
+
+    def of_joint(self, body, what: int) -> np.ndarray:
+        """The same of its own joint; a joint of as many freedoms has four Euler parameters for three of them."""
+        many = int(body["freedoms"])
+        if not many:
+            return states()
+        return body["rate"] + np.arange(many) if what else body["y"] + np.arange(many + (many >= 3))
+
+    def of_tree(self, root: int, what: int) -> np.ndarray:
+        """The same of a whole tree."""
+        return states(*(self.of_joint(body, what) for body in self.bodies if body["root"] == root))
+
+    def spatial(self) -> Iterator[Pairs]:
+        """Bodies: all of a tree on one another, and on what pushes it: other trees, chambers."""
+        for root in np.unique(self.bodies["root"]):
+            own = [self.of_tree(root, what) for what in (0, 1)]
+            yield every(states(*own), states(*own))
+        for row in [*self.braces, *self.pistons]:
+            if row["line"] < 0:
+                continue
+            ends = [self.points[k]["body"] for k in self.ends_of_line(row) if k >= 0]
+            roots = {int(self.bodies[i]["root"]) for i in ends if i >= 0}
+            felt = [self.places(row, 0), self.places(row, 1)]
+            if "rod" in row.dtype.names:
+                felt += [self.own(row["a"]), self.own(row["b"])]
+            yield every(states(*(self.of_tree(root, 1) for root in roots)), states(*felt))
 
     def pressures(self) -> list[np.ndarray]:
         """Of each node, the states that set its pressure: its own, or all that enter its group."""
@@ -150,8 +193,9 @@ class Couplings:
             for i in ends_of(column):
                 into[i].append(column["y"])
         for row in self.pistons:
+            swept = states() if row["line"] >= 0 else self.places(row, 1)
             for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
-                into[i] += [self.places(row, 1), *([self.held(other)] if row["leakage"] > 0.0 else [])]
+                into[i] += [swept, *([self.held(other)] if row["leakage"] > 0.0 else [])]
         for i in np.flatnonzero(~self.inner):
             yield every(states(self.own(i), self.behind(i), self.size + i), states(*into[i]))
 
@@ -165,10 +209,13 @@ class Couplings:
         at = self.masses[self.masses >= 0]
         yield at, at + 1
         for row in [*self.braces, *self.pistons]:
+            if row["line"] >= 0:
+                continue
             felt = [self.places(row, 0), self.places(row, 1)]
             if "rod" in row.dtype.names:
                 felt += [self.own(row["a"]), self.own(row["b"])]
             yield every(self.places(row, 1), states(*felt))
+        yield from self.spatial()
 
     def driven(self) -> Iterator[Pairs]:
         """What devices hold, on itself and on the pressures at their ends and at the place they sense."""

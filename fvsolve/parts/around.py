@@ -26,6 +26,12 @@ class Around:
     vacuum: Callable[[str, str, str, list[float]], Faults]
     between: Callable[[str, str], float | None]
 
+    def spatial(self, place: str | None) -> bool:
+        """Whether a place is a body, or a point of one or of the world."""
+        name, _, point = (place or "").partition(".")
+        node = self.nodes.get(name)
+        return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
+
     def ahead(self, link: Any, first: str, second: str) -> float | None:
         """How far the place at port `second` lies ahead of that at `first` at the start [m]; None unless known.
 

@@ -62,7 +62,8 @@ def stretch(out, tables):
         if line["acts"] == ABOUT:
             a, b, c = spin_of(out, tables, i)
             u, v, w = spin_of(out, tables, j)
-            put(out, at, line["direction"][0], line["direction"][1], line["direction"][2])
+            r = row_of(tables, tables.points[j]["body"]) + ATTITUDE
+            put(out, at, *turned(out, r, line["direction"], 0))
             out[to], out[to + 1] = 0.0, out[at] * (u - a) + out[at + 1] * (v - b) + out[at + 2] * (w - c)
             continue
         root = root_of(tables, i)

@@ -75,12 +75,14 @@ class Joint(Table):
         Schedule | None, Scheduled("position", about="at the start [m]; a schedule drives it; 0 if left out")
     ] = None
     rate: Annotated[
-        Any, OfJoint("angular_velocity", "at the start, of a ball or a free body [x, y, z] in its axes")
-    ] = 0.0
+        Any,
+        OfJoint("angular_velocity", "at the start, of a ball or a free body [x, y, z] in its own axes; 0 if left out"),
+    ] = None
     velocity: Annotated[
-        tuple[float, ...], Rows("velocity", length=3, about="of a free body's centre of mass at the start [m/s]")
-    ] = (0.0, 0.0, 0.0)
-    damping: Annotated[float, OfJoint("damping", "torque or force against its rate")] = 0.0
+        tuple[float, ...] | None,
+        Rows("velocity", length=3, about="of a free body's centre of mass at the start [m/s]; 0 if left out"),
+    ] = None
+    damping: Annotated[Any, OfJoint("damping", "torque or force against its rate; 0 if left out")] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -148,7 +150,12 @@ class Joint(Table):
     @property
     def turning(self) -> np.ndarray:
         """Angular velocity of a ball or a free body at the start, in its own axes : float64[3]."""
-        return np.array(self.rate if isinstance(self.rate, tuple) else (0.0, 0.0, 0.0), dtype=float)
+        return np.array(self.rate or (0.0, 0.0, 0.0))
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Velocity of a free body's centre of mass at the start : float64[3]."""
+        return np.array(self.velocity or (0.0, 0.0, 0.0))
 
 
 class Body(Node, kind="body"):

@@ -6,6 +6,12 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
 
 
+def on_axis(case, cylinder) -> bool:
+    """Whether a cylinder joins masses on one axis, and no points of bodies."""
+    ends = [cylinder.ports[port] for port in ("case", "rod")]
+    return all(getattr(case.nodes.get(end), "domain", "") == "translational" for end in ends)
+
+
 class ChamberRows(Lowering, kind="chamber"):
     """A place whose pressure is that of the fluid it holds."""
 
@@ -13,7 +19,8 @@ class ChamberRows(Lowering, kind="chamber"):
         moving, air = name in draft.owned, draft.fluid.air
         row["kind"], row["volume"] = rec.MOVING if moving else rec.CHAMBER, node.volume
         row["stiffness"] = draft.fluid.bulk_modulus / (draft.fluid.density * node.volume)
-        row["y"] = draft.states([f"{name}.{'excess' if moving else 'mass'}"], 1e5 / row["stiffness"])
+        swept = moving and on_axis(draft.case, draft.case.links[name.rpartition(".")[0]])
+        row["y"] = draft.states([f"{name}.{'excess' if swept else 'mass'}"], 1e5 / row["stiffness"])
         if moving or (air is not None and air.fraction > 0.0):  # which softens it
             row["row"] = draft.stiff()
 

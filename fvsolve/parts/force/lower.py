@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from fvsolve.kernels import records as rec
 from fvsolve.model.inputs import FORCE, Input
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.masses import Push, join
@@ -15,9 +18,14 @@ class ForceRows(Push, kind="force"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        how = () if link.direction is None else (rec.TOWARD, link.direction / np.linalg.norm(link.direction))
+        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *how)
         row["schedule"] = draft.schedules.add(link.force)
 
     def inputs(self, model, name, part):
-        place = [one for one, _, _ in rows_in(model.case, "brace")].index(name)
-        return {"force": Input(FORCE, int(model.tables.braces[place]["schedule"]))}
+        return {"force": Input(FORCE, brace_of(model, name)["schedule"].item())}
+
+
+def brace_of(model, name: str):
+    """The BRACE row of a link."""
+    return model.tables.braces[[one for one, _, _ in rows_in(model.case, "brace")].index(name)]

@@ -1,28 +1,50 @@
-"""A force from outside on a body. Knows its course; knows no body."""
+"""A force from outside on a mass or a body. Knows its course; knows no body."""
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.attitude import no_direction, uneven
 from fvsolve.parts.link import Coupling
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import Text
+from fvsolve.parts.value import Rows, Text
 
 
 class Force(Coupling, kind="force"):
     """force(t) on `to`, forward; as much back on `from`, where there is one.
 
-    Ports: from, to. Stored and dissipated energy: none; it brings force times (v_to - v_from) [W].
+    Ports: from, to. Stored and dissipated energy: none; it brings force times (v_to - v_from) [W], in space along its
+    direction.
     """
 
     may_lack: ClassVar[tuple[str, ...]] = ("from",)
 
-    from_: Annotated[str | None, Text("the body it pushes itself off from, if any"), Field(alias="from")] = None
+    from_: Annotated[str | None, Text("what it pushes itself off from, if anything"), Field(alias="from")] = None
     force: Annotated[Schedule, Scheduled("force", about="on `to`, positive forward [N]")]
+    direction: Annotated[
+        tuple[float, ...] | None,
+        Rows("number", length=3, about="forward in the world, of a point; the line from `from` to `to` if left out"),
+    ] = None
 
     @property
     def ports(self) -> dict[str, str]:
         """Port name -> place."""
         return {"to": self.to} if self.from_ is None else super().ports
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if no_direction(self.direction):
+            yield ("direction",), "is all zeros; wanted for example [0, 0, -1]"
+        if around.spatial(self.to) and self.from_ is None and self.direction is None:
+            yield (
+                (),
+                "direction is missing: without `from` a force on a point needs one, [0, 0, -1] is down",
+            )
+        if not around.spatial(self.to) and self.direction is not None:
+            yield ("direction",), f"{self.to} moves along one axis, which is its direction; leave it out"
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        yield from uneven("direction", self.direction)

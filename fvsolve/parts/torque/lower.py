@@ -1,9 +1,14 @@
-"""Torques on shafts of pumps in the tables of a model: their schedules stand among the numbers of the pump."""
+"""Torques in the tables of a model: on shafts of pumps among the numbers of the pump, on bodies pushes like others."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from fvsolve.kernels import records as rec
 from fvsolve.model.inputs import TORQUE, Input
 from fvsolve.model.lowering import Lowering, lowering_of
+from fvsolve.model.masses import Push, join
+from fvsolve.parts.force.lower import brace_of
 from fvsolve.parts.pump.law import OWN_NUMBERS
 from fvsolve.parts.pump.lower import torques_on
 
@@ -11,8 +16,30 @@ from fvsolve.parts.pump.lower import torques_on
 class TorqueRows(Lowering, kind="torque"):
     """What its pump adds up."""
 
+    def of(self, part):
+        return self if part.axis is None else ON_BODIES
+
     def inputs(self, model, name, part):
         pump = part.to.removesuffix(".shaft")
         row = lowering_of(type(model.case.links[pump])).row_of(model, pump)
         place = [one is part for one in torques_on(model.case, pump)].index(True)
         return {"torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))}
+
+
+class BodyTorqueRows(Push):
+    """A torque by a schedule, about an axis of the body that it turns."""
+
+    books = "supplied"
+    table, rank = "brace", 3
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        how = rec.ABOUT, link.axis / np.linalg.norm(link.axis)
+        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *how)
+        row["schedule"] = draft.schedules.add(link.torque)
+
+    def inputs(self, model, name, part):
+        return {"torque": Input(TORQUE, brace_of(model, name)["schedule"].item())}
+
+
+ON_BODIES = BodyTorqueRows()

@@ -1,38 +1,58 @@
-"""A torque from outside on a shaft. Knows its course; knows no shaft."""
+"""A torque from outside on a shaft or a body. Knows its course; knows no shaft."""
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
 
 from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.attitude import no_direction, uneven
 from fvsolve.parts.link import Link
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import Text
+from fvsolve.parts.value import Rows, Text
 
 
 class Torque(Link, kind="torque"):
-    """torque(t) on the shaft `to`, which then turns as it and the fluid have it.
+    """torque(t) on the shaft `to`, which then turns as it and the fluid have it; or on a body about `axis`.
 
-    Ports: to. Stored and dissipated energy: none; it brings torque times angular velocity [W].
+    Ports: to; of bodies from, which it turns back. Stored and dissipated energy: none; it brings torque times angular
+    velocity [W], of bodies that of `to` less that of `from` about the axis.
     """
 
-    joins: ClassVar[dict[str, str]] = {"to": "rotational"}
+    joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "rotational or spatial"}
+    may_lack: ClassVar[tuple[str, ...]] = ("from",)
     quantities: ClassVar[dict[str, str]] = {}
 
-    to: Annotated[str, Text("the shaft it turns, PUMP.shaft")]
+    from_: Annotated[str | None, Text("the body that it turns back, if any"), Field(alias="from")] = None
+    to: Annotated[str, Text("the shaft it turns, PUMP.shaft, or a body")]
     torque: Annotated[Schedule, Scheduled("torque", about="in the direction in which a pump is driven [N m]")]
+    axis: Annotated[
+        tuple[float, ...] | None, Rows("number", length=3, about="that it turns a body about, in the body's axes")
+    ] = None
 
     @property
     def ports(self) -> dict[str, str]:
         """Port name -> place."""
-        return {"to": self.to}
+        return {"to": self.to} if self.from_ is None else {"from": self.from_, "to": self.to}
 
     def faults(self, name: str, around: Around) -> Faults:
+        if no_direction(self.axis):
+            yield ("axis",), "is all zeros; wanted for example [0, 1, 0]"
         pump = around.links.get(self.to.removesuffix(".shaft"))
-        if getattr(pump, "kind", "") != "pump":
+        if around.spatial(self.to) and self.axis is None:
+            yield (), "axis is missing: a body is turned about one, in its own axes, for example [0, 1, 0]"
+        if getattr(pump, "kind", "") != "pump" or around.spatial(self.to):
             return
+        for key, given in (("from", self.from_), ("axis", self.axis)):
+            if given is not None:
+                yield (key,), f"goes with bodies; {self.to} is a shaft"
         if pump.inertia is None:
             yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the pump inertia"
         if pump.trip is not None:
             text = "is held by its motor until it trips; leave trip out, and let the torque fall to 0 in its place"
             yield ("to",), f"{self.to} {text}"
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        yield from uneven("axis", self.axis)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels.masses import motion
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.solve.loop import Loop
 from fvsolve.solve.solve import Run
@@ -42,7 +41,7 @@ class Booked(Loop):
             if self.memory[slots.STEPS] > steps and code in SOUND:
                 after = armed.copy()
                 armed[:] = rules  # those that the step was taken under
-                self.add(self.released(y, self.booked(t, y, *first)))
+                self.add(self.released(t, y, self.booked(t, y, *first)))
                 armed[:] = after
                 self.on_step()
         return code
@@ -99,15 +98,18 @@ class Booked(Loop):
             w[i] = gamma * (stage + along + late[i] * h * slope + big_c[i, 1:i] @ w[1:i])
         return w
 
-    def released(self, y: np.ndarray, part: np.ndarray) -> np.ndarray:
+    def released(self, t: float, y: np.ndarray, part: np.ndarray) -> np.ndarray:
         """The same, but for stops that are left in this step: they lose what they have taken up and do not keep.
 
         Where a contact stops to push, the rate of what it holds has a kink that no stage sees.
         """
         tables, lines = self.model.tables, self.accounts.stops
-        for (rate, loss), stop in zip(lines, tables.stops, strict=True):
-            was, leaves = pressed(tables, stop, y)
-            now, left = pressed(tables, stop, self.now)
+        if not lines:
+            return part
+        travels = [stop_travels(self.model, *one) for one in ((t, y), (self.t, self.now))]
+        for k, ((rate, loss), stop) in enumerate(zip(lines, tables.stops, strict=True)):
+            was, leaves = pressed(stop, *travels[0][k])
+            now, left = pressed(stop, *travels[1][k])
             if leaves or left:
                 change = 0.5 * float(stop["stiffness"]) * (now - was) * (now + was)
                 part[loss] += part[rate] - change
@@ -122,11 +124,17 @@ class Booked(Loop):
         self.total = new
 
 
-def pressed(tables, stop, y: np.ndarray) -> tuple[float, bool]:
+def stop_travels(model, t: float, y: np.ndarray) -> np.ndarray:
+    """Travel [m] and its rate of every stop at a state : float64[stops, 2]."""
+    out, tables = model.evaluate(t, y)[1], model.tables
+    first = int(model.layout["travel"]) + 2 * len(tables.braces)
+    return out[first : first + 2 * len(tables.stops)].reshape(-1, 2)
+
+
+def pressed(stop, x: float, speed: float) -> tuple[float, bool]:
     """(how deep a stop is pressed [m], whether what presses it leaves quicker than it can follow)."""
-    (x_i, v_i), (x_j, v_j) = (motion(tables.masses[stop[port]], y) for port in ("from_mass", "to_mass"))
-    above, below = (x_j - x_i) - stop["above"], -stop["below"] - (x_j - x_i)
-    deep, faster = (above, v_j - v_i) if above > below else (below, v_i - v_j)
+    above, below = x - stop["above"], -stop["below"] - x
+    deep, faster = (above, speed) if above > below else (below, -speed)
     leaves = faster < 0.0 and stop["stiffness"] * deep + stop["damping"] * faster <= 0.0
     return max(0.0, float(deep)), bool(leaves)
 

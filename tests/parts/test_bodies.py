@@ -1,0 +1,505 @@
+"""Bodies in space against closed forms, Lagrange by hand and SciPy; what nature keeps is kept to the method's order."""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+
+import numpy as np
+import pytest
+from model.test_sparsity import stray
+from pytest import approx
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
+from truth.bodies import CLOSE, OIL, Crane, bodies, pendulum
+from truth.scenes import GRAVITY, scene
+from truth.trees import body, random_tree, turn
+
+import fvsolve
+from fvsolve.studies import energy
+
+
+def run(case, **more):
+    result = fvsolve.run(case, **more)
+    assert result.ok, result.reason
+    return result
+
+
+def falls(t, values) -> np.ndarray:
+    """Times at which a smooth series falls through zero."""
+    series = CubicSpline(t, values)
+    return np.array([one for one in series.roots(extrapolate=False) if series.derivative()(one) < 0.0])
+
+
+# joints and trees -------------------------------------------------------------------------------------------
+
+
+def test_a_pendulum_swings_by_the_elliptic_integral():
+    """T = 4 sqrt(l / g) K(sin^2(angle / 2)), a large swing."""
+    length, angle = 0.7, 2.0
+    result = run(bodies({"arm": pendulum(angle, length)}, 10.0, ["arm.angle"], every=1e-3))
+    period = 4.0 * math.sqrt(length / GRAVITY) * ellipk(math.sin(angle / 2.0) ** 2)
+    assert np.diff(falls(result.t, result["arm.angle"])) == approx(period, rel=1e-8)
+
+
+def test_a_pendulum_shows_the_order_of_its_method():
+    length, angle = 0.7, 1.0
+    period = 4.0 * math.sqrt(length / GRAVITY) * ellipk(math.sin(angle / 2.0) ** 2)
+    errors = []
+    for steps in (100, 200, 400):
+        case = bodies({"arm": pendulum(angle, length)}, period, ["arm.angle", "arm.rate"], method="rk4",
+                      step=period / steps)  # fmt: skip
+        result = run(case)
+        errors.append(abs(result["arm.rate"][-1]))
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == approx(4.0, abs=0.2)
+
+
+def test_a_double_pendulum_moves_as_lagrange_by_hand():
+    """Two rods of length l with their masses in the middle, angles of each to the vertical."""
+    m, l, inertia = 1.5, 0.8, 0.09  # noqa: E741
+    rod = {"inertia": [inertia, inertia, 0.0], "centre_of_mass": [0, 0, -l / 2], "points": {"end": [0, 0, -l]}}
+    upper = body(m, **rod, joint={"kind": "revolute", "axis": [0, 1, 0], "angle": 1.2})
+    lower = body(m, **rod, joint={"kind": "revolute", "on": "upper.end", "axis": [0, 1, 0], "angle": -0.5})
+
+    def rates(t, y):
+        a, b, u, v = y
+        c, s = math.cos(a - b), math.sin(a - b)
+        mass = np.array([[inertia + m * l * l * 1.25, m * l * l / 2 * c], [m * l * l / 2 * c, inertia + m * l * l / 4]])
+        force = [-m * l * l / 2 * s * v * v - 1.5 * m * GRAVITY * l * math.sin(a),
+                 m * l * l / 2 * s * u * u - 0.5 * m * GRAVITY * l * math.sin(b)]  # fmt: skip
+        return [u, v, *np.linalg.solve(mass, force)]
+
+    truth = solve_ivp(rates, (0.0, 3.0), [1.2, 0.7, 0.0, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
+    result = run(bodies({"lower": lower, "upper": upper}, 3.0, ["upper.angle", "lower.angle"]))
+    assert result["upper.angle"][-1] == approx(truth[0], abs=1e-7)
+    assert result["lower.angle"][-1] == approx(truth[1] - truth[0], abs=1e-7)
+
+
+def test_a_slider_on_a_turning_arm_feels_coriolis_and_centrifugal_terms():
+    """r'' = r w^2 - g sin-free: the axis turns about z, which gravity does not feel; L = (I + m r^2) w is kept."""
+    arm = body(1.0, [0.0, 0.0, 0.0], {"kind": "revolute", "axis": [0, 0, 1], "rate": 2.0})
+    bead = body(0.5, [0, 0, 0], {"kind": "prismatic", "on": "arm", "axis": [1, 0, 0], "travel": 0.3})
+    arm["inertia"] = [0.2, 0.2, 0.2]
+
+    def rates(t, y):
+        angle, r, w, v = y
+        return [w, v, -2.0 * 0.5 * r * v * w / (0.2 + 0.5 * r * r), r * w * w]
+
+    truth = solve_ivp(rates, (0.0, 1.0), [0.0, 0.3, 2.0, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
+    result = run(bodies({"arm": arm, "bead": bead}, 1.0, ["arm.angle", "bead.travel", "arm.rate", "bead.rate"]))
+    found = [result[probe][-1] for probe in ("arm.angle", "bead.travel", "arm.rate", "bead.rate")]
+    assert found == approx(truth, abs=1e-8)
+
+
+TUMBLING = {"kind": "free", "rate": [0.1, 2.0, 0.3], "velocity": [0.5, 0.0, 0.2]}
+STONE = body(3.0, [0.3, 0.5, 0.7], TUMBLING, centre_of_mass=[0.2, -0.1, 0.3])
+TURNS = [f"stone.{one}" for one in ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z", "kinetic_energy")]
+WEIGHTLESS = {"gravity": 0.0}
+
+
+def drift(method: str, step: float) -> float:
+    case = {**bodies({"stone": STONE}, 8.0, TURNS, method=method, step=step), **WEIGHTLESS}
+    result = run(case)
+    return max(float(np.abs(result[one] / result[one][0] - 1.0).max()) for one in TURNS if abs(result[one][0]) > 0.1)
+
+
+def test_a_tumbling_body_keeps_energy_and_momentum_to_the_order_of_its_method():
+    """The middle axis, which is not stable: the body turns over. rk4 drifts as h^5, of which energy sees h^5 too."""
+    coarse, fine = drift("rk4", 0.04), drift("rk4", 0.02)
+    assert coarse < 1e-5 and coarse / fine > 14.0
+
+
+def test_gauss_methods_keep_energy_and_momentum_of_a_tumbling_body_to_rounding():
+    """Quadratic invariants both, wherever the centre of mass lies in the body's axes: it stays at the origin here."""
+    joint = {"kind": "free", "rate": TUMBLING["rate"], "at": [-0.2, 0.1, -0.3]}
+    case = {
+        **bodies({"stone": {**STONE, "joint": joint}}, 8.0, TURNS, every=0.04, method="gauss-4", step=0.02),
+        **WEIGHTLESS,
+    }
+    result = run(case)
+    for series in (result[TURNS[3]], np.linalg.norm([result[one] for one in TURNS[:3]], axis=0)):
+        assert np.abs(series / series[0] - 1.0).max() < 1e-12
+
+
+def test_a_tumbling_body_turns_as_euler_and_poisson_have_it():
+    joint = {**TUMBLING, "attitude": {"roll": 0.3, "pitch": -0.4, "yaw": 1.0}}
+    case = {**bodies({"stone": {**STONE, "joint": joint}}, 4.0, [f"stone.{one}" for one in
+            ("eta", "eps_x", "eps_y", "eps_z", "wx", "wy", "wz", "roll", "pitch", "yaw")]), **WEIGHTLESS}  # fmt: skip
+    j = np.array(STONE["inertia"])
+
+    def rates(t, y):
+        e, w = y[:4], y[4:]
+        return [*(0.5 * np.array([-e[1:] @ w, *(e[0] * w + np.cross(e[1:], w))])), *(np.cross(j * w, w) / j)]
+
+    first = Rotation.from_euler("ZYX", [1.0, -0.4, 0.3])
+    e = first.as_quat()[[3, 0, 1, 2]]
+    y = solve_ivp(rates, (0.0, 4.0), [*e, *TUMBLING["rate"]], rtol=1e-12, atol=1e-13).y[:, -1]
+    result = run(case)
+    found = np.array([result[f"stone.{one}"][-1] for one in ("eta", "eps_x", "eps_y", "eps_z")])
+    assert found == approx(y[:4], abs=1e-8)
+    there = Rotation.from_quat(y[[1, 2, 3, 0]])
+    assert [result[f"stone.{one}"][-1] for one in ("wx", "wy", "wz")] == approx(there.apply(y[4:]), abs=1e-7)
+    angles = [result[f"stone.{one}"][-1] for one in ("yaw", "pitch", "roll")]
+    assert angles == approx(there.as_euler("ZYX"), abs=1e-7)
+
+
+def test_a_top_precesses_steadily():
+    """A ball joint, spin s about z of its own axes, centre at height l: m g l = (J3 s + J3 w c) w - J1' w^2 c."""
+    m, l, tilt, w, j1, j3 = 0.5, 0.1, 0.6, 1.7, 2e-3, 1e-3  # noqa: E741
+    about = j1 + m * l * l
+    spin = (m * GRAVITY * l + (about - j3) * w * w * math.cos(tilt)) / (j3 * w)
+    turned = Rotation.from_euler("Y", tilt).inv().apply([0.0, 0.0, w])
+    joint = {"kind": "ball", "attitude": {"pitch": tilt}, "rate": [*turned[:2], turned[2] + spin]}
+    top = body(m, [j1, j1, j3], joint, centre_of_mass=[0, 0, l], points={"tip": [0, 0, 1.0]})
+    result = run(bodies({"top": top}, 2.0, ["top.tip.x", "top.tip.y", "top.tip.z"], every=0.05))
+    assert result["top.tip.z"] == approx(math.cos(tilt), abs=1e-7)
+    assert result["top.tip.x"] == approx(math.sin(tilt) * np.cos(w * result.t), abs=1e-6)
+    assert result["top.tip.y"] == approx(math.sin(tilt) * np.sin(w * result.t), abs=1e-6)
+
+
+# points -----------------------------------------------------------------------------------------------------
+
+SHARES = ("relative", "coriolis", "transversal", "centripetal")
+
+
+def test_the_terms_of_65_are_those_of_motion_seen_from_the_axes_that_move():
+    """Of a point on the third body of a random chain: relative by differences of its place in the second's axes."""
+    rng = np.random.default_rng(5)
+    tree = random_tree(rng, 3, "free")
+    tree["b1"]["joint"]["on"], tree["b2"]["joint"]["on"] = "b0", "b1"
+    names = [f"b2.p.{one}" for one in ("x", "y", "z", "ax", "ay", "az", *(f"a{k}_{s}" for s in SHARES for k in "xyz"))]
+    names += [f"b1.{one}" for one in ("x", "y", "z", "roll", "pitch", "yaw", "ax", "ay", "az", "wx", "wy", "wz")]
+    h = 1e-3
+    result = run(bodies(tree, 0.4, names, every=h, method="gauss-4", step=h))
+    k = 200
+
+    def rows(name, axes="xyz"):
+        return np.array([result[f"{name}{axis}"] for axis in axes]).T
+
+    turns = Rotation.from_euler("ZYX", rows("b1.", ("yaw", "pitch", "roll")))
+    seen = turns.inv().apply(rows("b2.p.") - rows("b1."))
+    about = slice(k - 3, k + 4)
+    weights = np.array([2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0]) / (180.0 * h * h)
+    rates = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / (60.0 * h)
+    w, turned = rows("b1.w")[k], turns[k]
+    r = rows("b2.p.")[k] - rows("b1.")[k]
+    v = turned.apply(rates @ seen[about])
+    expected = {
+        "relative": turned.apply(weights @ seen[about]),
+        "coriolis": 2.0 * np.cross(w, v),
+        "transversal": np.cross(rates @ rows("b1.w")[about], r),
+        "centripetal": np.cross(w, np.cross(w, r)),
+    }
+    for share, value in expected.items():
+        found = [result[f"b2.p.a{axis}_{share}"][k] for axis in "xyz"]
+        assert found == approx(value, abs=2e-6 * max(1.0, np.abs(value).max())), share
+    total = sum(expected.values()) + rows("b1.a")[k]
+    assert rows("b2.p.a")[k] == approx(total, abs=1e-5)
+    assert rows("b2.p.a")[k] == approx(weights @ rows("b2.p.")[about], abs=1e-5)
+
+
+def test_joint_forces_of_a_pendulum_are_those_of_its_motion():
+    result = run(bodies({"arm": pendulum(1.0)}, 1.0, ["arm.angle", "arm.rate", "arm.joint_fx", "arm.joint_fz",
+                                                      "arm.bob.ax", "arm.bob.az", "arm.joint_ty"]))  # fmt: skip
+    pull = 2.0 * (GRAVITY * np.cos(result["arm.angle"]) + 0.7 * result["arm.rate"] ** 2)
+    assert np.hypot(result["arm.joint_fx"], result["arm.joint_fz"]) == approx(pull, rel=1e-9)
+    assert result["arm.joint_fx"] == approx(2.0 * result["arm.bob.ax"], abs=1e-9)
+    assert result["arm.joint_ty"] == approx(0.0, abs=1e-9)
+
+
+# pushes -----------------------------------------------------------------------------------------------------
+
+
+def held(links: dict, nodes: dict, end: float, probes, **numerics):
+    ground = {"type": "frame", "points": {"hook": [1.0, 0.0, 2.0], "low": [0.0, 0.0, -0.25]}}
+    return bodies({**nodes, "ground": ground}, end, probes, links, **numerics)
+
+
+def test_springs_dampers_and_forces_push_along_the_line_between_points():
+    crane, k, c, free = Crane(), 2000.0, 50.0, 1.5
+    boom = crane.nodes()["boom"]
+    links = {
+        "spring": {"type": "spring", "from": "ground.hook", "to": "boom.tip", "stiffness": k, "free_length": free},
+        "damper": {"type": "damper", "from": "boom.tip", "to": "ground.hook", "damping": c},
+        "pull": {"type": "force", "from": "boom.tip", "to": "ground.hook", "force": -30.0},
+        "load": {"type": "force", "to": "boom.tip", "force": 20.0, "direction": [0, 0, -2]},
+        "motor": {"type": "torque", "to": "boom", "torque": 40.0, "axis": [0, -3, 0]},
+    }
+
+    def rates(t, y):
+        angle, w = y
+        tip, along = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+        far = tip - np.array([1.0, 2.0])
+        length = np.linalg.norm(far)
+        e = far / length
+        push = -k * (length - free) - c * w * (e @ along) - 30.0
+        weight = crane.mass * GRAVITY * crane.length / 2.0 * math.cos(angle)
+        return [w, (push * (e @ along) - weight - 20.0 * math.cos(angle) + 40.0) / crane.inertia]
+
+    truth = solve_ivp(rates, (0.0, 2.0), [0.0, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
+    result = run(held(links, {"boom": boom}, 2.0, ["boom.angle", "boom.rate", "spring.force"]))
+    assert [result["boom.angle"][-1], result["boom.rate"][-1]] == approx(truth, abs=1e-7)
+    assert result["spring.force"][0] == approx(-k * (2.0 - free))
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_a_crane_on_shut_chambers_does_not_move_by_one_bit(law):
+    result = run(Crane().case(10.0, ["boom.angle", "lift.A.pressure"], law))
+    assert np.all(result["boom.angle"] == 0.0) and np.ptp(result["lift.A.pressure"]) == 0.0
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_a_locked_cylinder_swings_at_the_root_of_its_spring_and_never_creeps(law):
+    crane = Crane()
+    case = crane.case(4.0, ["boom.angle"], law, 2e-4, {"rate": 1e-4})
+    result = run(case)
+    times = falls(result.t, result["boom.angle"])
+    tilting = crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance  # the lever grows as it sinks
+    stiffness = crane.spring(law) * crane.lever**2 + tilting
+    assert 2 * math.pi / np.mean(np.diff(times)) == approx(math.sqrt(stiffness / crane.inertia), rel=1e-4)
+    early, late = result["boom.angle"][:4000], result["boom.angle"][-4000:]
+    for extreme in (np.max, np.min):
+        assert extreme(late) == approx(extreme(early), rel=1e-4)
+    assert result.ledger["mass"]["relative"] < 1e-15
+
+
+def test_a_long_swing_of_a_locked_cylinder_loses_no_oil_by_steps():
+    """A shut chamber holds its mass to the last bit, however coarse the steps: what stands on it cannot sink."""
+    case = Crane().case(2.0, ["lift.A.pressure"], "log", joint={"rate": 0.05}, method="rk4", step=5e-3)
+    model = fvsolve.build(fvsolve.load(case))
+    state = fvsolve.advance(model, fvsolve.initial_state(model), 2.0)
+    at = [model.state_names.index(f"lift.{side}.mass") for side in "AB"]
+    assert np.all(state.y[at] == 0.0)
+
+
+def test_a_boom_lifted_through_valves_follows_scipy():
+    """Pressures as states of the truth, d p = beta / V (q - A dx/dt); x the length of the line less the start's."""
+    crane, beta, rho, share = Crane(), OIL["bulk_modulus"], OIL["density"], 2e-6
+    supply, sump = 25e6, 1e5
+    nodes = {**crane.nodes(), "pump": {"type": "reservoir", "pressure": supply},
+             "tank": {"type": "reservoir", "pressure": sump}}  # fmt: skip
+    opening = {"start": 0.1, "duration": 0.05, "value": [0.0, 1.0]}
+    orifice = {"type": "valve", "area": share, "discharge_coefficient": 1.0, "opening": opening}
+    links = {**crane.links(), "in": {**orifice, "from": "pump", "to": "lift.A"},
+             "out": {**orifice, "from": "lift.B", "to": "tank"}}  # fmt: skip
+    case = scene(nodes, links, 0.6, CLOSE, ["boom.angle", "lift.A.pressure", "lift.B.pressure"],
+                 fluid={**OIL, "law": "log"})  # fmt: skip
+    a, b = crane.areas
+
+    def rates(t, y):
+        angle, w, p, q = y
+        x, z = crane.eye * math.cos(angle), crane.eye * math.sin(angle) - crane.low
+        length = math.hypot(x, z)
+        lever = (crane.eye * math.cos(angle) * z - crane.eye * math.sin(angle) * x) / length
+        travel, speed, open_ = length - crane.distance, lever * w, min(max((t - 0.1) / 0.05, 0.0), 1.0)
+        force = a * (p - 101325.0) - b * (q - 101325.0)
+        density = [rho * math.exp((one - 101325.0) / beta) for one in (supply, p, q)]
+        into = open_ * share * math.copysign(math.sqrt(2 * density[0] * abs(supply - p)), supply - p)
+        out = open_ * share * math.copysign(math.sqrt(2 * density[2] * abs(q - sump)), q - sump)
+        volumes = crane.dead[0] + a * (crane.x + travel), crane.dead[1] + b * (crane.stroke - crane.x - travel)
+        weight = crane.mass * GRAVITY * crane.length / 2.0 * math.cos(angle)
+        return [w, (force * lever - weight) / crane.inertia, beta / volumes[0] * (into / density[1] - a * speed),
+                beta / volumes[1] * (b * speed - out / density[2])]  # fmt: skip
+
+    y, t = [0.0, 0.0, crane.p_a, crane.p_b], 0.0
+    for until in (0.1, 0.15, 0.6):
+        y = solve_ivp(rates, (t, until), y, rtol=1e-11, atol=[1e-12, 1e-11, 1e-2, 1e-2], max_step=1e-3).y[:, -1]
+        t = until
+    result = run(case)
+    assert result["boom.angle"][-1] == approx(y[0], abs=1e-6) and y[0] > 0.05
+    assert [result["lift.A.pressure"][-1], result["lift.B.pressure"][-1]] == approx(y[2:], rel=1e-4)
+
+
+def test_an_end_stop_between_points_throws_back_without_loss():
+    """A bob that falls onto an elastic stop: it comes back to where it was let go."""
+    drop = body(2.0, [0, 0, 0], {"kind": "prismatic", "axis": [0, 0, 1], "travel": 1.0})
+    links = {"stop": {"type": "end-stop", "from": "ground.low", "to": "drop", "stiffness": 1e5, "least": 0.75}}
+    result = run(held(links, {"drop": drop}, 1.0, ["drop.travel", "stop.force"], every=1e-3))
+    assert result["drop.travel"].min() < 0.5 and result["stop.force"].max() > 1000.0
+    fall = math.sqrt(2 * 0.5 / GRAVITY)
+    touch = math.sqrt(2.0 / 1e5) * (math.pi + 2 * math.atan(2.0 * GRAVITY / 1e5 / math.sqrt(2.0 / 1e5) / math.sqrt(2 * GRAVITY * 0.5)))  # noqa: E501  # fmt: skip
+    back = 2 * fall + touch
+    assert np.interp(back, result.t, result["drop.travel"]) == approx(1.0, abs=1e-5)
+
+
+# driven joints ----------------------------------------------------------------------------------------------
+
+
+def test_a_pendulum_on_a_driven_cart_feels_its_acceleration():
+    """q'' l = -g sin q - a cos q, with the cart's x = A sin(w t + p); the force that drives it is F = d(p_x)/dt."""
+    swing, period, phase, l = 0.3, 1.3, 0.4, 0.7  # noqa: E741
+    w = 2.0 * math.pi / period
+    wave = {"mean": 0.1, "amplitude": swing, "period": period, "phase": phase}
+    cart = body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [2, 0, 0], "travel": wave})
+    arm = pendulum(0.5, l, on="cart")
+
+    def rates(t, y):
+        a = -swing * w * w * math.sin(w * t + phase)
+        return [y[1], (-GRAVITY * math.sin(y[0]) + a * math.cos(y[0])) / l]
+
+    probes = ["arm.angle", "cart.travel", "cart.rate", "cart.joint_fx", "arm.bob.ax", "cart.ax"]
+    result = run(bodies({"cart": cart, "arm": arm}, 2.0, probes))
+    y = solve_ivp(rates, (0.0, 2.0), [0.5, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
+    assert result["arm.angle"][-1] == approx(y[0], abs=1e-7)
+    assert result["cart.travel"] == approx(0.1 + swing * np.sin(w * result.t + phase), abs=1e-12)
+    assert result["cart.rate"] == approx(swing * w * np.cos(w * result.t + phase), abs=1e-12)
+    assert result["cart.ax"] == approx(-swing * w * w * np.sin(w * result.t + phase), abs=1e-11)
+    assert result["cart.joint_fx"] == approx(3.0 * result["cart.ax"] + 2.0 * result["arm.bob.ax"], abs=1e-9)
+
+
+def test_a_crank_that_is_driven_gives_its_torque():
+    """About a vertical axis nothing but J alpha asks for a torque."""
+    wave = {"mean": 0.0, "amplitude": 1.0, "period": 2.0}
+    crank = body(1.0, [0.3, 0.3, 0.4], {"kind": "revolute", "axis": [0, 0, 1], "angle": wave})
+    crank["centre_of_mass"] = [0.5, 0, 0]
+    result = run(bodies({"crank": crank}, 1.0, ["crank.joint_tz", "crank.angle"]))
+    assert result["crank.joint_tz"] == approx(-0.65 * math.pi**2 * np.sin(math.pi * result.t), abs=1e-10)
+
+
+@pytest.mark.parametrize("driven", [
+    {"time": [0, 1], "value": [0.0, 1.0]}, {"time": [0, 1], "value": [0.0, 1.0], "kind": "step"},
+    {"start": 0.2, "duration": 0.5, "value": [0.0, 1.0], "exponent": 2.0},
+])  # fmt: skip
+def test_what_drives_a_joint_may_not_jump_nor_its_rate(driven):
+    with pytest.raises(fvsolve.errors.CaseError, match="nodes.arm.joint.angle: drives the joint, .* jumps"):
+        fvsolve.build(fvsolve.load(bodies({"arm": pendulum(driven)}, 1.0)))
+
+
+# energy -----------------------------------------------------------------------------------------------------
+
+
+def machine() -> dict:
+    """A damped tree with a spring, a damper and a force, of which one joint is driven."""
+    upper = pendulum(0.8, damping=0.3)
+    lower = {**pendulum(-0.4), "joint": {"kind": "revolute", "on": "arm.bob", "axis": [0.6, 0.8, 0], "angle": 0.2}}
+    lower["inertia"] = [0.1, 0.2, 0.3]
+    wave = {"mean": 0.0, "amplitude": 0.2, "period": 0.9}
+    cart = body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": wave})
+    upper["joint"]["on"] = "cart"
+    links = {
+        "spring": {"type": "spring", "from": "ground.hook", "to": "lower.bob", "stiffness": 50.0, "free_length": 1.0},
+        "damper": {"type": "damper", "from": "ground.hook", "to": "arm.bob", "damping": 2.0},
+        "load": {"type": "force", "to": "lower.bob", "force": {"mean": 0.0, "amplitude": 5.0, "period": 0.7},
+                 "direction": [1, 1, 0]},
+        "motor": {"type": "torque", "from": "arm", "to": "lower", "torque": 0.5, "axis": [0, 0, 1]},
+    }  # fmt: skip
+    return held(links, {"cart": cart, "arm": upper, "lower": lower}, 1.5, [], method="rk4", step=2e-3)
+
+
+def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
+    case = machine()
+    found = [energy(case, {"numerics.step": h}) for h in (4e-3, 2e-3)]
+    rest = [float(np.abs(one.remainder).max()) for one in found]
+    assert rest[0] / rest[1] > 12.0 and found[1].relative < 1e-7
+    lines = {(line.what, line.place) for line in found[1].lines} if hasattr(found[1], "lines") else set()
+    assert not lines or {("supplied", "cart"), ("dissipated", "arm"), ("supplied", "load")} <= lines
+
+
+# said otherwise ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["radau-iia-5", "rodas-5p", "auto", "implicit-midpoint"])
+def test_every_family_of_methods_moves_a_crane_alike(method):
+    crane, more = Crane(), {"rtol": 1e-9} if method != "implicit-midpoint" else {"step": 1e-4}
+    truth = run(crane.case(0.2, ["boom.angle"], "log", joint={"rate": 0.05}))["boom.angle"]
+    found = run(crane.case(0.2, ["boom.angle"], "log", joint={"rate": 0.05}, method=method, **more))["boom.angle"]
+    assert found == approx(truth, abs=2e-4 * np.abs(truth).max())
+
+
+def test_bodies_in_another_order_and_in_other_units_move_alike():
+    tree = random_tree(np.random.default_rng(3), 5, "free")
+    probes = [f"b{k}.{axis}" for k in range(5) for axis in "xyz"]
+    truth = run(bodies(tree, 0.5, probes))
+    back = dict(reversed(tree.items()))
+    for one in back.values():
+        one["mass"] = f"{one['mass'] / 1000.0!r} t"
+        one["centre_of_mass"] = [f"{1000.0 * x!r} mm" for x in one["centre_of_mass"]]
+        one["inertia"] = [[f"{x / 1000.0!r} t m2" for x in row] for row in one["inertia"]]
+        if one["joint"]["kind"] == "revolute":
+            one["joint"]["angle"] = f"{math.degrees(one['joint']['angle'])!r} deg"
+    found = run(bodies(back, 0.5, probes))
+    for probe in probes:
+        assert found[probe] == approx(truth[probe], abs=1e-7)
+
+
+def test_a_scene_that_is_turned_about_the_vertical_moves_alike():
+    tree = random_tree(np.random.default_rng(7), 4, "revolute")
+    probes = [f"b{k}.{axis}" for k in range(4) for axis in "xyz"]
+    truth, angle = run(bodies(tree, 0.5, probes)), 0.7
+    spin = Rotation.from_euler("Z", angle)
+    for one in tree.values():
+        if "on" not in one["joint"]:
+            one["joint"]["at"] = spin.apply(one["joint"]["at"]).tolist()
+            one["joint"]["attitude"]["matrix"] = (spin.as_matrix() @ one["joint"]["attitude"]["matrix"]).tolist()
+    found = run(bodies(tree, 0.5, probes))
+    for k in range(4):
+        here, there = (np.array([one[f"b{k}.{axis}"][-1] for axis in "xyz"]) for one in (found, truth))
+        assert here == approx(spin.apply(there), abs=1e-7)
+
+
+def test_bodies_that_are_fixed_to_each_other_are_one():
+    """Three rods in a chain of fixed joints swing as one body of their common mass, centre and inertia."""
+    rng, places, rods = np.random.default_rng(11), [], {}
+    turns = [np.eye(3), turn(rng), turn(rng)]
+    for k in range(3):
+        joint = {"kind": "fixed", "on": f"r{k - 1}", "at": [0.1, 0.2, -0.5], "attitude": {"matrix": turns[k].tolist()}}
+        if k == 0:
+            joint = {"kind": "revolute", "axis": [0, 1, 0], "angle": 0.6}
+        rods[f"r{k}"] = body(1.0 + k, [0.1, 0.2, 0.15], joint, centre_of_mass=[0.05, 0.02, -0.3])
+    total, first, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+    r, p = np.eye(3), np.zeros(3)
+    for k in range(3):
+        if k > 0:
+            p, r = p + r @ [0.1, 0.2, -0.5], r @ turns[k]
+        places.append((1.0 + k, p + r @ [0.05, 0.02, -0.3], r @ np.diag([0.1, 0.2, 0.15]) @ r.T))
+    total = sum(one[0] for one in places)
+    first = sum(one[0] * one[1] for one in places) / total
+    for mass, place, own in places:
+        far = place - first
+        inertia = inertia + own + mass * (far @ far * np.eye(3) - np.outer(far, far))
+    joint = {"kind": "revolute", "axis": [0, 1, 0], "angle": 0.6}
+    one = body(total, inertia.tolist(), joint, centre_of_mass=first.tolist())
+    alone = run(bodies({"r0": one}, 1.0, ["r0.angle", "r0.joint_fx", "r0.joint_tz"]))
+    chain = run(bodies(rods, 1.0, ["r0.angle", "r0.joint_fx", "r0.joint_tz"]))
+    for probe in ("r0.angle", "r0.joint_fx", "r0.joint_tz"):
+        assert chain[probe] == approx(alone[probe], abs=1e-6)
+
+
+def test_no_rate_depends_on_a_state_that_the_pattern_has_not():
+    crane = Crane()
+    nodes = {**crane.nodes(rate=0.1), **random_tree(np.random.default_rng(4), 4, "free")}
+    nodes["jib"] = {**nodes.pop("b3"), "joint": {"kind": "ball", "on": "boom.tip"}}
+    links = {**crane.links(leakage=1e-13), "rope": {"type": "spring", "from": "b1.p", "to": "jib.p", "stiffness": 1e3}}
+    model = fvsolve.build(fvsolve.load(bodies(nodes, 1.0, [], links)))
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        assert stray(model, 0.0, model.scale * rng.normal(scale=10.0, size=model.y_size)) < 1e-9
+
+
+@pytest.mark.parametrize("method, step", [("rk4", 2e-6), ("implicit-midpoint", 2e-6)])
+def test_a_run_broken_off_and_resumed_is_the_unbroken_one(method, step, tmp_path, monkeypatch):
+    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    case = Crane().case(0.1, ["boom.angle", "lift.A.pressure"], "log", joint={"rate": 0.05}, method=method, step=step)
+    calls = []
+
+    def third(t, seconds, steps):
+        calls.append(t)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    whole = run(case, out=tmp_path / "whole")
+    assert fvsolve.run(case, out=tmp_path / "broken", progress=third).reason.startswith("interrupted")
+    resumed = run(case, out=tmp_path / "broken", resume=True)
+    assert 0.0 < calls[1] < 0.1 and resumed.ledger == whole.ledger
+    assert np.array_equal(resumed["boom.angle"], whole["boom.angle"])
+
+
+def test_a_tree_far_from_the_origin_moves_as_one_near_it():
+    tree = random_tree(np.random.default_rng(2), 4, "free")
+    model = [fvsolve.build(fvsolve.load(bodies(tree, 1.0)))]
+    tree["b0"]["joint"]["at"] = [1e6, -2e6, 3e5]
+    model.append(fvsolve.build(fvsolve.load(bodies(tree, 1.0))))
+    near, far = (one.rhs(0.0, one.start) for one in model)
+    assert far == approx(near, rel=1e-9, abs=1e-8)

@@ -1,0 +1,131 @@
+"""What a case may say of bodies, and what it gets told where it says something else: all at once, with the place."""
+
+from __future__ import annotations
+
+import pytest
+from truth.bodies import Crane, bodies, pendulum
+from truth.trees import body
+
+import fvsolve
+from fvsolve.errors import CaseError
+
+PROBES = ["arm.x"]
+
+
+def told(nodes: dict, links: dict | None = None, probes=()) -> str:
+    with pytest.raises(CaseError) as caught:
+        fvsolve.build(fvsolve.load(bodies(nodes, 1.0, probes, links)))
+    return str(caught.value)
+
+
+def arm(**more) -> dict:
+    return {"arm": {**pendulum(), **more}}
+
+
+def hinge(**more) -> dict:
+    return {"kind": "revolute", "axis": [0, 1, 0], **more}
+
+
+BAD = {
+    "a mass of zero": (arm(mass=0), "nodes.arm.mass: 0 is out of range; wanted a value above 0"),
+    "inertia of no body": (arm(inertia=[1, 1, 3]), "nodes.arm.inertia: moments of 1, 1, 3 kg m2 belong to no body"),
+    "inertia in other units": (arm(inertia=["1 kg m", 1, 1]), 'nodes.arm.inertia[0]: "1 kg m"'),
+    "products that are not symmetric": (arm(inertia=[[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]), "is not symmetric"),
+    "a matrix of no body": (arm(inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]), "principal moment of -1 kg m2"),
+    "a joint without axis": (arm(joint={"kind": "revolute"}), "nodes.arm.joint: axis is missing"),
+    "an axis of zeros": (arm(joint=hinge(axis=[0, 0, 0])), "nodes.arm.joint.axis: is all zeros"),
+    "a travel of a hinge": (arm(joint=hinge(travel=1)), "nodes.arm.joint.travel: goes with no joint of kind"),
+    "a joint of no kind": (arm(joint={"kind": "hinge"}), 'nodes.arm.joint.kind: no joint named "hinge"; say revolute'),
+    "a rate along a line": (arm(joint=hinge(rate="1 m/s")), 'nodes.arm.joint.rate: "1 m/s" is a velocity'),
+    "a free body on another": (
+        {**arm(), "b": body(1, [1, 1, 1], {"kind": "free", "on": "arm"})}, "nodes.b.joint.on: goes with no free joint",
+    ),
+    "a joint on nothing": (arm(joint=hinge(on="am")), 'nodes.arm.joint.on: "am" is no node'),
+    "a joint on no point": (
+        {**arm(), "b": body(1, [1, 1, 1], hinge(on="arm.bop"))}, 'arm has no point "bop"; its points are bob',
+    ),
+    "a place that is said twice": (
+        {**arm(), "b": body(1, [1, 1, 1], hinge(on="arm.bob", at=[0, 0, 1]))}, "b.joint.at: arm.bob says where it is",
+    ),
+    "a rate of what is driven": (
+        arm(joint=hinge(angle={"mean": 0, "amplitude": 1, "period": 1}, rate=1)), "joint.rate: its angle is driven",
+    ),
+    "points of one number": (arm(points={"tip": [1, 2]}), "nodes.arm.points.tip: [1, 2] has 2 values; wanted 3"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_body_gets_its_message(name):
+    nodes, message = BAD[name]
+    assert message in told(nodes)
+
+
+def test_bodies_that_hang_in_a_loop_are_named():
+    nodes = {name: body(1, [1, 1, 1], hinge(on=on)) for name, on in (("a", "c"), ("b", "a"), ("c", "b"))}
+    found = told({**nodes, "d": body(1, [1, 1, 1], hinge(on="c"))})
+    assert "hangs on itself: a on c on b on a; close a loop by a pin" in found and found.count("hangs on itself") == 1
+
+
+CRANE = Crane()
+LINKS = {
+    "beyond its stroke": (CRANE.links(closed_length=0.0), "links.lift.stroke: the piston starts at 0.353553 m"),
+    "an unknown point": (
+        CRANE.links(ports={"case": "ground.lug", "rod": "boom.eyes"}), 'no place named "boom.eyes"; places are',
+    ),
+    "a mass and a point": (
+        {"s": {"type": "spring", "from": "ground", "to": "boom.eye", "stiffness": 1}},
+        '"ground" is a place on the axis of masses, "boom.eye" one in space',
+    ),
+    "a force without direction": ({"f": {"type": "force", "to": "boom.eye", "force": 1}}, "direction is missing"),
+    "a torque without axis": ({"t": {"type": "torque", "to": "boom", "torque": 1}}, "axis is missing"),
+    "points in one place": (
+        {"s": {"type": "spring", "from": "ground.top", "to": "boom", "stiffness": 1}}, "lie in one place at the start",
+    ),
+    "a pipe to a point": (
+        {"p": {"type": "valve", "from": "boom.eye", "to": "boom.tip", "area": 1}},
+        '"boom.eye" is a point, a spatial place, and this port of a valve a hydraulic one',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LINKS)
+def test_a_link_between_points_gets_its_message(name):
+    links, message = LINKS[name]
+    nodes = CRANE.nodes()
+    nodes["ground"]["points"]["top"] = [0, 0, 0]
+    assert message in told(nodes, links)
+
+
+def test_a_probe_that_a_joint_has_not_is_refused():
+    found = told(arm(), probes=["arm.travel", "arm.bob.roll", "arm.bop.x"])
+    assert 'arm is a body, without "travel"' in found and 'arm.bob is a point, without "roll"' in found
+    assert 'no part named "arm.bop"' in found
+
+
+def test_all_that_is_wrong_is_said_at_once():
+    found = told({**arm(mass=0, inertia=[1, 1, 9]), "b": body(1, [1, 1, 1], {"kind": "revolute", "on": "nobody"})})
+    for message in ("mass", "belong to no body", "axis is missing"):
+        assert message in found
+
+
+def test_an_axis_that_is_not_of_unit_length_is_divided_by_it_and_noted():
+    model = fvsolve.build(fvsolve.load(bodies(arm(joint=hinge(axis=[0, 2, 0], angle=1.0)), 1.0)))
+    assert [one.key for one in model.warnings] == ["joint.axis"] and "not 1" in model.warnings[0].text
+    assert model.tables.bodies[0]["axis"].tolist() == [0.0, 1.0, 0.0]
+
+
+def test_what_moves_at_the_start_is_said():
+    case = bodies(arm(joint=hinge(angle=1.0, rate=2.0)), 1.0)
+    model = fvsolve.build(fvsolve.load(case))
+    assert model.steady["moving"] == ["body arm turns at 2 rad/s", "body arm accelerates at 11.79 rad/s2"]
+    case["numerics"]["initial"] = "equilibrium"
+    with pytest.raises(CaseError, match="wants nothing to move, but body arm turns at 2 rad/s"):
+        fvsolve.build(fvsolve.load(case))
+
+
+def test_a_case_of_bodies_reads_back_as_itself():
+    case = fvsolve.load(Crane().case(1.0, ["boom.angle"], joint={"attitude": {"yaw": 0.3}, "rate": 0.1}))
+    import tomllib
+
+    again = fvsolve.load(tomllib.loads(case.resolved()))
+    assert again == case
