@@ -25,6 +25,7 @@ STATEMENTS = {  # without a number, in sections 2 to 5: words that a heading has
 NOT_YET = "not modelled yet"
 SLOW = {  # what they run, or compile
     "(6) The global error", "(13) Stability of a step", "Rotational ports", "(71) A volume that moves as it likes",
+    "(65) (66) The shares of an acceleration",
 }  # fmt: skip
 
 
