@@ -18,21 +18,32 @@ LOOSE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between f
 ANGLES = ("roll", "pitch", "yaw")
 
 
+def Angle(about: str) -> Quantity:
+    """An angle of an attitude."""
+    return Quantity("angle", about=about, usual=TURNS)
+
+
 class Attitude(Table):
     """How axes b stand in axes a: R^a_b by angles (40), (41), axis and angle (43), Euler parameters (45) or a matrix.
 
     Of several forms all must say the same; the first of them, in this order, is taken.
     """
 
-    roll: Annotated[float | None, Quantity("angle", about="about x, the last turn [rad]; 0", usual=TURNS)] = None
-    pitch: Annotated[float | None, Quantity("angle", about="about y, the turn between [rad]; 0", usual=TURNS)] = None
-    yaw: Annotated[float | None, Quantity("angle", about="about z, the first turn [rad]; 0", usual=TURNS)] = None
+    roll: Annotated[
+        float | None, Quantity("angle", about="about x, the last turn [rad]; 0 if left out", usual=TURNS)
+    ] = None
+    pitch: Annotated[
+        float | None, Quantity("angle", about="about y, the turn between [rad]; 0 if left out", usual=TURNS)
+    ] = None
+    yaw: Annotated[
+        float | None, Quantity("angle", about="about z, the first turn [rad]; 0 if left out", usual=TURNS)
+    ] = None
     zyz: Annotated[
         tuple[float, ...] | None,
         Rows("angle", length=3, about="[psi, theta, phi], classical Euler angles [rad]", usual=TURNS),
     ] = None
     axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="that it is turned about by angle")] = None
-    angle: Annotated[float | None, Quantity("angle", about="about axis [rad]", usual=TURNS)] = None
+    angle: Annotated[float | None, Angle("about axis [rad]")] = None
     euler_parameters: Annotated[tuple[float, ...] | None, Rows("number", length=4, about="[eta, e1, e2, e3]")] = None
     matrix: Annotated[tuple | None, Matrix("number", about="its columns are the axes of b as a sees them")] = None
 

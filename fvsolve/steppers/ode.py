@@ -214,8 +214,9 @@ def _no_events(t, y, handle, g):
 
 
 def in_place(f) -> bool:
-    """Whether f(t, y, dydt) fills its last argument."""
-    return len(inspect.signature(getattr(f, "py_func", f)).parameters) == 3
+    """Whether f(t, y, dydt) fills its last argument; one with a default is a constant of f's own."""
+    parameters = inspect.signature(getattr(f, "py_func", f)).parameters.values()
+    return sum(one.default is inspect.Parameter.empty for one in parameters) == 3
 
 
 def _functions(f, t0, y0):

@@ -9,7 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
+from truth.scenes import scene
 
+from fvsolve import load
+from fvsolve.errors import CaseError
 from fvsolve.parts.attitude import Attitude
 from fvsolve.parts.table import Inside, Table, misfits
 
@@ -134,6 +137,22 @@ def test_what_does_not_fit_is_named(what):
     assert {*found} == {f"attitude.{key}" for key in wanted}
     for key, text in wanted.items():
         assert text in found[f"attitude.{key}"]
+
+
+def test_a_case_has_its_notes_and_faults_with_their_places():
+    """Of a body's joint, whose attitude lies two tables below the part."""
+    body = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "joint": {"attitude": {"axis": [0, 0, 2]}}}
+    case = scene({"arm": body}, {}, 1.0, {"method": "rk4", "step": 0.1})
+    with pytest.raises(CaseError) as found:
+        load(case)
+    assert [(one.place, one.message) for one in found.value.faults] == [
+        ("nodes.arm.joint.attitude.axis", "wants an angle beside it")
+    ]
+    body["joint"]["attitude"]["angle"] = 30
+    assert [(one.key, one.value, one.text.split(": ")[1]) for one in load(scene({"arm": body}, {}, 1.0, {})).notes] == [
+        ("joint.attitude.angle", 30.0, '30 rad is outside -6.3 to 6.3 rad, a turn either way; did you mean "30 deg"?'),
+        ("joint.attitude.axis", 2.0, "its length is 2, not 1; it is divided by it"),
+    ]
 
 
 def test_no_table_is_told_what_is_wanted():

@@ -29,6 +29,17 @@ def test_a_function_that_numba_refuses_gives_the_same_steps():
     )
 
 
+@pytest.mark.parametrize("python", [False, True])
+def test_a_constant_with_a_default_is_no_row_to_fill(python):
+    """f(t, y, rate=2): two arguments and a constant, not f(t, y, dydt)."""
+
+    def decay(t, y, rate=2.0):
+        return np.array([-rate * one for one in (y.tolist() if python else y)])  # `tolist` numba refuses
+
+    end = integrate(decay, [1.0], [0.0, 1.0], "rk4", step=0.01)[-1, 0]
+    assert end == pytest.approx(math.exp(-2.0), abs=1e-8)
+
+
 def test_a_users_array_is_a_method_everywhere():
     fvsolve.tableau("ralston-test", text="""
         0   |
