@@ -130,11 +130,12 @@ def coordinate(joint: Any, t: float) -> float:
 
 
 def rate(joint: Any, t: float) -> float:
-    """Its rate then; of one that is driven by differences of what drives it, as far as pictures and checks need."""
+    """Its rate then; of one that is driven by differences of what drives it from then on."""
     if joint.driven is None:
         return float(joint.rate or 0.0)
     h = 1e-4
-    return float(value(joint.driven, t + h) - value(joint.driven, t - h)) / (2.0 * h)
+    now, soon, later = (float(value(joint.driven, t + k * h)) for k in range(3))
+    return (4.0 * soon - 3.0 * now - later) / (2.0 * h)
 
 
 def point_of(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None:

@@ -87,7 +87,8 @@ def drive(draft, name: str, schedule, row) -> None:
     """Let a schedule drive a joint: one whose rate jumps would want a force without end, and is a fault."""
     row["schedule"] = draft.schedules.add(schedule)
     key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
-    kinks = [time for time, _ in sorted(rate_jumps(schedule))]
+    start, end = draft.case.numerics.start, draft.case.numerics.end  # what it did before does not matter
+    kinks = [time for time, _ in sorted(rate_jumps(schedule)) if start < time <= end]
     if kinks:
         what = "it jumps" if schedule.kind == "step" else "its rate jumps"
         text = f"drives the joint, and at t = {kinks[0]:g} s {what}, which asks for a force without end"

@@ -39,7 +39,7 @@ def steady(rate, span=100.0):
     return {"time": [0.0, span], "value": [0.0, rate * span]}
 
 
-# water at rest ------------------------------------------------------------------------------------------------------
+# water at rest ----------
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -82,7 +82,7 @@ def test_a_box_that_slows_down_steadily_holds_its_water_aslant_and_a_tilted_one_
     assert same[0] == pytest.approx(found[0], abs=1e-12)
 
 
-# linear waves -----------------------------------------------------------------------------------------------------------
+# linear waves ----------
 
 
 def forced(x, length, w, push, depth=0.3):
@@ -170,7 +170,7 @@ def test_a_tank_that_falls_freely_ends_the_run_by_name():
     assert not result.ok and "the water in b has no weight left" in result.reason
 
 
-# faults ---------------------------------------------------------------------------------------------------------------
+# faults ----------
 
 FAULTS = {
     "rides on body; say where with at": ({}, {"elevation": 1.0}),

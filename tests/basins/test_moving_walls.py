@@ -42,7 +42,7 @@ def straight(speed, end=10.0):
     return {"time": [0.0, end], "value": [0.0, speed * end]}
 
 
-# closed forms ---------------------------------------------------------------------------------------------------
+# closed forms ----------
 
 
 @pytest.mark.parametrize("method", ["euler", "ssp-rk2", "rk4", "implicit-midpoint", "gauss-4", "rodas-4"])
@@ -235,7 +235,7 @@ def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_an
     assert abs(result.ledger["mass"]["remainder"]) < 1e-9 * 2500.0
 
 
-# restated, resumed ------------------------------------------------------------------------------------------------------
+# restated, resumed ----------
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
@@ -278,7 +278,7 @@ def test_a_run_that_is_resumed_is_the_unbroken_one_to_the_bit(tmp_path):
     assert np.abs(again.y - whole.y).max() < 1e-2
 
 
-# order, energy -----------------------------------------------------------------------------------------------------------
+# order, energy ----------
 
 
 @pytest.mark.parametrize(("scheme", "order"), [("upwind", 1.0), ("muscl", 2.0), ("upwind5", 2.0)])
