@@ -17,6 +17,7 @@ from fvsolve.exact.schedule import value
 from fvsolve.parts.body.part import Body
 from fvsolve.units import show
 
+OPEN = 1e-4  # of the length of things, by which a pin may be open at the start: numbers are typed with a few digits
 WORLD = ""  # what all hangs on; no name
 Found = Iterator[tuple[tuple, str]]
 
@@ -165,11 +166,32 @@ def one_place(nodes: dict[str, Any], links: dict[str, Any], found: dict[str, Pos
     """Faults of links along a line between two points that lie in one place at the start: it has no direction."""
     for name, link in links.items():
         ends = [link.ports.get(port) for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))]
-        if None in ends or getattr(link, "direction", None) is not None or getattr(link, "axis", None) is not None:
+        if (
+            None in ends
+            or link.kind in ("pin", "bushing")
+            or any(getattr(link, key, None) for key in ("direction", "axis"))
+        ):
             continue
         if None not in [point_of(nodes, end) for end in ends] and ahead(nodes, found, *ends) == 0.0:
             text = f"{ends[0]} and {ends[1]} lie in one place at the start, so the line between them has no direction"
             yield ("links", name), text
+
+
+def open_pins(nodes: dict[str, Any], links: dict[str, Any], found: dict[str, Pose]) -> Found:
+    """Faults of pins whose two points do not meet at the start."""
+    for name, link in links.items():
+        points = [point_of(nodes, link.ports[port]) for port in ("from", "to")] if link.kind == "pin" else [None]
+        if None in points or any(one not in (WORLD, *found) for one, _ in points):
+            continue
+        here, there = (found.get(one, AT_REST).at(place) for one, place in points)
+        turn = found.get(points[0][0], AT_REST).attitude
+        gap = float(np.linalg.norm(link.directions() @ (turn.T @ (there - here))))
+        if gap > OPEN * (1.0 + float(np.linalg.norm(points[0][1]))):
+            across = " across its axis" if link.axis else ""
+            yield (
+                ("links", name),
+                f"{link.from_} and {link.to} lie {gap:.4g} m apart{across} at the start; wanted them to meet",
+            )
 
 
 def misfits(nodes: dict[str, Any]) -> Found:

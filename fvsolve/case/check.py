@@ -96,6 +96,7 @@ def parts(
     yield from bodies.misfits(nodes)
     poses = bodies.poses(nodes, start)
     yield from bodies.one_place(nodes, links, poses)
+    yield from bodies.open_pins(nodes, links, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():

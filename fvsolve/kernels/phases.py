@@ -91,10 +91,12 @@ MEMBERS = {
         **COLUMNS,
     ),
     "bodies": Pieces(
-        prepare="mechanism.joints: kinematics", accelerate="mechanism.matrix: accelerate",
+        prepare="mechanism.joints: kinematics",
         observe="mechanism.observe: observe_bodies", power="mechanism.energy: power_bodies",
         stored="mechanism.energy: stored_bodies",
     ),
+    "no pins": Pieces(accelerate="mechanism.matrix: accelerate"),
+    "pins": Pieces(accelerate="mechanism.pins: accelerate_pinned", observe="mechanism.pins: observe_pins"),
     "stretches": Pieces(events="mechanism.joints: stretch_again"),
     "lines": Pieces(move="mechanism.lines: push_bodies"),
     "masses": Pieces(
@@ -133,6 +135,7 @@ class Cast:
     masses: bool = False
     bodies: bool = False
     lines: bool = False
+    pins: bool = False
     memory: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
@@ -163,6 +166,7 @@ class Cast:
             yield MEMBERS["columns" if linear else "columns, barotropic"]
         if self.bodies:
             yield MEMBERS["bodies"]
+            yield MEMBERS["pins" if self.pins else "no pins"]
         if self.lines:
             yield MEMBERS["stretches"]
         if self.masses:

@@ -242,6 +242,19 @@ LINE = np.dtype(  # a push on points of bodies
 )
 ALONG, TOWARD, ABOUT = 0, 1, 2
 
+PIN = np.dtype(
+    [
+        ("from_point", "i8"),
+        ("to_point", "i8"),
+        ("rows", "i8"),  # in how many directions it holds
+        ("directions", "f8", (9,)),  # in axes of the body of `from`
+        ("pull", "f8"),  # [1/s]
+        ("gap", "f8", (3,)),  # along each at the start [m], and
+        ("force", "f8", (3,)),  # its force there [N]
+    ],
+    align=True,
+)
+
 MASS = np.dtype(
     [
         ("y", "i8"),  # offset of its position, velocity follows; both as deviations; -1 for a frame
@@ -354,6 +367,7 @@ LAYOUT = np.dtype(
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
         ("along", "i8"),  # of lines, from the one point to the other, of length 1
+        ("pin", "i8"),  # forces of pins, three each [N]
         ("body", "i8"),  # of bodies, as `kernels.mechanism.room` says
         ("size", "i8"),
     ],
@@ -385,7 +399,7 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
 GIVEN_FLOW = 18  # of a patch that a given velocity passes
 WALL_VALUE = 19  # of a wall that moves
-BODY_VALUE, POINT_VALUE = 20, 21  # `side` says which, as `kernels.mechanism.observe` numbers them
+BODY_VALUE, POINT_VALUE, PIN_VALUE = 20, 21, 22  # `side` says which, as `kernels.mechanism.observe` numbers them
 
 BASIN = np.dtype(
     [
@@ -516,6 +530,7 @@ RECORDS = {
     "freedoms": FREEDOM,
     "points": POINT,
     "lines": LINE,
+    "pins": PIN,
     "masses": MASS,
     "braces": BRACE,
     "stops": STOP,

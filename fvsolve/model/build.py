@@ -94,7 +94,7 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
     draft.tables = rec.Tables(
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
-        np.array(draft.points, rec.POINT), draft.line_table, draft.mass_table,
+        np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.mass_table,
         draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
         draft.wall_table,
@@ -144,7 +144,7 @@ def layout_of(draft: Draft) -> np.ndarray:
         ("conductance", valves), ("drive", valves), ("value", many * nodes), ("edge", 2 * pipes * many),
         ("carried", 2 * pipes * many), ("brought", many * nodes), ("wall", len(draft.wall_table)),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
-        ("body", rec.BODY_OUT * len(draft.body_table)),
+        ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
     ):  # fmt: skip
         found[name], at = at, at + size
     found["size"] = at
@@ -166,7 +166,9 @@ def scratch_of(draft: Draft) -> int:
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))
     system += 6 * nodes + 2 * len(draft.valve_table) + 4 * len(draft.cluster_table)
+    held = int(sum(draft.pin_table["rows"]))
     spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
+    spatial += held * (2 * len(draft.freedom_table) + held + 1)
     spatial = max(spatial, 18 if len(draft.body_table) else 0)
     return int(max(spatial, (5 if many else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * many * nodes))
 

@@ -59,6 +59,7 @@ class Draft:
     body_names: list[str] = field(default_factory=list)
     point_index: dict[str, int] = field(default_factory=dict)
     points: list[tuple] = field(default_factory=list)  # rows, as they are asked for
+    pin_names: list[str] = field(default_factory=list)
     lines: list[tuple] = field(default_factory=list)
     factor_size: int = 0  # entries of a mass matrix
     mass_names: list[str] = field(default_factory=list)
@@ -82,6 +83,7 @@ class Draft:
     body_table: np.ndarray = rows(rec.BODY)
     freedom_table: np.ndarray = rows(rec.FREEDOM)
     line_table: np.ndarray = rows(rec.LINE)
+    pin_table: np.ndarray = rows(rec.PIN)
     mass_table: np.ndarray = rows(rec.MASS)
     brace_table: np.ndarray = rows(rec.BRACE)
     stop_table: np.ndarray = rows(rec.STOP)

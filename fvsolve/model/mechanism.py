@@ -13,6 +13,8 @@ from fvsolve.parts.body.part import Body
 
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
+ALIKE = 1e-8  # share of the largest row of pins that a row has beside all others: below, it says nothing new
+LOOSE = 1e-6  # rate at which a pin may open at the start [m/s]
 SNAP = 1e-12  # share of what makes up a joint's force below which their sum is rounding
 KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
@@ -122,7 +124,8 @@ def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direc
 
 
 def lower_lines(draft) -> None:
-    """Number pushes as `lines` name them."""
+    """Number pushes as `lines` name them; pins."""
+    draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
     draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
     rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
     for k, row in enumerate(rows):
@@ -186,6 +189,10 @@ class Statics:
         tables = (*self.draft.tables, *self.written)
         call_pieces(tables, pieces, self.t, np.zeros(self.draft.size), self.out)
 
+    def rates(self) -> np.ndarray:
+        """Velocities of all freedoms at the start."""
+        return np.concatenate([row["speed"][: row["freedoms"]] for row in self.draft.body_table])
+
     def forces(self) -> np.ndarray:
         """Forces of all freedoms under what `out` says of bodies, what their motion asks for taken off."""
         n = len(self.draft.freedom_table)
@@ -203,6 +210,14 @@ class Statics:
 
         first, many = int(self.layout["body"]), len(self.draft.body_table)
         return self.out[first : first + rec.BODY_OUT * many].reshape(many, rec.BODY_OUT)[:, FORCE : FORCE + 6]
+
+    def under(self, pushes: np.ndarray) -> np.ndarray:
+        """Forces of all freedoms under weights and these pushes."""
+        self.run("joints: kinematics")
+        at = int(self.layout["push"])
+        self.out[at : at + pushes.size] = pushes
+        self.run("lines: push_bodies")
+        return self.forces()
 
     def shares(self, pushes: np.ndarray) -> np.ndarray:
         """Forces of freedoms by each body's weight, then by each line's push : float64[bodies + lines, freedoms]."""
@@ -228,6 +243,51 @@ class Statics:
         return self.forces()
 
 
+def holding_pressures(draft, start) -> dict[int, float]:
+    """Pressures at which shut chambers that state none hold the bodies that stand on them : node -> pressure [Pa].
+
+    Forces of their pistons by least squares, so that forces of joints vanish; of two such chambers of one cylinder the
+    one that need not push is at ambient pressure. None of a chamber that would have to pull.
+    """
+    pistons = {}
+    for k, row in enumerate(draft.piston_table):
+        free = [side for side in "ab" if row["line"] >= 0 and is_shut(draft, start, int(row[side]))]
+        pistons |= {k: free} if free else {}
+    if not pistons:
+        return {}
+    ambient, at = draft.case.ambient_pressure, Statics(draft, start.t)
+    first = len(draft.brace_table) + len(draft.stop_table)
+    pushes = np.zeros(first + len(draft.piston_table))
+    for k, row in enumerate([*draft.brace_table, *draft.stop_table]):
+        scheduled = "schedule" in row.dtype.names and row["schedule"] >= 0
+        pushes[k] = start.given(row["schedule"]) if scheduled else row["force"]
+    gauge = {side: [start.pressure(int(row[side])) - ambient for row in draft.piston_table] for side in "ab"}
+    for k, row in enumerate(draft.piston_table):
+        if k not in pistons:
+            pushes[first + k] = row["area_a"] * gauge["a"][k] - row["area_b"] * gauge["b"][k]
+    left = at.under(pushes)
+    unit = np.array([at.under(pushes + np.eye(pushes.size)[first + k]) - left for k in pistons]).T
+    forces = np.linalg.lstsq(unit, -left, rcond=None)[0]
+    found = {}
+    for (k, free), force in zip(pistons.items(), forces, strict=True):
+        row = draft.piston_table[k]
+        side = free[0] if len(free) == 1 else "a" if force > 0.0 else "b"
+        other = gauge["b" if side == "a" else "a"][k] if len(free) == 1 else 0.0
+        sign, area, against = (1.0, "area_a", "area_b") if side == "a" else (-1.0, "area_b", "area_a")
+        pressure = ambient + (sign * force + row[against] * other) / row[area]
+        found |= dict.fromkeys([int(row[one]) for one in free], ambient)
+        found[int(row[side])] = float(pressure)
+    return {i: p for i, p in found.items() if p > draft.case.law.cavity_pressure}
+
+
+def is_shut(draft, start, i: int) -> bool:
+    """Whether a chamber that states no pressure is joined to nothing that has one."""
+    places = list(draft.case.places.values())
+    if places[i].initial_pressure is not None:
+        return False
+    return all(j == i or np.isnan(start.held[j]) for j in start.reaches(i))
+
+
 def start_bodies(draft, start) -> list[str]:
     """Lengths of lines, and of joints what is balanced at the start; returns what moves, in words."""
     if not len(draft.body_table):
@@ -246,9 +306,56 @@ def start_bodies(draft, start) -> list[str]:
     at.run("joints: kinematics", "lines: push_bodies")
     left = at.forces()
     freedoms = draft.freedom_table
+    accelerate = "matrix: accelerate"
+    if len(draft.pin_table):
+        accelerate = "pins: accelerate_pinned"
+        left, held = start_pins(draft, at)
+        size += held
     freedoms["balance"] = np.where(np.abs(left) <= SNAP * size, left, 0.0)
-    at.run("joints: kinematics", "lines: push_bodies", "matrix: accelerate")
+    at.run("joints: kinematics", "lines: push_bodies", accelerate)
     return moves(draft, at.accelerations())
+
+
+def start_pins(draft, at: Statics) -> tuple[np.ndarray, np.ndarray]:
+    """Gaps and forces of pins at the start: (what is left of forces of freedoms with these, their size). Faults."""
+    at.run("joints: kinematics", "lines: push_bodies", "pins: gaps")
+    first = int(at.layout["pin"])
+    for k, row in enumerate(draft.pin_table):
+        row["gap"][: row["rows"]] = at.out[first + 3 * k :][: row["rows"]]
+    at.run("joints: kinematics", "lines: push_bodies", "pins: accelerate_pinned")
+    n, many = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
+    first = 8 * n + draft.factor_size + 16 * len(draft.body_table)
+    rows = at.written.scratch[first : first + many * n].reshape(many, n).copy()
+    names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
+    for name in dict.fromkeys(redundant(rows, names)):
+        text = "in some direction nothing can open it, or others hold it there already"
+        draft.fault(f"links.{name}", f"{text}; of a loop in a plane give its axis, else leave one pin out")
+    slips = dict(zip(names, rows @ at.rates(), strict=True))
+    for name, slip in slips.items():
+        if abs(slip) > LOOSE:
+            draft.fault(f"links.{name}", f"the rates of the start open it at {abs(slip):.4g} m/s; let them agree")
+    draft.check()
+    forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)
+    for row, force in zip(draft.pin_table, forces, strict=True):
+        row["force"][: row["rows"]] = force[: row["rows"]]
+    sizes = np.concatenate([np.abs(row["force"][: row["rows"]]) for row in draft.pin_table])
+    size = np.abs(rows.T) @ sizes
+    at.run("joints: kinematics", "lines: push_bodies", "pins: hold")
+    return at.forces(), size
+
+
+def redundant(rows: np.ndarray, names: list[str]) -> list[str]:
+    """Pins of rows that are sums of those before, or nothing."""
+    found, basis = [], np.zeros((0, rows.shape[1]))
+    size = np.linalg.norm(rows, axis=1).max()
+    for name, row in zip(names, rows, strict=True):
+        rest = row - basis.T @ (basis @ row)
+        rest -= basis.T @ (basis @ rest)
+        if np.linalg.norm(rest) <= ALIKE * size:
+            found.append(name)
+        else:
+            basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+    return found
 
 
 def moves(draft, accelerations: np.ndarray) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from fvsolve.model.mechanism import holding_pressures
 from fvsolve.model.probes import probe_offsets
 from fvsolve.model.start import Start
 from fvsolve.model.unsteady import add_terms
@@ -18,6 +19,8 @@ def start_profile(draft) -> dict[str, Any]:
 
         start = BarotropicStart(draft)
     start.solve()
+    if start.hold_loads(holding_pressures(draft, start)):
+        start.solve()
     start.report_split()
     start.freeze_factors()
     start.fill_nodes()

@@ -45,6 +45,9 @@ class Couplings:
         self.masses, self.pistons = tables.masses["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
         self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
+        joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
+        joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
+        self.ties = union(len(self.bodies), joined)
         self.devices = tables.devices
         self.basins, self.integers, self.walls = model.basins, tables.integers, tables.walls
         self.patches = {int(row["node"]): row for row in tables.patches}
@@ -143,19 +146,23 @@ class Couplings:
         return body["rate"] + np.arange(many) if what else body["y"] + np.arange(many + (many >= 3))
 
     def of_tree(self, root: int, what: int) -> np.ndarray:
-        """The same of a whole tree."""
-        return states(*(self.of_joint(body, what) for body in self.bodies if body["root"] == root))
+        """The same of a whole tree, and of those that pins tie to it."""
+        return states(*(self.of_joint(body, what) for body in self.bodies if self.tied(body["root"]) == root))
+
+    def tied(self, root: int) -> int:
+        """The first root of all trees that pins tie together."""
+        return self.ties[root]
 
     def spatial(self) -> Iterator[Pairs]:
         """Bodies: all of a tree on one another, and on what pushes it: other trees, chambers."""
-        for root in np.unique(self.bodies["root"]):
+        for root in np.unique([self.tied(root) for root in self.bodies["root"]]):
             own = [self.of_tree(root, what) for what in (0, 1)]
             yield every(states(*own), states(*own))
         for row in [*self.braces, *self.pistons]:
             if row["line"] < 0:
                 continue
             ends = [self.points[k]["body"] for k in self.ends_of_line(row) if k >= 0]
-            roots = {int(self.bodies[i]["root"]) for i in ends if i >= 0}
+            roots = {self.tied(self.bodies[i]["root"]) for i in ends if i >= 0}
             felt = [self.places(row, 0), self.places(row, 1)]
             if "rod" in row.dtype.names:
                 felt += [self.own(row["a"]), self.own(row["b"])]

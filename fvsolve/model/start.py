@@ -20,7 +20,7 @@ from fvsolve.model.lowering import lowering_of
 from fvsolve.model.masses import start_masses
 from fvsolve.model.mechanism import start_bodies
 from fvsolve.model.slate import wiped
-from fvsolve.steady import Edge, solve_steady
+from fvsolve.steady import Edge, solve_steady, union
 
 HELD = (rec.FIXED, rec.TANK, rec.PATCH)  # at a pressure that flows do not change
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
@@ -55,6 +55,7 @@ class Start:
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.modes: dict[int, str] = {}  # as what those stand that regulate
+        self.loads: dict[int, float] = {}  # of shut chambers, pressures that hold bodies [Pa]
 
     @cached_property
     def out(self) -> np.ndarray:
@@ -151,9 +152,21 @@ class Start:
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] == rec.JUNCTION:
                 demand[i] = self.given(row["schedule"])
+            elif i in self.loads:
+                held[i] = self.law.potential_of(self.loads[i], row["elevation"])
             elif (pressure := lowering_of(type(node)).pressure_at_start(self, i, node, row)) is not None:
                 held[i] = self.law.potential_of(pressure, row["elevation"])
         return held, np.zeros_like(demand) if self.rest else demand
+
+    def hold_loads(self, pressures: dict[int, float]) -> bool:
+        """Let shut chambers have pressures that hold what stands on them; whether there are any."""
+        self.loads = pressures
+        return bool(pressures)
+
+    def reaches(self, i: int) -> list[int]:
+        """Nodes that open links join to node i, itself among them."""
+        group = union(len(self.nodes), [(edge.i, edge.j) for edge in self.edges if not edge.shut])
+        return [j for j in range(len(self.nodes)) if group[j] == group[i]]
 
     def touched(self, i: int) -> bool:
         """Whether a link of the fluid joins node i."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from parts.test_bodies import parallelogram
 from truth.bodies import Crane, bodies, pendulum
 from truth.trees import body
 
@@ -94,6 +95,18 @@ def test_a_link_between_points_gets_its_message(name):
     nodes = CRANE.nodes()
     nodes["ground"]["points"]["top"] = [0, 0, 0]
     assert message in told(nodes, links)
+
+
+def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_which_pin():
+    nodes, links = parallelogram()
+    nodes["two"]["joint"]["at"] = [1.6, 0, 0]
+    assert "links.loop: two.end and coupler.end lie 0.1 m apart across its axis at the start" in told(nodes, links)
+    nodes, links = parallelogram()
+    del links["loop"]["axis"]
+    assert "links.loop: in some direction nothing can open it" in told(nodes, links)
+    nodes, links = parallelogram()
+    nodes["two"]["joint"]["rate"] = 0.5
+    assert "links.loop: the rates of the start open it at" in told(nodes, links)
 
 
 def test_a_probe_that_a_joint_has_not_is_refused():

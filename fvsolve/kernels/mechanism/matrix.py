@@ -19,6 +19,7 @@ from fvsolve.kernels.mechanism.room import (
     ARM,
     ATTITUDE,
     FORCE,
+    PLACE,
     SPIN,
     SPIN_BIAS,
     STREAM,
@@ -146,13 +147,13 @@ def fill(y, out, tables):
         body, inertia, load = bodies[i], first + INERTIA * i, loads + LOAD * i
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
             s, row, path, depth = 6 * j, 8 * n + freedoms[j]["row"], freedoms[j]["path"], freedoms[j]["depth"]
-            found = -freedoms[j]["balance"]
+            found = 0.0
             for k in range(6):
                 found -= work[s + k] * work[load + k]
             if body["damping"] > 0.0:
                 k = body["rate"] + (j - body["freedom"])
                 found -= body["damping"] * (body["speed"][j - body["freedom"]] + y[k])
-            work[6 * n + j] = found
+            work[6 * n + j] = found - freedoms[j]["balance"]  # last, so that what is balanced leaves no bit
             tx, ty, tz, fx, fy, fz = momentum(
                 work, inertia, work[s], work[s + 1], work[s + 2], work[s + 3], work[s + 4], work[s + 5]
             )
@@ -250,12 +251,32 @@ def lean(out, tables, point, acts, x, y, z, at):
     if point < 0 or tables.points[point]["body"] < 0:
         return
     i = tables.points[point]["body"]
-    here, work, freedoms, paths = row_of(tables, i), tables.scratch, tables.freedoms, tables.integers
-    tx, ty, tz, fx, fy, fz = x, y, z, 0.0, 0.0, 0.0
-    if acts != ABOUT:
-        a, b, c = turned(out, here + ATTITUDE, tables.points[point]["place"], 0)
-        a, b, c = a + out[here + ARM], b + out[here + ARM + 1], c + out[here + ARM + 2]
-        tx, ty, tz, fx, fy, fz = b * z - c * y, c * x - a * z, a * y - b * x, x, y, z
+    here = row_of(tables, i)
+    if acts == ABOUT:
+        lean_by(tables, i, x, y, z, 0.0, 0.0, 0.0, at)
+        return
+    a, b, c = turned(out, here + ATTITUDE, tables.points[point]["place"], 0)
+    k = here + PLACE
+    lean_at(out, tables, i, out[k] + a, out[k + 1] + b, out[k + 2] + c, x, y, z, at)
+
+
+@njit
+def lean_at(out, tables, i, px, py, pz, x, y, z, at):
+    """The same of a force on body i at a place of the world; on the world (i < 0) nothing."""
+    if i >= 0:
+        here = row_of(tables, i)
+        a, b, c = (
+            px - out[here + PLACE] + out[here + ARM],
+            py - out[here + PLACE + 1] + out[here + ARM + 1],
+            pz - out[here + PLACE + 2] + out[here + ARM + 2],
+        )
+        lean_by(tables, i, b * z - c * y, c * x - a * z, a * y - b * x, x, y, z, at)
+
+
+@njit
+def lean_by(tables, i, tx, ty, tz, fx, fy, fz, at):
+    """The same of a torque about o and a force on body i."""
+    work, freedoms, paths = tables.scratch, tables.freedoms, tables.integers
     while i >= 0 and tables.bodies[i]["freedoms"] == 0:
         i = tables.bodies[i]["parent"]
     if i < 0:
@@ -316,15 +337,9 @@ def weigh(t, y, dydt, out, handle):
 
 
 @njit
-def accelerate(t, y, dydt, out, handle):
-    """Accelerations of all bodies under their forces, rates of their states."""
-    tables = open_tables(handle)
+def state_rates(y, dydt, tables):
+    """Rates of the states of joints from the accelerations of their freedoms; none where dydt is empty."""
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
-    fill(y, out, tables)
-    factor(tables)
-    solve(tables, 6 * n)
-    spread(out, tables)
-    out[RATE] = quickest_body(out, tables)
     if dydt.size == 0:
         return
     for i in range(bodies.size):
@@ -333,3 +348,15 @@ def accelerate(t, y, dydt, out, handle):
             coordinate_rates(body, y, dydt)
             for k in range(body["freedoms"]):
                 dydt[body["rate"] + k] = work[6 * n + body["freedom"] + k]
+
+
+@njit
+def accelerate(t, y, dydt, out, handle):
+    """Accelerations of all bodies under their forces, rates of their states."""
+    tables = open_tables(handle)
+    fill(y, out, tables)
+    factor(tables)
+    solve(tables, 6 * tables.freedoms.size)
+    spread(out, tables)
+    out[RATE] = quickest_body(out, tables)
+    state_rates(y, dydt, tables)

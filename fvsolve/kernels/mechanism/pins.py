@@ -1,0 +1,225 @@
+"""Pins that close loops: multipliers of their rows, with Baumgarte's pull. Loaded by scenes that have one alone.
+
+A row says that n . rho stays, n a direction and rho the place of `to` in the axes of the body of `from`, so the same
+force acts on both bodies at one point, forth and back. With G q' its rate and Z' Z = G M^-1 G' (Z = L^-T G'), lambda =
+-(Z' Z)^-1 (rows of the free accelerations + 2 pull G q' + pull^2 gap). Forces and places count from those of the start,
+which stand in the table: what was balanced there adds no bit. Behind what `kernels.mechanism.matrix` has in `scratch`:
+G, Z (a row of freedoms for each), Z' Z, lambda.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanism.lines import point_at
+from fvsolve.kernels.mechanism.matrix import (
+    LOAD,
+    factor,
+    fill,
+    halve,
+    lean_at,
+    loads_at,
+    quickest_body,
+    solve,
+    spread,
+    state_rates,
+)
+from fvsolve.kernels.mechanism.observe import acceleration_at
+from fvsolve.kernels.mechanism.room import (
+    ACCELERATION,
+    ATTITUDE,
+    PLACE,
+    SPIN,
+    VELOCITY,
+    add_force,
+    cross,
+    row_of,
+    turned,
+)
+from fvsolve.kernels.records import PIN_VALUE, RATE
+
+
+@njit(forceinline=True)
+def pins_at(tables):
+    """Where G stands in `scratch`."""
+    return loads_at(tables)[1] + LOAD * tables.bodies.size
+
+
+@njit(forceinline=True)
+def body_of(tables, point):
+    """Body of a point; -1 for the world."""
+    return tables.points[point]["body"]
+
+
+@njit
+def direction(out, tables, pin, r):
+    """Direction r of a pin, as the world sees it now."""
+    i = body_of(tables, pin["from_point"])
+    if i < 0:
+        return pin["directions"][3 * r], pin["directions"][3 * r + 1], pin["directions"][3 * r + 2]
+    return turned(out, row_of(tables, i) + ATTITUDE, pin["directions"], 3 * r)
+
+
+@njit
+def seen(out, tables, pin):
+    """Place, velocity and acceleration of `to` less those of the body of `from` there, (65): 9 numbers."""
+    i, j = body_of(tables, pin["from_point"]), body_of(tables, pin["to_point"])
+    x, y, z, u, v, w = point_at(out, tables, pin["to_point"], PLACE)
+    p, q, s, _, _, _ = point_at(out, tables, pin["from_point"], PLACE)
+    a, b, c = 0.0, 0.0, 0.0
+    if j >= 0:
+        here = row_of(tables, j)
+        a, b, c = acceleration_at(
+            out, here, here + ACCELERATION, *turned(out, here + ATTITUDE, tables.points[pin["to_point"]]["place"], 0)
+        )
+    if i >= 0:
+        here = row_of(tables, i)
+        rx, ry, rz = x - out[here + PLACE], y - out[here + PLACE + 1], z - out[here + PLACE + 2]
+        dx, dy, dz = cross(out, here + SPIN, rx, ry, rz)
+        k = here + VELOCITY
+        u, v, w = u - out[k] - dx, v - out[k + 1] - dy, w - out[k + 2] - dz
+        ex, ey, ez = acceleration_at(out, here, here + ACCELERATION, rx, ry, rz)
+        fx, fy, fz = cross(out, here + SPIN, 2.0 * u, 2.0 * v, 2.0 * w)
+        a, b, c = a - ex - fx, b - ey - fy, c - ez - fz
+    return x - p, y - q, z - s, u, v, w, a, b, c
+
+
+@njit
+def pull_apart(out, tables, pin, r, size):
+    """Add force `size` of row r to both bodies, where `to` is."""
+    nx, ny, nz = direction(out, tables, pin, r)
+    x, y, z, _, _, _ = point_at(out, tables, pin["to_point"], PLACE)
+    for end, sign in ((pin["to_point"], size), (pin["from_point"], -size)):
+        i = body_of(tables, end)
+        if i >= 0:
+            here = row_of(tables, i)
+            rx, ry, rz = x - out[here + PLACE], y - out[here + PLACE + 1], z - out[here + PLACE + 2]
+            add_force(out, here, rx, ry, rz, sign * nx, sign * ny, sign * nz)
+
+
+@njit
+def fill_rows(out, tables):
+    """G, Z, and in the place of lambda what each row lacks of its pull."""
+    pins, work, n, g = tables.pins, tables.scratch, tables.freedoms.size, pins_at(tables)
+    many = 0
+    for k in range(pins.size):
+        many += pins[k]["rows"]
+    z, last = g + many * n, g + 2 * many * n + many * many
+    row = 0
+    for k in range(pins.size):
+        pin = pins[k]
+        gx, gy, gz, u, v, w, a, b, c = seen(out, tables, pin)
+        x, y0, z0, _, _, _ = point_at(out, tables, pin["to_point"], PLACE)
+        for r in range(pin["rows"]):
+            nx, ny, nz = direction(out, tables, pin, r)
+            for m in range(n):
+                work[g + row * n + m] = 0.0
+            lean_at(out, tables, body_of(tables, pin["to_point"]), x, y0, z0, nx, ny, nz, g + row * n)
+            lean_at(out, tables, body_of(tables, pin["from_point"]), x, y0, z0, -nx, -ny, -nz, g + row * n)
+            for m in range(n):
+                work[z + row * n + m] = work[g + row * n + m]
+            halve(tables, z + row * n)
+            gap = nx * gx + ny * gy + nz * gz - pin["gap"][r]
+            slip, pull = nx * u + ny * v + nz * w, pin["pull"]
+            work[last + row] = -(nx * a + ny * b + nz * c + 2.0 * pull * slip + pull * pull * gap)
+            row += 1
+    return many
+
+
+@njit
+def multipliers(tables, many):
+    """lambda, by Z' Z = C C' in its place."""
+    work, n, z = tables.scratch, tables.freedoms.size, pins_at(tables) + many * tables.freedoms.size
+    h, last = z + many * n, z + many * n + many * many
+    for i in range(many):
+        for j in range(i + 1):
+            total = 0.0
+            for m in range(n):
+                total += work[z + i * n + m] * work[z + j * n + m]
+            for m in range(j):
+                total -= work[h + i * many + m] * work[h + j * many + m]
+            work[h + i * many + j] = sqrt(total) if i == j else total / work[h + j * many + j]
+    for i in range(many):
+        for m in range(i):
+            work[last + i] -= work[h + i * many + m] * work[last + m]
+        work[last + i] /= work[h + i * many + i]
+    for i in range(many - 1, -1, -1):
+        for m in range(i + 1, many):
+            work[last + i] -= work[h + m * many + i] * work[last + m]
+        work[last + i] /= work[h + i * many + i]
+
+
+@njit
+def gaps(t, y, dydt, out, handle):
+    """Gaps of the start into the places of forces, for `model.mechanism` to keep."""
+    tables = open_tables(handle)
+    pins, at = tables.pins, tables.layout[0]["pin"]
+    for k in range(pins.size):
+        x, y0, z, _, _, _, _, _, _ = seen(out, tables, pins[k])
+        for r in range(pins[k]["rows"]):
+            nx, ny, nz = direction(out, tables, pins[k], r)
+            out[at + 3 * k + r] = nx * x + ny * y0 + nz * z
+
+
+@njit
+def hold(t, y, dydt, out, handle):
+    """Forces that pins have at the start, as they act now."""
+    tables = open_tables(handle)
+    pins = tables.pins
+    for k in range(pins.size):
+        for r in range(pins[k]["rows"]):
+            pull_apart(out, tables, pins[k], r, pins[k]["force"][r])
+
+
+@njit
+def accelerate_pinned(t, y, dydt, out, handle):
+    """Accelerations of all bodies under their forces and those of pins, rates of their states."""
+    tables = open_tables(handle)
+    pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
+    hold(t, y, dydt, out, handle)
+    fill(y, out, tables)
+    factor(tables)
+    solve(tables, 6 * n)
+    spread(out, tables)
+    many = fill_rows(out, tables)
+    multipliers(tables, many)
+    g = pins_at(tables)
+    last = g + 2 * many * n + many * many
+    for m in range(n):
+        total = 0.0
+        for i in range(many):
+            total += work[last + i] * work[g + i * n + m]
+        work[7 * n + m] = total
+    solve(tables, 7 * n)
+    for m in range(n):
+        work[6 * n + m] += work[7 * n + m]
+    row, rate = 0, 0.0
+    for k in range(pins.size):
+        rate = max(rate, pins[k]["pull"])
+        for r in range(pins[k]["rows"]):
+            pull_apart(out, tables, pins[k], r, work[last + row])
+            out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
+            row += 1
+    spread(out, tables)
+    out[RATE] = max(quickest_body(out, tables), rate)
+    state_rates(y, dydt, tables)
+
+
+@njit
+def observe_pins(t, y, out, handle, values):
+    """Gap [m] of a pin, and its force [N]."""
+    tables = open_tables(handle)
+    probes, pins = tables.probes, tables.pins
+    for k in range(probes.size):
+        if probes[k]["kind"] == PIN_VALUE:
+            pin, at = pins[probes[k]["index"]], tables.layout[0]["pin"] + 3 * probes[k]["index"]
+            total = 0.0
+            if probes[k]["side"] == 0:
+                x, y0, z, _, _, _, _, _, _ = seen(out, tables, pin)
+                for r in range(pin["rows"]):
+                    nx, ny, nz = direction(out, tables, pin, r)
+                    total += (nx * x + ny * y0 + nz * z) ** 2
+            else:
+                for r in range(pin["rows"]):
+                    total += out[at + r] * out[at + r]
+            values[k] = sqrt(total)

@@ -1,0 +1,24 @@
+"""Pins in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import Lowering
+from fvsolve.model.mechanism import point_row
+
+
+class PinRows(Lowering, kind="pin"):
+    """Rows that hold one point at another."""
+
+    table = "pin"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        row["from_point"], row["to_point"] = point_row(draft, link.from_), point_row(draft, link.to)
+        directions = link.directions()
+        row["rows"], row["pull"] = len(directions), link.pull
+        row["directions"][: directions.size] = directions.ravel()
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["kind"], row["side"] = rec.PIN_VALUE, ("gap", "force").index(probe.quantity)
+        row["index"] = draft.pin_names.index(name)

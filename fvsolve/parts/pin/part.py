@@ -1,0 +1,46 @@
+"""A pin that closes a loop of bodies. Knows its points and its axis; computes no force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.attitude import no_direction, uneven
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.value import VALUE, Quantity, Rows, positive
+
+
+class Pin(TwoPort, kind="pin"):
+    """Holds point `to` at point `from`, across `axis` where one is given: a loop in a plane closes by those two rows.
+
+    Ports: from, to. Stored and dissipated energy: none, but for what its pull takes out of a gap. The forces are
+    multipliers of d2(gap)/dt2 = -2 pull d(gap)/dt - pull^2 gap (Baumgarte, 1972).
+    """
+
+    joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
+    quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force"}
+
+    axis: Annotated[
+        tuple[float, ...] | None,
+        Rows("number", length=3, about="in the axes of `from`, along which it holds nothing; a ball if left out"),
+    ] = None
+    pull: Annotated[float, Quantity("rate", positive, "at which a gap closes [1/s]", changes=VALUE)] = 10.0
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if no_direction(self.axis):
+            yield ("axis",), "is all zeros; wanted for example [0, 1, 0]"
+
+    def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+        yield from uneven("axis", self.axis)
+
+    def directions(self) -> np.ndarray:
+        """Along which it holds, in the axes of `from` : float64[rows, 3]."""
+        if self.axis is None:
+            return np.eye(3)
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        first /= np.linalg.norm(first)
+        return np.array([first, np.cross(axis, first)])
