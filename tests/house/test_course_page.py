@@ -23,9 +23,10 @@ STATEMENTS = {  # without a number, in sections 2 to 5: words that a heading has
     "L-stability", "Padé",
 }  # fmt: skip
 NOT_YET = "not modelled yet"
-SLOW = {  # what they run, or compile
-    "(6) The global error", "(13) Stability of a step", "Rotational ports", "(71) A volume that moves as it likes",
-    "(65) (66) The shares of an acceleration",
+SLOW = {  # what they run, or compile: bodies, basins, studies
+    "(6) The global error", "(13) Stability of a step", "Rotational ports", "(63) Acceleration of a point",
+    "(65) (66) The shares of an acceleration", "(68) Equations of motion of a rigid body",
+    "(69) (70) Energy in place of forces", "(71) A volume that moves as it likes", "(76) A volume that stands",
 }  # fmt: skip
 
 
@@ -150,8 +151,6 @@ def test_lines_of_python_print_what_stands_below_them(entry):
     assert printed_otherwise(entry.python) == ""
 
 
-def test_what_is_shown_is_a_command_or_python_or_a_test():
-    """Everything that the program has can be seen to run: most by a line that a reader may type."""
-    modelled = [one for one in ENTRIES if one.modelled]
-    typed = [one for one in modelled if one.python or "run" in one.fields]
-    assert len(typed) > 0.7 * len(modelled)
+def test_whatever_is_modelled_can_be_seen_to_run():
+    """By a line that a reader may type."""
+    assert [one.title for one in ENTRIES if one.modelled and not one.python and "run" not in one.fields] == []

@@ -3,7 +3,7 @@
 Codes of what is read stand in the order of `BODY_QUANTITIES` and `POINT_QUANTITIES`, in axes of the world.
 """
 
-from math import atan2, hypot, sqrt
+from math import atan2, cos, hypot, sin, sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -31,6 +31,7 @@ BODY_QUANTITIES = (
     "kinetic_energy", "momentum_x", "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y",
     "angular_momentum_z",
 )  # fmt: skip
+LEVEL = 1e-12  # cosine of pitch below which roll and yaw turn about one line
 SHARES = ("", "_relative", "_coriolis", "_transversal", "_centripetal")  # of an acceleration, (65)
 POINT_QUANTITIES = (
     *"xyz", "vx", "vy", "vz", *(f"a{axis}{share}" for share in SHARES for axis in "xyz"),
@@ -107,12 +108,16 @@ def joint_load(out, tables, i):
 
 @njit
 def roll_pitch_yaw(out, r):
-    """Angles of (40), R = R_z(yaw) R_y(pitch) R_x(roll)."""
-    return (
-        atan2(out[r + 7], out[r + 8]),
-        atan2(-out[r + 6], hypot(out[r + 7], out[r + 8])),
-        atan2(out[r + 3], out[r]),
-    )
+    """Angles of (40), R = R_z(yaw) R_y(pitch) R_x(roll): roll is what is left of R once yaw is undone.
+
+    So they say R also next to a pitch of 90 degrees, where the entries that roll and yaw are read from vanish; there
+    only their sum or difference is known, yaw is 0 and roll has it all, as in `fvsolve.attitude`.
+    """
+    level = hypot(out[r], out[r + 3])  # cos(pitch)
+    yaw = atan2(out[r + 3], out[r]) if level > LEVEL else 0.0
+    c, s = cos(yaw), sin(yaw)
+    roll = atan2(s * out[r + 2] - c * out[r + 5], c * out[r + 4] - s * out[r + 1])
+    return roll, atan2(-out[r + 6], level), yaw
 
 
 @njit
