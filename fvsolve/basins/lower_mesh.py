@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fvsolve.basins import faces
+from fvsolve.basins import faces, moving_meshes
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
@@ -18,13 +18,7 @@ if TYPE_CHECKING:
 def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """(float64[:] floats, int64[:] integers): geometry, and who lies beyond; cells and faces keep their numbers."""
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
-    slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
-    face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
-    own = np.concatenate([mesh.left, mesh.right[:inner]])
-    sort = np.lexsort((_turn(mesh, face), own))
-    first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=n))[:-1]])
-    side = np.empty(own.size, np.int64)
-    side[sort] = np.arange(own.size) - first[own[sort]]
+    slots, face, own, side = _sides(mesh)
     block, lane, count = own // faces.BLOCK, own % faces.BLOCK, -(-n // faces.BLOCK)
     slot, at = (4 * block + side) * faces.BLOCK + lane, (slots * block + side) * faces.BLOCK + lane
     other = np.concatenate([f + np.arange(inner), np.arange(inner, f), np.arange(inner)])  # the side beyond, or itself
@@ -50,6 +44,43 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     places = _by_block(indices).astype(np.int32).view(np.int64)
     integers = [[slots, n, f, f - inner, ring], places, need, slot[inner + rank], rank, face_of]
     return np.concatenate(floats), np.concatenate(integers).astype(np.int64)
+
+
+def lower_ends(mesh: Mesh, goes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(int64[blocks], int64[:]) of `moving_meshes`: blocks in which or beside which corners move, and ends of sides.
+
+    goes : bool[p]  whether a corner moves
+    """
+    n, inner = len(mesh.area), mesh.inner
+    slots, face, own, side = _sides(mesh)
+    at, count = (slots * (own // faces.BLOCK) + side) * faces.BLOCK + own % faces.BLOCK, -(-n // faces.BLOCK)
+    number, left = np.where(face >= 0, face, ~face), face >= 0
+    ends = np.zeros((moving_meshes.ENDS, count * slots * faces.BLOCK), np.int64)
+    ends[:, at] = [
+        mesh.ends[number, np.where(left, 0, 1)], mesh.ends[number, np.where(left, 1, 0)],
+        np.maximum(np.where(left, mesh.right[number], mesh.left[number]), -1),
+    ]  # fmt: skip
+    corners = np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)
+    moved = goes[corners].any(axis=1)
+    beside = moved.copy()
+    np.logical_or.at(beside, mesh.left[:inner], moved[mesh.right[:inner]])
+    np.logical_or.at(beside, mesh.right[:inner], moved[mesh.left[:inner]])
+    stirs = np.bincount(np.arange(n) // faces.BLOCK, beside, count) > 0.0
+    pairs = [table.ravel().astype(np.int32).view(np.int64) for table in (corners, _by_block(ends))]
+    return stirs.astype(np.int64), np.concatenate(pairs)
+
+
+def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+    """(sides a cell has at most, and of each side its face, its cell and its number there)."""
+    n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
+    slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
+    face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
+    own = np.concatenate([mesh.left, mesh.right[:inner]])
+    sort = np.lexsort((_turn(mesh, face), own))
+    first = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=n))[:-1]])
+    side = np.empty(own.size, np.int64)
+    side[sort] = np.arange(own.size) - first[own[sort]]
+    return slots, face, own, side
 
 
 def _by_block(table: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ WALLS = Pieces(
     home=HOME, see="walls: see", prepare="walls: drive_lines", enter="walls: push_bodies", swell="walls: swell",
     observe="walls: observe_walls", power="walls: wall_power",
 )  # fmt: skip
+SIDES = Pieces(home=HOME, see="moving_meshes: see_meshes", prepare="moving_meshes: drive_sides")
 VALUES = Pieces(home=HOME, leave="carried: patch_values", observe="carried: observe_values")
 GRIDS = Pieces(home=HOME, carry="carried_grids: carry_on_grids")
 FIFTH = Pieces(home=HOME, carry="carried_grids: add_on_grids")
@@ -27,6 +28,7 @@ def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
     """What runs in basins beside scalars; valves : whether there are any in the network."""
     shared = [ALL] if basins and basins[0].case.law.linear else [ALL, DENSE] if basins else []
     moving = [WALLS] if any(basin.moves for basin in basins) else []
+    moving += [SIDES] if any(basin.moves and not basin.is_grid for basin in basins) else []
     return tuple(dict.fromkeys([*shared, *(one for basin in basins for one in basin.pieces(valves)), *moving]))
 
 

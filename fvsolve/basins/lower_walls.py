@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.basins import faces, moving_meshes
+from fvsolve.basins.lower_mesh import lower_ends
 from fvsolve.basins.walls import BESIDE
 from fvsolve.case import walls as case
 from fvsolve.kernels import records as rec
@@ -22,18 +24,24 @@ def lower_walls(draft) -> None:
         row["y"] = draft.states([f"{basin.name}.{patch}.travel"], SCALE)
         row["mass"] = draft.mass_index[one.body] if one.body is not None else -1
         row["schedule"] = draft.schedules.add(one.travel) if one.travel is not None else -1
-        lines = (basin.mesh.grid.x, basin.mesh.grid.y)[axis]
-        goes = case.weights(basin.part, basin.mesh, patch, lines)
-        per = np.diff(goes) / np.diff(lines)
-        grid = basin.mesh.grid
-        per_cell = np.repeat(per, grid.nx) if axis == 1 else np.tile(per, grid.ny)
         with_it = case.weights(basin.part, basin.mesh, patch, basin.mesh.points[:, axis])
+        goes, per = with_it, case.widened(basin.mesh, axis, with_it)
+        per_cell = per
+        if basin.is_grid:
+            grid, lines = basin.mesh.grid, (basin.mesh.grid.x, basin.mesh.grid.y)[axis]
+            goes = case.weights(basin.part, basin.mesh, patch, lines)
+            per = np.diff(goes) / np.diff(lines)
+            per_cell = np.repeat(per, grid.nx) if axis == 1 else np.tile(per, grid.ny)
         basin.stretches.append((int(row["y"]), per_cell, np.outer(with_it, np.eye(2)[axis])))
         row["weights"] = draft.to_plane(np.concatenate([goes, per]))
-        faces = np.arange(basin.mesh.left.size)[basin.mesh.patch(patch)]
-        length, behind = basin.mesh.length[faces], basin.mesh.left[faces]
-        row["faces"], row["count"] = len(draft.integers), faces.size
-        draft.integers += [*np.argsort(basin.ring())[faces - basin.mesh.inner].tolist(), *behind.tolist()]
+        own = np.arange(basin.mesh.left.size)[basin.mesh.patch(patch)]
+        length, behind = basin.mesh.length[own], basin.mesh.left[own]
+        row["faces"], row["count"] = len(draft.integers), own.size
+        numbers = own - basin.mesh.inner
+        draft.integers += [
+            *(np.argsort(basin.ring())[numbers] if basin.is_grid else numbers).tolist(),
+            *behind.tolist(),
+        ]
         row["lengths"] = draft.to_plane(length)
         row["rest"] = float(np.sum(length * basin.thrust_at_rest()[behind]))
     for k, basin in enumerate(draft.basins):
@@ -43,9 +51,26 @@ def lower_walls(draft) -> None:
 
 def lower_lines(draft, basin, row) -> None:
     """Reserve what lines of a basin that move need in `plane`, beside what is drawn."""
-    grid, axis = basin.mesh.grid, case.axis_of(basin.part, basin.mesh)
-    drawn = 1.0 / np.diff((grid.x, grid.y)[axis])
-    row["turn"], row["area"] = axis, draft.to_plane(basin.mesh.area)
+    mesh, axis = basin.mesh, case.axis_of(basin.part, basin.mesh)
+    row["turn"], row["area"] = axis, draft.to_plane(mesh.area)
+    row["thrust"] = draft.to_work(2 * row["outer"])
+    if not basin.is_grid:
+        lower_corners(draft, basin, row, axis)
+        return
+    drawn = 1.0 / np.diff((mesh.grid.x, mesh.grid.y)[axis])
     row["stretch"] = draft.to_plane(np.concatenate([np.ones(drawn.size), drawn]))
     row["lines"] = draft.to_plane(np.zeros(drawn.size + 1 + BESIDE))
-    row["thrust"] = draft.to_work(2 * (grid.nx + grid.ny))
+
+
+def lower_corners(draft, basin, row, axis: int) -> None:
+    """The same of corners of a mesh of any cells."""
+    mesh, (x, y) = basin.mesh, basin.mesh.points.T
+    row["corners"], row["stretch"] = x.size, draft.to_plane(np.ones(basin.n))
+    row["lines"] = draft.to_plane(np.zeros(x.size))
+    room = np.zeros(moving_meshes.ROOM)
+    row["places"] = draft.to_plane(np.concatenate([x, y, mesh.points[:, axis], *mesh.centre.T, room]))
+    goes = sum(case.weights(basin.part, mesh, patch, mesh.points[:, axis]) for patch in basin.walls) > 0.0
+    stirs, pairs = lower_ends(mesh, goes)
+    row["sides"] = draft.to_plane(np.zeros(4 * faces.BLOCK * stirs.size))
+    row["ends"] = len(draft.integers)
+    draft.integers += [stirs.size, *stirs.tolist(), *pairs.tolist()]

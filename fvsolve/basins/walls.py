@@ -1,10 +1,10 @@
-"""Walls of basins that move, and the lines of grids that go with them. Knows rows of tables; knows no physics.
+"""Walls of basins that move, and the lines that go with them. Knows rows of tables; knows no physics.
 
 d/dt of what a cell contains is the sum of F - w U over its faces, w their speeds (Reynolds' transport theorem, 71 to
 73). So the states are contents over areas as drawn, (A U - A0 U0) / A0, and where walls stand are states as well: areas
 are then linear in states, a sum that every Runge-Kutta method keeps, and what is even stays so to round-off. All walls
 of a basin move along one axis. What other pieces see in place of the contents are deviations U - U0, and in `plane`
-lines and areas as they are.
+lines and areas as they are. Corners of other meshes are what lines are to grids (`moving_meshes` has the rest of them).
 """
 
 from math import sqrt
@@ -23,8 +23,19 @@ BESIDE = 8  # speeds of lines that loops over whole vectors look at beyond the l
 
 @njit(forceinline=True)
 def across(basin):
-    """How many cells lie between the lines that move, and how many in each row of these."""
-    return (basin["ny"], basin["nx"]) if basin["turn"] == 1 else (basin["nx"], basin["ny"])
+    """How many rows of cells stretch, and how many lines move; of a mesh cells and corners."""
+    if basin["nx"] == 0:
+        return basin["n"], basin["corners"]
+    many = basin["ny"] if basin["turn"] == 1 else basin["nx"]
+    return many, many + 1
+
+
+@njit(forceinline=True)
+def row_across(basin, i):
+    """In which of the rows that stretch cell i lies."""
+    if basin["nx"] == 0:
+        return i
+    return i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
 
 
 @njit
@@ -41,21 +52,22 @@ def see(t, y, seen, out, handle):
 
 @njit
 def stretch_cells(tables, basin, y):
-    """Widths of columns or rows, and areas, with walls where they are."""
+    """By how much cells are stretched, and areas, with walls where they are; of grids widths and patches too."""
     plane, walls, at = tables.plane, tables.walls, basin["stretch"]
-    many, _ = across(basin)
-    spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
-    drawn = at + many  # 1 / widths as drawn, behind what they are stretched by
+    many, lines = across(basin)
     for i in range(many):
         plane[at + i] = 1.0
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
-        weights = walls[k]["weights"] + many + 1
+        weights = walls[k]["weights"] + lines
         for i in range(many):
             plane[at + i] += plane[weights + i] * y[walls[k]["y"]]
-    for i in range(many):
-        plane[spacing + i] = plane[drawn + i] / plane[at + i]
     for i in range(basin["n"]):
         plane[basin["area"] + i] = plane[basin["drawn"] + i] * stretched(plane, basin, i)
+    if basin["nx"] == 0:
+        return
+    spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
+    for i in range(many):
+        plane[spacing + i] = plane[at + many + i] / plane[at + i]  # 1 / widths as drawn
     for p in range(tables.patches.size):
         if tables.basins[tables.patches[p]["basin"]]["y"] == basin["y"]:
             stretch_patch(tables, basin, tables.patches[p])
@@ -80,7 +92,7 @@ def stretch_patch(tables, basin, patch):
 @njit(forceinline=True)
 def stretched(plane, basin, i):
     """Area of cell i over that as drawn."""
-    return plane[basin["stretch"] + (i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"])]
+    return plane[basin["stretch"] + row_across(basin, i)]
 
 
 @njit
@@ -114,29 +126,30 @@ def drive_lines(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["walls"] == 0:
             continue
-        lines, (many, _) = basin["lines"], across(basin)
-        for i in range(many + 1):
-            plane[lines + i] = 0.0
+        at, (many, lines) = basin["lines"], across(basin)
+        for i in range(lines):
+            plane[at + i] = 0.0
         for k in range(basin["wall"], basin["wall"] + basin["walls"]):
             speed = speed_of(t, tables, walls[k], y)
-            for i in range(many + 1):
-                plane[lines + i] += speed * plane[walls[k]["weights"] + i]
+            for i in range(lines):
+                plane[at + i] += speed * plane[walls[k]["weights"] + i]
             if dydt.size > 0:
                 dydt[walls[k]["y"]] = speed
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
         for i in range(many):
             if not plane[basin["stretch"] + i] > ROOM:
                 out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
-            most = max(most, max(abs(plane[lines + i]), abs(plane[lines + i + 1])) * plane[spacing + i])
+        for i in range(many if basin["nx"] > 0 else 0):
+            most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
         out[RATE] = max(out[RATE], most)
 
 
 @njit
 def nearest(tables, basin, i):
-    """The place that is the wall with which column or row i goes most."""
-    found, most, (many, _) = basin["wall"], -1.0, across(basin)
+    """The place that is the wall with which column, row or cell i goes most."""
+    found, most, (_, lines) = basin["wall"], -1.0, across(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
-        per = abs(tables.plane[tables.walls[k]["weights"] + many + 1 + i])
+        per = abs(tables.plane[tables.walls[k]["weights"] + lines + i])
         if per > most:
             found, most = k, per
     return tables.walls[found]["node"]
@@ -145,8 +158,8 @@ def nearest(tables, basin, i):
 @njit(forceinline=True)
 def moves_of(tables, basin):
     """Speeds of lines along x and along y, and room for the thrust on the boundary, as kernels of grids want them."""
-    plane, lines, (many, _) = tables.plane, basin["lines"], across(basin)
-    speeds, none = plane[lines : lines + many + 1 + BESIDE], plane[:0]
+    plane, at, (_, lines) = tables.plane, basin["lines"], across(basin)
+    speeds, none = plane[at : at + lines + BESIDE], plane[:0]
     thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * (basin["nx"] + basin["ny"])]
     if basin["turn"] == 1:
         return none, speeds, thrust
@@ -243,9 +256,8 @@ def wall_power(t, y, dydt, out, handle, power):
 @njit
 def widening(t, tables, basin, y, i):
     """Rate of the area of cell i over that as drawn [1/s]."""
-    total, (many, _) = 0.0, across(basin)
-    column = i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
+    total, (_, lines) = 0.0, across(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         wall = tables.walls[k]
-        total += tables.plane[wall["weights"] + many + 1 + column] * speed_of(t, tables, wall, y)
+        total += tables.plane[wall["weights"] + lines + row_across(basin, i)] * speed_of(t, tables, wall, y)
     return total

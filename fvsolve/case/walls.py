@@ -13,6 +13,7 @@ from fvsolve.parts.formula import Formula
 from fvsolve.units import show
 
 SAMPLES = 1001  # of a travel
+NEAR = 1e-9  # of a size, or of a normal, what counts as none of it
 FLAT = 1e-12  # of the height of a bed, what counts as none of it
 
 
@@ -39,6 +40,17 @@ def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
     low, high = mesh.points[:, axis].min(), mesh.points[:, axis].max()
     zone = basin.patches[patch].zone or high - low
     return np.clip(1.0 - (high - at if side > 0.0 else at - low) / zone, 0.0, 1.0)
+
+
+def widened(mesh: Any, axis: int, goes: np.ndarray) -> np.ndarray:
+    """By how much the area of cells grows per travel, over that as drawn : float64[n] [1/m].
+
+    goes : float64[p]  how far corners go with the wall
+    """
+    swept = mesh.length * mesh.normal[:, axis] * goes[mesh.ends].mean(axis=1)
+    inner = mesh.inner
+    found = np.bincount(mesh.left, swept, mesh.area.size)
+    return (found - np.bincount(mesh.right[:inner], swept[:inner], mesh.area.size)) / mesh.area
 
 
 def misfits(
@@ -76,13 +88,19 @@ def wall_faults(basin: Any, mesh: Any, patch: str, one: Any, nodes: dict, times:
         return
     axis, side = outward(mesh, patch)
     at = mesh.points[:, axis]
+    end = at.max() if side > 0.0 else at.min()
+    if np.abs(at[mesh.ends[mesh.patch(patch)]] - end).max() > NEAR * np.ptp(at):
+        yield (), f"does not lie where the basin ends along {'xy'[axis]}, at {end:g} m; wanted a wall that does"
+        return
     size, zone = float(np.ptp(at)), one.zone or float(np.ptp(at))
     if zone > size * (1.0 + 1e-9):
         yield ("zone",), f"{zone:g} m is more than there is along {'xy'[axis]}, {size:g} m"
     if one.travel is not None:
-        yield from ((("travel",), text) for text in travel_faults(one.travel, side, zone, times))
+        per = widened(mesh, axis, weights(basin, mesh, patch, at))
+        yield from ((("travel",), text) for text in travel_faults(one.travel, side, zone, times, mesh, per))
     if isinstance(getattr(basin, "bed", None), Formula):
         yield from bed_faults(basin, mesh, patch)
+    yield from outline_faults(basin, mesh, patch)
 
 
 def body_faults(name: str, nodes: dict[str, Any]) -> Iterator[str]:
@@ -96,8 +114,11 @@ def body_faults(name: str, nodes: dict[str, Any]) -> Iterator[str]:
         yield f"{name} is {still}; wanted a mass, or travel in its place"
 
 
-def travel_faults(travel: Any, side: float, zone: float, times: tuple[float, float]) -> Iterator[str]:
-    """Faults of how far a wall is to move: jumps, and all of its zone used up."""
+def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any, per: np.ndarray) -> Iterator[str]:
+    """Faults of how far a wall is to move: jumps, all of its zone used up, and a cell in which it ends turned over.
+
+    per : float64[n]  what cells grow by per travel, over their areas [1/m]
+    """
     if travel.kind == "step":
         yield "jumps, and a wall has a speed; wanted one without jumps, for example a ramp"
     inside = travel.time[(travel.time > times[0]) & (travel.time < times[1])]
@@ -105,6 +126,24 @@ def travel_faults(travel: Any, side: float, zone: float, times: tuple[float, flo
     inward = float((side * (places[0] - places)).max())
     if inward >= zone:
         yield f"comes {inward:g} m inward, and the zone behind it is {zone:g} m wide; wanted less, or a wider zone"
+        return
+    least = np.minimum((places.min() - places[0]) * per, (places.max() - places[0]) * per)
+    if least.min() <= -1.0:
+        x, y = mesh.centre[np.argmin(least)]
+        yield f"turns over the cell at {x:.6g},{y:.6g} m, in which the zone ends; wanted less, or another zone"
+
+
+def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:
+    """Boundaries that a wall would take along or shear: all beside it must run along its way."""
+    axis, _ = outward(mesh, patch)
+    outer = np.arange(mesh.inner, mesh.left.size)
+    own = mesh.patch(patch)
+    goes = (weights(basin, mesh, patch, mesh.points[:, axis])[mesh.ends[outer]] > 0.0).any(axis=1)
+    leans = (np.abs(mesh.normal[outer, axis]) > NEAR) & goes & ~((outer >= own.start) & (outer < own.stop))
+    if leans.any() and not basin.holes:
+        x, y = mesh.middle[outer[np.flatnonzero(leans)[0]]]
+        text = f"would take along the outline at {x:.6g},{y:.6g} m, which does not run along {'xy'[axis]}"
+        yield (), f"{text}; wanted an outline that does where lines move, or a shorter zone"
 
 
 def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]:

@@ -445,11 +445,15 @@ BASIN = np.dtype(
         ("walls", "i8"),  # how many these are; with any, its states are contents, see `basins.walls`
         ("drawn", "i8"),  # offsets in `plane`: areas of cells as drawn; else those of cells now
         ("stretch", "i8"),  # area of cells over that as drawn
-        ("lines", "i8"),  # speeds of lines [m/s]
+        ("lines", "i8"),  # speeds of lines, of a mesh of its corners [m/s]
         ("thrust", "i8"),  # and in `work`: on faces of the boundary, see `free_surface.grid`
         ("turn", "i8"),  # 0 where lines along x move, 1 where those along y do
         ("body", "i8"),  # that it rides on; -1 for none
         ("frame", "i8"),  # in `plane`: where and how it stands there, and how its axes move; see `basins.frames`
+        ("corners", "i8"),  # of a mesh: how many, and offsets in `plane`:
+        ("places", "i8"),  # of these, then centres of cells, see `moving_meshes`
+        ("sides", "i8"),  # speeds of sides along their normals, by block, side of four and cell [m/s]
+        ("ends", "i8"),  # and in `integers`: corners of sides and cells, see `moving_meshes`
     ],
     align=True,
 )

@@ -44,7 +44,7 @@ class Field:
         """(rates, greatest rate); work starts as NaN, so that what is read before it is written shows."""
         work, found = np.full(shallow_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
         rate = shallow_faces.shallow_rates(
-            G, scheme, wide, self.floats, self.integers, reflect, plan, *y, flow, NONE, work, *found
+            G, scheme, wide, self.floats, self.integers, reflect, plan, *y, flow, NONE, work, *found, None
         )
         return found, rate
 

@@ -36,7 +36,8 @@ THIN = 1e-6  # depth below which velocities fade [m]
 # rows of BLOCK in the scratch of `settle`: what lies beyond, rates, sums for the step, flow through the side
 _E, _U, _V, _C, _RH, _RX, _RY, _FAST, _GONE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-ROWS = 13
+_PUSH = 13 * BLOCK  # of what moves, thrust on the side less that of the cell's own depth
+ROWS = 14
 
 
 @njit
@@ -51,28 +52,37 @@ def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
 
 
 @njit
-def mirror(edges, ring, nx, ny, number, reflect, u, v, shown_u, shown_v):
-    """Velocities that the boundary shows of the cells inside."""
+def mirror(edges, ring, nx, ny, number, reflect, u, v, shown_u, shown_v, moves):
+    """Velocities that the boundary shows of the cells inside; where it moves, u of 2 w - u."""
     for q in range(edges.size):
         i = place(edges[q], ring)
         r = reflect[number[q]] if reflect.size > 0 else 1.0
-        turn = 2.0 * r * (u[i] * nx[q] + v[i] * ny[q])
+        across = u[i] * nx[q] + v[i] * ny[q]
+        if moves is not None:
+            across -= moves[0][edges[q]]
+        turn = 2.0 * r * across
         shown_u[q], shown_v[q] = u[i] - turn * nx[q], v[i] - turn * ny[q]
 
 
 @njit
-def mirror_sides(edges, nx, ny, number, reflect, ul, vl, w):
+def mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
     """Put beyond sides of the boundary what it shows of the values inside."""
     for q in range(edges.size):
         i = edges[q] % BLOCK
         r = reflect[number[q]] if reflect.size > 0 else 1.0
-        turn = 2.0 * r * (ul[i] * nx[q] + vl[i] * ny[q])
+        across = ul[i] * nx[q] + vl[i] * ny[q]
+        if moves is not None:
+            across -= moves[0][edges[q]]
+        turn = 2.0 * r * across
         w[_U + i], w[_V + i] = ul[i] - turn * nx[q], vl[i] - turn * ny[q]
 
 
 @njit
-def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w):
-    """Take from the rates of a block of cells what leaves through one side of each, from the values inside it."""
+def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
+    """Take from the rates of a block of cells what leaves through one side of each, from the values inside it.
+
+    speeds : of the sides [m/s], None where they stand still: F(U) - w U, found in axes that move along
+    """
     half = 0.5 * g
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
@@ -80,12 +90,17 @@ def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w):
         a, b, c = max(0.0, el[i] - bed), max(0.0, w[_E + i] - bed), max(c0[i], w[_C + i])
         na, nb = ul[i] * nx + vl[i] * ny, w[_U + i] * nx + w[_V + i] * ny
         ta, tb = vl[i] * nx - ul[i] * ny, w[_V + i] * nx - w[_U + i] * ny
+        if speeds is not None:
+            na, nb = na - speeds[i], nb - speeds[i]
         low, high = min(min(na, nb) - c, 0.0), max(max(na, nb) + c, 0.0)
         both = 1.0 / (high - low + TINY)
         qa, qb = a * na, b * nb
         mass = both * (high * qa - low * qb + high * low * (b - a))
         flow = both * (high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa))
         flow += half * (hl[i] + h0[i]) * (el[i] - e0[i])
+        if speeds is not None:
+            flow += speeds[i] * mass
+            w[_PUSH + i] = flow
         along = mass * (ta if mass > 0.0 else tb)
         w[_RH + i] -= reach * mass
         w[_RX + i] -= reach * (flow * nx - along * ny)
@@ -93,6 +108,17 @@ def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w):
         w[_FAST + i] += reach * max(high, -low)
         w[_GONE + i] += reach * (high * (na - low) * both)
         w[_MASS + i] = mass
+
+
+@njit
+def push_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
+    """Let nothing pass walls; thrust on them less that of the depth at rest there."""
+    for q in range(edges.size):
+        i = edges[q] % BLOCK
+        thrust[number[q]] = w[_PUSH + i] + 0.5 * g * ((h0[i] - rest[i]) * (h0[i] + rest[i]))
+        if reflect.size == 0 or reflect[number[q]] == 1.0:
+            w[_RH + i] += geo[_REACH + i] * w[_MASS + i]
+            w[_MASS + i] = 0.0
 
 
 @njit
@@ -139,8 +165,9 @@ def work_size(integers):
 
 @njit
 def shallow_rates(
-    g, scheme, wide_by, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y
-):
+    g, scheme, wide_by, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y,
+    moves,
+):  # fmt: skip
     """Rates of all cells; returns the greatest of sum L (|u| + c) / (2 A) and of the share that leaves a cell [1/s].
 
     Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
@@ -148,6 +175,8 @@ def shallow_rates(
     reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
     flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
     through : float64[b]  volumes inward through the boundary [m3/s], or empty
+    moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: thrust on faces
+    of the boundary less that at rest, over density [m2/s2], float64[b]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -178,7 +207,7 @@ def shallow_rates(
             if not first_order:
                 k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
                 here, su, sv = edges[k:wall], shown[k:wall], shown[b + k : b + wall]
-                mirror(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, u, v, su, sv)
+                mirror(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, u, v, su, sv, moves)
                 o = (sided % ring) * BLOCK
                 put_sides(
                     sided, floats, integers, h, wide_by, h[o:], su, edges[:0], w, hs
@@ -201,8 +230,13 @@ def shallow_rates(
             gather(vs, beyond, w[_V:])
             gather(c, where, w[_C:])
             i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
-            mirror_sides(edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, us[own:], vs[own:], w)
-            settle(g, h[o:], e[o:], c[o:], hs[own:], es[own:], us[own:], vs[own:], geo, w)
+            mirror_sides(edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, us[own:], vs[own:], w, moves)
+            if moves is None:
+                settle(g, h[o:], e[o:], c[o:], hs[own:], es[own:], us[own:], vs[own:], geo, w, None)
+            else:
+                speeds = moves[0][(4 * j + k) * BLOCK :]
+                settle(g, h[o:], e[o:], c[o:], hs[own:], es[own:], us[own:], vs[own:], geo, w, speeds)
+                push_walls(g, edges[i:edge], number[i:edge], reflect, plan[DEPTH, first:last], h[o:], geo, w, moves[1])
             if flow.size > 0:
                 put_flow(faces[slot * BLOCK :], w, lengths, flow)
             if through.size > 0:

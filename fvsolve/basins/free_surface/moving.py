@@ -1,7 +1,8 @@
 """Water between walls that move: rates of cells, and its energy as areas change. Knows the tables; knows no flux."""
 
+from fvsolve.basins import moving_meshes
 from fvsolve.basins.energy import at_rest, row_of
-from fvsolve.basins.free_surface.rates import MINE, on_grid
+from fvsolve.basins.free_surface.rates import MINE, on_grid, on_mesh
 from fvsolve.basins.walls import moves_of, widening
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -20,6 +21,15 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         if is_moving(tables.basins[b]) and tables.basins[b]["nx"] > 0:
             on_grid(tables, b, y, dydt, out, moves_of(tables, tables.basins[b]))
+
+
+@njit
+def rates_on_moving_meshes(t, y, dydt, out, handle):
+    """Rates of cells of any mesh."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if is_moving(tables.basins[b]) and tables.basins[b]["nx"] == 0:
+            on_mesh(tables, b, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]))
 
 
 @njit

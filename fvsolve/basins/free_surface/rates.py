@@ -81,27 +81,32 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 
 @njit
-def rates_on_meshes(t, y, dydt, out, handle):
-    """Rates of cells of any mesh."""
-    tables = open_tables(handle)
+def on_mesh(tables, b, y, dydt, out, moves):
+    """Rates of cells of any mesh; moves : None, or as `faces.shallow_rates` has it."""
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
+    basin = tables.basins[b]
+    n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
+    plan = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n))
+    dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+    rates = to[first : first + 3 * n]
+    rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
+    flow = work[:0]
+    if f >= 0:  # scalars are carried by them
+        flow = work[f : f + basin["faces"]]
+    rate = faces.shallow_rates(
+        weight_of(st, plane, basin), basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
+        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
+        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y, moves,
+    )  # fmt: skip
+    finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+
+
+@njit
+def rates_on_meshes(t, y, dydt, out, handle):
+    """Rates of cells of any mesh that stands still."""
+    tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
-        if basin["kind"] != MINE or basin["nx"] > 0 or not wanted(basin, dydt):
-            continue
-        n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
-        plan = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n))
-        dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
-        rates = to[first : first + 3 * n]
-        rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
-        flow = work[:0]
-        if f >= 0:  # scalars are carried by them
-            flow = work[f : f + basin["faces"]]
-        rate = faces.shallow_rates(
-            weight_of(st, plane, basin), basin["scheme"], basin["wide"],
-            plane[basin["mesh"] :], integers[basin["links"] :],
-            plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
-            work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y,
-        )  # fmt: skip
-        finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+        if basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0 and wanted(basin, dydt):
+            on_mesh(tables, b, y, dydt, out, None)
