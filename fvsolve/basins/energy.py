@@ -6,16 +6,15 @@ change since the profile [J]. A physics fills what is not zero of its own, squar
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.accounts import OF_BASIN, basin_rows
 from fvsolve.kernels.energy import potential
 from fvsolve.kernels.handle import open_tables
-
-ROWS = 4  # of `power` a basin
 
 
 @njit
 def row_of(tables, power, b):
     """The first of the rows of `power` of basin b."""
-    return power.size - ROWS * (tables.basins.size - b)
+    return basin_rows(tables, power) + OF_BASIN * b
 
 
 @njit(forceinline=True)

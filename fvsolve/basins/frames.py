@@ -8,18 +8,42 @@ In axes of the basin, z along its normal, r = (x, y, 0) from its origin, which m
 So tilt, accelerations and centrifugal forces are a bed that moves, phi stands where the bed stands, and water that
 rests in the frame rests to round-off. Left out are what columns feel along z but at the origin, and vertical momentum:
 both of the order of angle times depth over wave length.
+
+Where forces move the body its acceleration is not known before that of its water. As Lagrange (70) has it for columns
+that are point masses which slide along the bed, weight at mid depth: what pushes them along the bed hangs on the state
+alone. So rates of flow are found first as if joints were held; water then loads the body by what its momentum lacks
+(`load_bodies`), along the normal by its mass and moments beside those of bodies (`kernels.mechanism.tanks`); once
+accelerations are solved, flow feels them (`follow_bodies`). Momentum of the whole is kept to the method's order: Ω x
+the sum of x dm/dt in the load is that of mass fluxes.
 """
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, cross, row_of, turned
+from fvsolve.kernels.mechanism.room import (
+    ACCELERATION,
+    ARM,
+    ATTITUDE,
+    BIAS,
+    SPIN,
+    SPIN_BIAS,
+    TURNING,
+    add_force,
+    add_torque,
+    cross,
+    dot,
+    put,
+    row_of,
+    turned,
+)
+from fvsolve.kernels.mechanism.tanks import ARM_OF, EAST, MOMENTS, TANK_OUT
 from fvsolve.kernels.records import NO_WEIGHT, RATE, STATUS, WHERE
 
 AT, TURN = 0, 3  # numbers of a frame: place of its origin and attitude, by rows, in axes of its body,
-GX, GY, GN, WX, WY, WZ, WZ_RATE = range(12, 19)  # G, g_n, W and dW_z/dt in its own axes,
-SURFACE = 19  # offsets in `plane`: of surfaces as drawn, and of places of columns and rows, or of cells
-PLACES = 20
-FRAME = 21  # numbers
+GX, GY, GN, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n, W and dW/dt in its own axes,
+SURFACE = 21  # offsets in `plane`: of surfaces as drawn, and of places of columns and rows, or of cells
+PLACES = 22
+DOWN = 23  # gravity alone, three numbers
+FRAME = 26  # numbers
 
 
 @njit
@@ -59,7 +83,8 @@ def set_frame(tables, basin, out):
     plane[at + GN] = -seen_along(out, row, plane, axes, 2, gx, gy, gz)
     for k in range(3):
         plane[at + WX + k] = seen_along(out, row, plane, axes, k, out[s], out[s + 1], out[s + 2])
-    plane[at + WZ_RATE] = seen_along(out, row, plane, axes, 2, out[e], out[e + 1], out[e + 2])
+        plane[at + AX + k] = seen_along(out, row, plane, axes, k, out[e], out[e + 1], out[e + 2])
+        plane[at + DOWN + k] = seen_along(out, row, plane, axes, k, 0.0, 0.0, -tables.settings[0]["gravity"])
 
 
 @njit
@@ -84,23 +109,124 @@ def tilt_bed(plane, basin):
             plane[to + row + i] = plane[drawn + row + i] + (x * (slope + xx * x) + even)
 
 
+@njit(forceinline=True)
+def place_of(plane, basin, i):
+    """Where the centre of cell i lies in axes of its basin [m]."""
+    n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
+    if nx == 0:
+        return plane[places + i], plane[places + n + i]
+    return plane[places + i % nx], plane[places + nx + i // nx]
+
+
 @njit
 def turn_water(t, y, dydt, out, handle):
-    """Add Coriolis and Euler forces to rates of flow."""
+    """Add Coriolis and Euler forces to rates of flow, and let bodies feel what is in them."""
     tables = open_tables(handle)
     plane = tables.plane
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["frame"] < 0:
             continue
-        twice, euler = 2.0 * plane[basin["frame"] + WZ], plane[basin["frame"] + WZ_RATE]
+        twice, euler = 2.0 * plane[basin["frame"] + WZ], plane[basin["frame"] + AZ]
         out[RATE] = max(out[RATE], abs(twice))
-        if dydt.size == 0 or (twice == 0.0 and euler == 0.0):
-            continue
-        n, o, nx, places = basin["n"], basin["y"], basin["nx"], int(plane[basin["frame"] + PLACES])
-        for i in range(n):
-            x = plane[places + (i if nx == 0 else i % nx)]
-            z = plane[places + (n + i if nx == 0 else nx + i // nx)]
+        n, o = basin["n"], basin["y"]
+        to, first = (dydt, o) if dydt.size > 0 else (tables.work, basin["unused"])
+        for i in range(n if twice != 0.0 or euler != 0.0 else 0):
+            x, z = place_of(plane, basin, i)
             depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
-            dydt[o + n + i] += twice * y[o + 2 * n + i] + euler * depth * z
-            dydt[o + 2 * n + i] -= twice * y[o + n + i] + euler * depth * x
+            to[first + n + i] += twice * y[o + 2 * n + i] + euler * depth * z
+            to[first + 2 * n + i] -= twice * y[o + n + i] + euler * depth * x
+        load_body(tables, basin, b, y, to, first, out)
+
+
+@njit
+def load_body(tables, basin, b, y, rates, first, out):
+    """Force and torque of the water in a basin on its body with joints held, and its moments along the normal."""
+    plane, n, o, rho = tables.plane, basin["n"], basin["y"], tables.settings[0]["rho"]
+    m = sx = sy = xx = xy = yy = lever = 0.0  # moments of mass, and half of that times depth
+    dx = dy = dxx = dxy = dyy = 0.0  # their rates
+    qx = qy = turn = fx = fy = spin = 0.0  # momentum, its moment about z, and their rates
+    for i in range(n):
+        x, z = place_of(plane, basin, i)
+        per = rho * plane[basin["area"] + i]
+        depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
+        mass, more = per * depth, per * rates[first + i]
+        u, v, du, dv = (
+            per * y[o + n + i],
+            per * y[o + 2 * n + i],
+            per * rates[first + n + i],
+            per * rates[first + 2 * n + i],
+        )
+        m, sx, sy, lever = m + mass, sx + mass * x, sy + mass * z, lever + 0.5 * mass * depth
+        xx, xy, yy = xx + mass * x * x, xy + mass * x * z, yy + mass * z * z
+        dx, dy = dx + more * x, dy + more * z
+        dxx, dxy, dyy = dxx + more * x * x, dxy + more * x * z, dyy + more * z * z
+        qx, qy, turn = qx + u, qy + v, turn + x * v - z * u
+        fx, fy, spin = fx + du, fy + dv, spin + x * dv - z * du
+    at = basin["frame"]
+    gx, gy, gz = plane[at + GX], plane[at + GY], -plane[at + GN]
+    wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
+    ax, ay, az = plane[at + AX], plane[at + AY], plane[at + AZ]
+    # force: M G - W' x S - W x (W x S + S' + Q) - Q'
+    px, py, pz = qx + dx - wz * sy, qy + dy + wz * sx, wx * sy - wy * sx
+    hx = m * gx + az * sy - (wy * pz - wz * py) - fx
+    hy = m * gy - az * sx - (wz * px - wx * pz) - fy
+    hz = m * gz - (ax * sy - ay * sx) - (wx * py - wy * px)
+    # torque: S x G + lever n x g - I W' - I' W - H' - W x (I W + H)
+    lx, ly, lz = yy * wx - xy * wy, xx * wy - xy * wx, (xx + yy) * wz + turn
+    tx = sy * gz - lever * plane[at + DOWN + 1] - (yy * ax - xy * ay) - (dyy * wx - dxy * wy) - (wy * lz - wz * ly)
+    ty = -sx * gz + lever * plane[at + DOWN] - (xx * ay - xy * ax) - (dxx * wy - dxy * wx) - (wz * lx - wx * lz)
+    tz = sx * gy - sy * gx - (xx + yy) * az - (dxx + dyy) * wz - spin - (wx * ly - wy * lx)
+    body, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    rx, ry, rz = turned(out, body + ATTITUDE, plane[at : at + 3], 0)
+    put(out, tank + ARM_OF, out[body + ARM] + rx, out[body + ARM + 1] + ry, out[body + ARM + 2] + rz)
+    for k in range(3):
+        a, c, e = plane[at + TURN + k], plane[at + TURN + 3 + k], plane[at + TURN + 6 + k]
+        x, z, v = out[body + ATTITUDE], out[body + ATTITUDE + 1], out[body + ATTITUDE + 2]
+        out[tank + EAST + 3 * k] = x * a + z * c + v * e
+        x, z, v = out[body + ATTITUDE + 3], out[body + ATTITUDE + 4], out[body + ATTITUDE + 5]
+        out[tank + EAST + 3 * k + 1] = x * a + z * c + v * e
+        x, z, v = out[body + ATTITUDE + 6], out[body + ATTITUDE + 7], out[body + ATTITUDE + 8]
+        out[tank + EAST + 3 * k + 2] = x * a + z * c + v * e
+    put(out, tank + MOMENTS, m, sx, sy)
+    put(out, tank + MOMENTS + 3, xx, xy, yy)
+    e = tank + EAST
+    add_force(out, body, rx, ry, rz,
+              out[e] * hx + out[e + 3] * hy + out[e + 6] * hz,
+              out[e + 1] * hx + out[e + 4] * hy + out[e + 7] * hz,
+              out[e + 2] * hx + out[e + 5] * hy + out[e + 8] * hz)  # fmt: skip
+    add_torque(out, body,
+               out[e] * tx + out[e + 3] * ty + out[e + 6] * tz,
+               out[e + 1] * tx + out[e + 4] * ty + out[e + 7] * tz,
+               out[e + 2] * tx + out[e + 5] * ty + out[e + 8] * tz)  # fmt: skip
+
+
+@njit(forceinline=True)
+def beyond(out, i, j):
+    """The vector at i less that at j."""
+    return out[i] - out[j], out[i + 1] - out[j + 1], out[i + 2] - out[j + 2]
+
+
+@njit
+def follow_bodies(t, y, dydt, out, handle):
+    """Let flow feel what the accelerations of its body are beyond those with joints held."""
+    tables = open_tables(handle)
+    plane = tables.plane
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
+        if basin["frame"] < 0:
+            continue
+        row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+        rx, ry, rz = turned(out, row + ATTITUDE, plane[basin["frame"] : basin["frame"] + 3], 0)
+        wx, wy, wz = beyond(out, row + TURNING, row + SPIN_BIAS)
+        ax, ay, az = beyond(out, row + ACCELERATION, row + BIAS)
+        ax, ay, az = ax + wy * rz - wz * ry, ay + wz * rx - wx * rz, az + wx * ry - wy * rx
+        e, n, o = tank + EAST, basin["n"], basin["y"]
+        east, north, turn = dot(out, e, ax, ay, az), dot(out, e + 3, ax, ay, az), dot(out, e + 6, wx, wy, wz)
+        if east == 0.0 and north == 0.0 and turn == 0.0:
+            continue
+        for i in range(n):
+            x, z = place_of(plane, basin, i)
+            depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
+            dydt[o + n + i] -= depth * (east - turn * z)
+            dydt[o + 2 * n + i] -= depth * (north + turn * x)

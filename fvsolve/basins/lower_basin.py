@@ -270,7 +270,7 @@ class BasinRows:
         row["reflect"], row["outer_given"] = draft.to_plane(given), given.size
         row["outer"] = mesh.left.size - mesh.inner
         row["through"] = draft.to_work(given.size) if given.size else -1
-        row["unused"] = draft.to_work(len(self.quantities) * self.n if given.size or self.moves else 0)
+        row["unused"] = draft.to_work(len(self.quantities) * self.n if given.size or self.moves or self.part.on else 0)
         row["carried"] = row["flows"] = -1
         if self.moves:
             from fvsolve.basins.lower_walls import lower_lines

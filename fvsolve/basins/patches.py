@@ -8,7 +8,7 @@ from fvsolve.kernels.handle import open_tables
 @njit(forceinline=True)
 def wanted(basin, dydt):
     """Whether its rates are asked for, or what they say of flows through open patches."""
-    return dydt.size > 0 or basin["through"] >= 0
+    return dydt.size > 0 or basin["through"] >= 0 or basin["frame"] >= 0
 
 
 @njit

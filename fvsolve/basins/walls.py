@@ -11,6 +11,7 @@ from math import sqrt
 
 from fvsolve.basins.energy import row_of
 from fvsolve.jit import njit
+from fvsolve.kernels.accounts import wall_rows
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
 from fvsolve.kernels.records import NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
@@ -249,7 +250,7 @@ def wall_power(t, y, dydt, out, handle, power):
     tables = open_tables(handle)
     for k in range(tables.walls.size):
         work = brought(t, tables, k, y, out)
-        power[row_of(tables, power, 0) - tables.walls.size + k] = work
+        power[wall_rows(tables, power) + k] = work
         power[row_of(tables, power, tables.walls[k]["basin"])] += work
 
 

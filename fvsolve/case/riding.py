@@ -28,7 +28,11 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str]) -> F
         yield (*key, "on"), f'physics {show(basin.physics)} rides on no body yet; wanted "free-surface"'
     if any(one.moves for one in basin.patches.values()):
         yield (*key, "on"), "its walls move, and its axes too; wanted one of both"
-    for patch in basin.patches:
+    free = next(free_joints(basin.on, nodes), None)
+    for patch, one in basin.patches.items():
+        if one.boundary == "open" and free is not None:
+            text = f"{free} moves freely, and would have to feel what leaves here; wanted a wall, or a driven joint"
+            yield (*key, "patches", patch, "boundary"), text
         if f"{name}.{patch}" in joined:
             text = "a link joins here, and the basin rides on a body: between these goes a hose, which there is not yet"
             yield (*key, "patches", patch), text
@@ -41,9 +45,6 @@ def body_faults(on: str, nodes: dict[str, Any]) -> Iterator[str]:
         what = f"is a {nodes[on].kind}" if on in nodes else "is not there"
         yield f"{show(on)} {what}; wanted a body: {listing(bodies) or 'there is none'}{did_you_mean(on, bodies)}"
         return
-    free = next(free_joints(on, nodes), None)
-    if free is not None:
-        yield f"{free} moves freely, and water that moves its body is not there yet; drive the joint of {free}"
 
 
 def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:

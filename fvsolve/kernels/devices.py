@@ -1,6 +1,7 @@
 """What all devices of a scene do, each by the hooks of its law. Knows the tables; knows no law."""
 
 from fvsolve.jit import njit
+from fvsolve.kernels.accounts import OF_DEVICE, device_rows, device_stores
 from fvsolve.kernels.calls import (
     HOOKS,
     call_events,
@@ -18,7 +19,6 @@ SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD
     len(HOOKS)
 )  # columns of `hooks`
 PASSING = 2  # of a law's `outside`: to be known, but it passes with the shutting of a check valve
-ROWS = 3  # of `power` a device
 
 
 @njit
@@ -83,22 +83,22 @@ def record_devices(t, y, out, handle, values):
 
 @njit
 def power_devices(t, y, dydt, out, handle, power):
-    """Rows of devices, the last of `power` [W]: supplied, rate of what is stored, dissipated."""
+    """Rows of devices [W]: supplied, rate of what is stored, dissipated."""
     tables = open_tables(handle)
-    devices, at = tables.devices, power.size - ROWS * tables.devices.size
+    devices, at = tables.devices, device_rows(tables, power)
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], POWER]
         power[at], power[at + 1], power[at + 2] = 0.0, 0.0, 0.0
         if hook != 0:
             power[at], power[at + 1], power[at + 2] = call_power(hook, t, y, dydt, out, tables, devices[k])
-        at += ROWS
+        at += OF_DEVICE
 
 
 @njit
 def stored_devices(t, y, dydt, out, handle, stored):
     """Rows of devices, the last of `stored`, changes since the profile [J]."""
     tables = open_tables(handle)
-    devices, first = tables.devices, stored.size - tables.devices.size
+    devices, first = tables.devices, device_stores(tables, stored)
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], STORED]
         stored[first + k] = call_stored(hook, y, tables, devices[k]) if hook != 0 else 0.0

@@ -35,6 +35,7 @@ class Pieces:
     rates: str = ""  # of cells, in pipes and basins
     enter: str = ""  # what comes into these by patches
     accelerate: str = ""  # bodies, once all that pushes them is known
+    follow: str = ""  # what feels these accelerations
     leave: str = ""  # values of scalars with which water leaves pipes and cells
     mix: str = ""  # and their values at nodes
     carry: str = ""  # rates of what is carried in cells

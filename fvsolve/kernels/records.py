@@ -364,6 +364,7 @@ LAYOUT = np.dtype(
         ("edge", "i8"),  # values that the water of pipes has at both ends
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
+        ("tank", "i8"),  # of basins that ride on bodies, what their mass is along their normal
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
         ("along", "i8"),  # of lines, from the one point to the other, of length 1
@@ -374,6 +375,7 @@ LAYOUT = np.dtype(
     align=True,
 )
 BODY_OUT = 45  # numbers of each body in `out`
+TANK_OUT = 18  # numbers in `out` of what rides on bodies, see `mechanism.tanks`
 RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # first entries of `out`
 OUT_HEAD = 4
 

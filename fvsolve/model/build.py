@@ -143,6 +143,7 @@ def layout_of(draft: Draft) -> np.ndarray:
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", many * nodes), ("edge", 2 * pipes * many),
         ("carried", 2 * pipes * many), ("brought", many * nodes), ("wall", len(draft.wall_table)),
+        ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
     ):  # fmt: skip

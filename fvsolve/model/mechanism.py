@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.basins.lower import at_start
 from fvsolve.case import bodies
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.handle import make_handle
@@ -11,6 +12,7 @@ from fvsolve.model.schedules import break_times
 from fvsolve.model.slate import wiped
 from fvsolve.parts.body.part import Body
 
+WATER = ("frames: set_frames", "frames: turn_water")  # what loads bodies beside pushes, at rest
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
 ALIKE = 1e-8  # share of the largest row of pins that a row has beside all others: below, it says nothing new
@@ -158,7 +160,8 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
 
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
-        addresses[calls.RHS, k] = calls.addressed(found("fvsolve.kernels.mechanism", piece), calls.RATES)
+        home = "fvsolve.basins" if piece in WATER else "fvsolve.kernels.mechanism"
+        addresses[calls.RHS, k] = calls.addressed(found(home, piece), calls.RATES)
     calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
     handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
     calls.rhs_in_turn(t, y, np.zeros(0), out, handle)
@@ -182,12 +185,18 @@ class Statics:
         self.written.clock["limit"] = t
         self.layout = draft.tables.layout[0]
         self.out = np.zeros(int(self.layout["size"]))
+        self.y, self.tables, rides = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
+        self.pushes = ("joints: kinematics", "lines: push_bodies", *(WATER if rides else ()))
+        if rides:
+            self.y, self.tables = (
+                at_start(draft.basins, draft.size),
+                draft.tables._replace(plane=draft.tables.plane.copy()),
+            )
         self.run("joints: kinematics")
 
     def run(self, *pieces: str) -> None:
         """Call pieces of the room of mechanisms as a right-hand side does."""
-        tables = (*self.draft.tables, *self.written)
-        call_pieces(tables, pieces, self.t, np.zeros(self.draft.size), self.out)
+        call_pieces((*self.tables, *self.written), pieces, self.t, self.y, self.out)
 
     def rates(self) -> np.ndarray:
         """Velocities of all freedoms at the start."""
@@ -303,8 +312,11 @@ def start_bodies(draft, start) -> list[str]:
             rows[line["push"]]["speed"] = at.out[travel + 2 * line["push"] + 1]
     size = np.abs(at.shares(pushes)).sum(axis=0)
     at.out[first : first + pushes.size] = pushes
-    at.run("joints: kinematics", "lines: push_bodies")
+    at.run(*at.pushes[:2])
+    dry = at.forces()
+    at.run(*at.pushes)
     left = at.forces()
+    size += np.abs(left - dry)
     freedoms = draft.freedom_table
     accelerate = "matrix: accelerate"
     if len(draft.pin_table):
@@ -312,17 +324,17 @@ def start_bodies(draft, start) -> list[str]:
         left, held = start_pins(draft, at)
         size += held
     freedoms["balance"] = np.where(np.abs(left) <= SNAP * size, left, 0.0)
-    at.run("joints: kinematics", "lines: push_bodies", accelerate)
+    at.run(*at.pushes, accelerate)
     return moves(draft, at.accelerations())
 
 
 def start_pins(draft, at: Statics) -> tuple[np.ndarray, np.ndarray]:
     """Gaps and forces of pins at the start: (what is left of forces of freedoms with these, their size). Faults."""
-    at.run("joints: kinematics", "lines: push_bodies", "pins: gaps")
+    at.run(*at.pushes, "pins: gaps")
     first = int(at.layout["pin"])
     for k, row in enumerate(draft.pin_table):
         row["gap"][: row["rows"]] = at.out[first + 3 * k :][: row["rows"]]
-    at.run("joints: kinematics", "lines: push_bodies", "pins: accelerate_pinned")
+    at.run(*at.pushes, "pins: accelerate_pinned")
     n, many = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
     first = 8 * n + draft.factor_size + 16 * len(draft.body_table)
     rows = at.written.scratch[first : first + many * n].reshape(many, n).copy()
@@ -340,7 +352,7 @@ def start_pins(draft, at: Statics) -> tuple[np.ndarray, np.ndarray]:
         row["force"][: row["rows"]] = force[: row["rows"]]
     sizes = np.concatenate([np.abs(row["force"][: row["rows"]]) for row in draft.pin_table])
     size = np.abs(rows.T) @ sizes
-    at.run("joints: kinematics", "lines: push_bodies", "pins: hold")
+    at.run(*at.pushes, "pins: hold")
     return at.forces(), size
 
 

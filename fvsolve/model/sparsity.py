@@ -67,6 +67,7 @@ class Couplings:
         yield from self.moving()
         yield from self.driven()
         yield from self.walled()
+        yield from self.riding()
 
     def passing(self) -> Iterator[Pairs]:
         """What passes an open patch, on the cells there."""
@@ -241,6 +242,20 @@ class Couplings:
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
             cells = pattern.about(pattern.neighbours(basin), behind)
             yield every(speed, states(wall["y"], pattern.of_cells(basin, cells)))
+
+    def riding(self) -> Iterator[Pairs]:
+        """Water and the bodies that it moves: all on all, and on what pushes these."""
+        trees: dict[int, list] = {}
+        for basin in self.basins:
+            if basin.row["body"] >= 0:
+                trees.setdefault(self.tied(self.bodies[basin.row["body"]]["root"]), []).append(pattern.all_of(basin))
+        for root, cells in trees.items():
+            own = [self.of_tree(root, what) for what in (0, 1)]
+            if own[0].size == 0:
+                continue
+            both = states(*cells, own[1])
+            felt = [self.own(row[side]) for row in self.pistons if row["line"] >= 0 for side in ("a", "b")]
+            yield every(both, states(*cells, *own, *felt))
 
     # pipes ------------------------------------------------------------------------------------------------------
 

@@ -5,13 +5,12 @@ drives its joint; of `stored` [J] its kinetic energy and m g z of its centre, si
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.accounts import OF_BODY, body_rows, body_stores
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.joints import angle_of, centre_of
 from fvsolve.kernels.mechanism.observe import acceleration_at, joint_load, kinetic, spread_inertia
 from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, SPIN, TURNING, dot, row_of, turned
 from fvsolve.kernels.records import FREE, PRISMATIC
-
-ROWS, OF_DEVICES, OF_BASINS = 3, 3, 4  # rows of `power`
 
 
 @njit
@@ -51,12 +50,12 @@ def power_bodies(t, y, dydt, out, handle, power):
     """Rows of bodies."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
-    at = power.size - OF_BASINS * tables.basins.size - OF_DEVICES * tables.devices.size - ROWS * bodies.size
+    at = body_rows(tables, power)
     for i in range(bodies.size):
         power[at] = gained(bodies[i], out, row_of(tables, i), gravity)
         power[at + 1] = rubbed(bodies[i], y) if bodies[i]["damping"] > 0.0 else 0.0
         power[at + 2] = driven(t, y, out, tables, i) if bodies[i]["schedule"] >= 0 else 0.0
-        at += ROWS
+        at += OF_BODY
 
 
 @njit
@@ -64,7 +63,7 @@ def stored_bodies(t, y, dydt, out, handle, stored):
     """Rows of bodies."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
-    at = stored.size - tables.basins.size - tables.devices.size - bodies.size
+    at = body_stores(tables, stored)
     for i in range(bodies.size):
         body, here = bodies[i], row_of(tables, i)
         z = out[here + PLACE + 2] + centre_of(body, out, here)[2]

@@ -30,6 +30,7 @@ from fvsolve.kernels.mechanism.room import (
     row_of,
     turned,
 )
+from fvsolve.kernels.mechanism.tanks import add_tanks
 from fvsolve.kernels.records import ABOUT, FREE, PRISMATIC, RATE, REVOLUTE
 
 INERTIA, LOAD = 10, 6
@@ -167,6 +168,7 @@ def fill(y, out, tables):
                 work[up + k] += work[inertia + k]
             for k in range(LOAD):
                 work[over + k] += work[load + k]
+    add_tanks(out, tables)
 
 
 @njit

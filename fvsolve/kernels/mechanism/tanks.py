@@ -1,0 +1,50 @@
+"""What water in tanks adds to the mass matrix: along the normals of their beds alone. Knows moments; knows no flow.
+
+Row b of what basins say, from layout["tank"] + TANK_OUT b: moments of mass 1, x, y, xx, xy, yy in axes of the basin,
+these axes in the world, and where its origin lies from o (`room`). A basin that rides on nothing says zeros.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.records import TANK_OUT
+
+MOMENTS, EAST, NORTH, NORMAL, ARM_OF = 0, 6, 9, 12, 15
+
+__all__ = ["ARM_OF", "EAST", "MOMENTS", "NORMAL", "NORTH", "TANK_OUT", "add_tanks"]
+
+
+@njit
+def add_tanks(out, tables):
+    """Add J' N J to M in `scratch`, J the accelerations along the normal that freedoms give: n . (a + alpha x r)."""
+    work, freedoms, paths, n = tables.scratch, tables.freedoms, tables.integers, tables.freedoms.size
+    for b in range(tables.basins.size):
+        i, tank = tables.basins[b]["body"], tables.layout[0]["tank"] + TANK_OUT * b
+        while i >= 0 and tables.bodies[i]["freedoms"] == 0:
+            i = tables.bodies[i]["parent"]
+        if i < 0:
+            continue
+        last = freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
+        path, depth = last["path"], last["depth"]
+        for p in range(depth + 1):
+            j = paths[path + p]
+            row, (a, c, d) = 8 * n + freedoms[j]["row"], along_normal(out, work, tank, 6 * j)
+            m = tank + MOMENTS
+            e = out[m] * a + out[m + 1] * c + out[m + 2] * d
+            f = out[m + 1] * a + out[m + 3] * c + out[m + 4] * d
+            g = out[m + 2] * a + out[m + 4] * c + out[m + 5] * d
+            for q in range(p + 1):
+                x, y, z = along_normal(out, work, tank, 6 * paths[path + q])
+                work[row + q] += e * x + f * y + g * z
+
+
+@njit(forceinline=True)
+def along_normal(out, work, tank, s):
+    """What a freedom gives along the normal at 1, x and y of a tank, its S at scratch[s]."""
+    wx, wy, wz = work[s], work[s + 1], work[s + 2]
+    x, y, z = out[tank + ARM_OF], out[tank + ARM_OF + 1], out[tank + ARM_OF + 2]
+    u, v, w = work[s + 3] + wy * z - wz * y, work[s + 4] + wz * x - wx * z, work[s + 5] + wx * y - wy * x
+    n, e, k = tank + NORMAL, tank + EAST, tank + NORTH
+    return (
+        out[n] * u + out[n + 1] * v + out[n + 2] * w,
+        -(out[k] * wx + out[k + 1] * wy + out[k + 2] * wz),
+        out[e] * wx + out[e + 1] * wy + out[e + 2] * wz,
+    )
