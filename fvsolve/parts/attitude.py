@@ -82,7 +82,7 @@ class Attitude(Table):
         faults = dict([*_no_length(said), *_no_rotation(said)])
         whole = [keys for keys in cls.forms if all(one in said and one not in faults for one in keys if one in given)]
         sound = cls.model_construct(**{key: said[key] for keys in whole for key in keys if key in said})
-        faults |= {key: text for key, text, apart in sound._apart() if apart > LOOSE}
+        faults |= {key: f"{text}; wanted the same rotation" for key, text, apart in sound._apart() if apart > LOOSE}
         if faults:
             raise Misfit([((key,), text) for key, text in faults.items()])
         return given

@@ -75,11 +75,11 @@ def test_forms_that_agree_may_stand_together():
 
 def test_forms_that_disagree_are_named_with_the_angle_between_them():
     found = faults(yaw="90 deg", axis=[0, 0, 1], angle="80 deg", matrix=QUARTER)
-    assert found == {"attitude.axis": "is 10 deg away from what roll, pitch, yaw say"}
+    assert found == {"attitude.axis": "is 10 deg away from what roll, pitch, yaw say; wanted the same rotation"}
     found = faults(axis=[0, 0, 1], angle="80 deg", matrix=QUARTER, euler_parameters=[1, 0, 0, 0])
     assert found == {
-        "attitude.euler_parameters": "is 80 deg away from what axis says",
-        "attitude.matrix": "is 10 deg away from what axis says",
+        "attitude.euler_parameters": "is 80 deg away from what axis says; wanted the same rotation",
+        "attitude.matrix": "is 10 deg away from what axis says; wanted the same rotation",
     }
 
 
