@@ -18,6 +18,7 @@ from fvsolve.kernels.schedules import schedule_slopes
 
 FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.MovingWall`
 ROOM = 1e-3  # share of its drawn width that a cell keeps at least
+ROWS = 2  # of `power` a wall
 BESIDE = 8  # speeds of lines that loops over whole vectors look at beyond the last
 
 
@@ -245,12 +246,23 @@ def brought(t, tables, k, y, out):
 
 @njit
 def wall_power(t, y, dydt, out, handle, power):
-    """Rows of walls, before those of basins, and what they bring to these."""
+    """Rows of walls, before those of basins: what they bring to these, and what the law of these loses beside them."""
     tables = open_tables(handle)
     for k in range(tables.walls.size):
-        work = brought(t, tables, k, y, out)
-        power[row_of(tables, power, 0) - tables.walls.size + k] = work
-        power[row_of(tables, power, tables.walls[k]["basin"])] += work
+        work, lost = brought(t, tables, k, y, out), lost_beside(tables, tables.walls[k])
+        first = row_of(tables, power, 0) - ROWS * (tables.walls.size - k)
+        power[first], power[first + 1] = work, lost
+        power[row_of(tables, power, tables.walls[k]["basin"])] += work - lost
+
+
+@njit
+def lost_beside(tables, wall):
+    """What law linear loses beside a wall, whose density and momentum do not ride along [W]; see `liquid.faces`."""
+    basin, total = tables.basins[wall["basin"]], 0.0
+    for m in range(wall["count"]):
+        at = basin["thrust"] + basin["outer"] + tables.integers[wall["faces"] + m]
+        total += tables.plane[wall["lengths"] + m] * tables.work[at]
+    return 0.5 * basin["thickness"] / tables.settings[0]["rho"] * total
 
 
 @njit
