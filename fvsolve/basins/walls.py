@@ -11,7 +11,7 @@ from math import sqrt
 
 from fvsolve.basins.energy import row_of
 from fvsolve.jit import njit
-from fvsolve.kernels.accounts import wall_rows
+from fvsolve.kernels.accounts import OF_WALL, wall_rows
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
 from fvsolve.kernels.records import NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
@@ -246,12 +246,23 @@ def brought(t, tables, k, y, out):
 
 @njit
 def wall_power(t, y, dydt, out, handle, power):
-    """Rows of walls, before those of basins, and what they bring to these."""
+    """Rows of walls, before those of basins: what they bring to these, and what the law of these loses beside them."""
     tables = open_tables(handle)
     for k in range(tables.walls.size):
-        work = brought(t, tables, k, y, out)
-        power[wall_rows(tables, power) + k] = work
-        power[row_of(tables, power, tables.walls[k]["basin"])] += work
+        work, lost = brought(t, tables, k, y, out), lost_beside(tables, tables.walls[k])
+        first = wall_rows(tables, power) + OF_WALL * k
+        power[first], power[first + 1] = work, lost
+        power[row_of(tables, power, tables.walls[k]["basin"])] += work - lost
+
+
+@njit
+def lost_beside(tables, wall):
+    """What law linear loses beside a wall, whose density and momentum do not ride along [W]; see `liquid.faces`."""
+    basin, total = tables.basins[wall["basin"]], 0.0
+    for m in range(wall["count"]):
+        at = basin["thrust"] + basin["outer"] + tables.integers[wall["faces"] + m]
+        total += tables.plane[wall["lengths"] + m] * tables.work[at]
+    return 0.5 * basin["thickness"] / tables.settings[0]["rho"] * total
 
 
 @njit

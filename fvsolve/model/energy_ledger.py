@@ -148,9 +148,10 @@ class Accounts:
     def walls(self) -> None:
         names = [f"{basin.name}.{patch}" for basin in self.model.basins for patch in basin.walls]
         for name, row in zip(names, self.model.tables.walls, strict=True):
-            at = self.take(1)
+            at = self.take(2)
             if row["mass"] < 0:
                 self.add("supplied", name, "wall", at)
+            self.add("law", name, "wall", at + 1)
 
     def basins(self) -> None:
         for basin in self.model.basins:

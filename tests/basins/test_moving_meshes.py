@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 from truth.meshes import write
 
@@ -16,7 +17,8 @@ from fvsolve.mesh import rectangle
 from fvsolve.mesh.edges import edges_of
 from fvsolve.mesh.shapes import assemble
 from fvsolve.model.model import State
-from tests.truth.scenes import GRAVITY, RHO, ramp, scene
+from fvsolve.studies.energy.energy import energy
+from tests.truth.scenes import AMBIENT, GRAVITY, RHO, WATER, ramp, scene, smooth_ramp, smooth_step
 
 SIDES = {"west": (0, 0.0), "east": (0, 1.0), "south": (1, 0.0), "north": (1, 1.0)}
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}
@@ -80,7 +82,7 @@ def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(
     y[[int(row["y"]) for row in model.tables.walls]] = 0.2, -0.3
     with model.slate() as slate:
         model.functions.rhs(0.0, y, np.zeros(y.size), model.new_out(), slate.handle)
-    now = as_it_is(basin.mesh, basin.points_at(y))
+    now = as_it_is(basin.mesh, basin.mesh.points + sum(y[at] * goes for at, _, goes in basin.stretches))
     assert now.area / basin.mesh.area == pytest.approx(basin.stretched(y), rel=1e-13)
     floats, integers = lower_mesh(now)
     assert (integers == basin.integers).all()
@@ -216,3 +218,169 @@ def test_a_mesh_that_is_turned_by_a_right_angle_has_the_same_waves(tmp_path, sch
         found.append(depth[np.lexsort((np.round(y, 9), np.round(x, 9)))])
     assert np.abs(found[0]).max() > 0.01
     assert found[1] == pytest.approx(found[0], abs=1e-12)
+
+
+# liquids --------------------------------------------------------------------------------------------------------
+
+CO2 = {"name": "CO2", "temperature": 280.0, "pressure": 6e6, "law": "table"}
+
+
+def fluid(law):
+    return CO2 if law == "table" else {**WATER, "law": law}
+
+
+def column(law, patches, cells=12, side="east", file=None, length=2.0, wide=0.05, **more):
+    """A column of liquid along the way of the wall on a side: a rectangle, or a mesh of triangles."""
+    along = side in ("west", "east")
+    shape = {"size": [length, wide] if along else [wide, length], "cells": [cells, 1] if along else [1, cells]}
+    if file is not None:
+        shape = {"mesh": {"file": tub(file, "triangles", shape["cells"], shape["size"], reach=0.0)}}
+    pressure = 6e6 if law == "table" else 2e5
+    if file is None:
+        patches = {name: {"side": name, **one} for name, one in patches.items()}
+    return {"type": "basin", "physics": "liquid", "pressure": pressure, "thickness": 0.1, "patches": patches, **shape,
+            **more}  # fmt: skip
+
+
+def law_of(basin, law, ratio):
+    """Pressure above that at rest where the density is so many times that at rest [Pa]."""
+    if law == "table":
+        return float(basin.pressure(np.array([basin.density * (ratio - 1.0)]))[0])
+    return basin.density * basin.speed**2 * (ratio - 1.0 if law == "linear" else math.log(ratio))
+
+
+@pytest.mark.parametrize("law", ["linear", "log", "table"])
+@pytest.mark.parametrize("method", ["ssp-rk3", "rodas-4"])
+def test_a_liquid_that_is_compressed_evenly_follows_its_law_as_a_chamber_of_the_same_length_does(tmp_path, law, method):
+    for side, file in (("east", tmp_path), ("south", None)):
+        travel = smooth_ramp(0.0, 0.2, 0.0, -0.004 if side == "east" else 0.004)
+        nodes = {"b": column(law, {side: {"travel": travel}}, side=side, file=file)}
+        step = {"courant": 0.8} if method == "ssp-rk3" else {"rtol": 1e-6}
+        case = scene(nodes, {}, 0.2, {"scheme": "muscl", "method": method, **step}, [f"b.{side}.force"], every=0.05,
+                     fluid=fluid(law))  # fmt: skip
+        model, state = moved(case, 0.2)
+        basin, ratio = model.basins[0], 2.0 / 1.996
+        wanted = law_of(basin, law, ratio)
+        assert basin.pressure(basin.of(state.y)[0]) == pytest.approx(wanted, rel=2e-3)
+        now = 1.0 / basin.stretched(state.y)[0]
+        assert now == pytest.approx(ratio, rel=1e-8)
+        mean = np.average(basin.of(state.y)[0], weights=basin.mesh.area)
+        assert mean == pytest.approx(basin.density * (now - 1.0), rel=1e-9)
+        assert abs(model.contents(state.y)[1]) < 1e-12 * model.contents(state.y)[0]
+        force = run(case)[f"b.{side}.force"]
+        rest = (basin.part.pressure - AMBIENT) * 0.1 * 0.05
+        assert force[0] == pytest.approx(rest, rel=1e-12)
+        assert force[-1] - rest == pytest.approx(wanted * 0.1 * 0.05, rel=3e-3)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_a_piston_that_starts_at_once_makes_a_water_hammer(tmp_path, law, side, speed):
+    inward = speed if side in ("west", "south") else -speed
+    for file in (None, tmp_path):
+        nodes = {"b": column(law, {side: {"travel": straight(inward)}}, 60, side=side, file=file)}
+        case = scene(nodes, {}, 1e-3, {"scheme": "upwind", "method": "ssp-rk2", "courant": 0.8},
+                     [f"b.{side}.force", f"b.{side}.power"], every=1e-4, fluid=fluid(law))  # fmt: skip
+        result, basin = run(case), build(load(case)).basins[0]
+        rho, c = basin.density, basin.speed
+        wanted = rho * c * speed / (1.0 - speed / c)  # m = c r meets m = speed (rho + r)
+        if law == "log":  # a simple wave: c falls by half the speed
+            wanted = -2.0 * rho * c * c * math.log1p(-0.5 * speed / c)
+        assert wanted == pytest.approx(rho * c * speed, rel=1e-3)  # Joukowsky
+        force = result[f"b.{side}.force"]
+        assert (force[-1] - force[0]) / (0.1 * 0.05) == pytest.approx(wanted, rel=2e-5)
+        assert result[f"b.{side}.power"][-1] == pytest.approx(force[-1] * speed, rel=1e-15)
+
+
+@pytest.mark.parametrize("law", ["linear", "log", "table"])
+@pytest.mark.parametrize("method", [*EXACT[:3]])
+def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_liquid_as_it_is(tmp_path, law, method):
+    patches = {"west": {"travel": {"mean": 0.0, "amplitude": 0.01, "period": 1e-2}}, "east": {"travel": straight(-1.0)}}
+    nodes = {"b": pool(tub(tmp_path, many=(30, 2)), patches, "liquid") | ({"pressure": 6e6} if law == "table" else {})}
+    case = scene(nodes, {}, 1.0, {"scheme": "upwind", "method": method, "step": 1e-5}, fluid=fluid(law))
+    model, state = moved(case, 3e-5)
+    basin = model.basins[0]
+    far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
+    found = basin.of(state.y)
+    assert np.abs(basin.stretched(state.y)[far] - 1.0).min() > 1e-6
+    assert np.abs(found[0, far]).max() < 1e-12 * basin.density
+    assert np.abs(found[1:, far]).max() < 1e-12 * basin.density * basin.speed
+    assert np.abs(found[0]).max() > 1e-4 * basin.density * 1e-3
+
+
+@pytest.mark.parametrize(("law", "method"), [("linear", "ssp-rk3"), ("log", "ssp-rk3"), ("linear", "rodas-4")])
+def test_a_mass_on_a_spring_beside_a_column_of_liquid_swings_at_the_root_of_the_cotangent_law(law, method):
+    mass, length, section = 2.0, 2.0, 0.1 * 0.05
+    for side in ("east", "south") if method == "ssp-rk3" else ("north",):
+        errors = []
+        for n in (20, 40):
+            nodes = {"b": column(law, {side: {"body": "lid"}}, n, side=side), "lid": {"type": "mass", "mass": mass,
+                     "initial_velocity": 1e-4}, "ground": {"type": "frame"}}  # fmt: skip
+            case = scene(nodes, {}, 1.0, {"scheme": "muscl", "limiter": "van-leer", "method": method},
+                         ["lid.velocity"], fluid=fluid(law))  # fmt: skip
+            rho = RHO * math.exp((2e5 - AMBIENT) / 2.2e9) if law == "log" else RHO
+            c = math.sqrt(2.2e9 / rho)
+            w = 2.0 * c / length
+            stiff = mass * w * w - rho * c * section * w / math.tan(2.0)  # K - M w^2 + rho c A w cot(w L / c) = 0
+            x = {"east": "x", "south": f"(x - x + {length} - y)", "north": "y"}[side]
+            shape = f"1e-4 * sin({w / c} * {x}) / {math.sin(w / c * length)}"
+            nodes["b"]["start"] = {"u": shape} if side == "east" else {"v": shape}
+            rest = (2e5 - AMBIENT) * section * (-1.0 if side == "south" else 1.0)
+            case["nodes"] = nodes
+            case["links"] = {
+                "spring": {"type": "spring", "from": "lid", "to": "ground", "stiffness": stiff, "preload": rest}
+            }
+            case["numerics"] |= {"end": 4.0 * math.pi / w, "step": 0.4 * length / n / c}
+            case["output"]["every"] = 0.1 / w
+            result = run(case)
+            errors.append(np.abs(result["lid.velocity"] - 1e-4 * np.cos(w * result.t)).max() / 1e-4)
+
+        assert errors[1] < 0.35 * errors[0] and errors[1] < 0.02
+
+
+# energy ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("physics", ["free-surface", "liquid"])
+@pytest.mark.parametrize("body", [False, True])
+def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_with_the_step(tmp_path, physics, body):
+    parts, water = [], physics == "free-surface"
+    slow, more = (1.0, {}) if water else (1e-3, {"elevation": 7.0, "start": {"pressure": "1e6 * sin(3 * x)"}})
+    file, rest = (
+        tub(tmp_path, "triangles", (20, 2), (2.0, 0.2)),
+        0.1 * RHO * GRAVITY if water else (2e5 - AMBIENT) * 0.02,
+    )
+    for step in (4e-3 * slow, 2e-3 * slow):
+        wall = {"travel": {"mean": 0.0, "amplitude": 0.1 * slow, "period": 2.0 * slow}, "zone": 1.0}
+        nodes, links = {"b": pool(file, {"east": {"body": "lid"} if body else wall}, physics, **more)}, {}
+        if body:
+            nodes["lid"] = {"type": "mass", "mass": 50.0 if water else 5.0, "initial_velocity": 0.3}
+            nodes["ground"] = {"type": "frame"}
+            links = {"spring": {"type": "spring", "from": "lid", "to": "ground", "stiffness": 9e3, "preload": rest}}
+        numerics = {"scheme": "upwind", "method": "ssp-rk3", "step": step}
+        found = energy(scene(nodes, links, 0.8 * slow, numerics))
+        parts.append(abs(found.step[-1]) / np.ptp(found.stored["b"]))
+        assert (np.diff(sum(found.scheme.values())) > 0.0).all()
+    assert parts[1] < parts[0] / 6.0
+    assert parts[1] < 1e-4
+
+
+@pytest.mark.parametrize("side", ["east", "south"])
+def test_what_law_linear_loses_beside_a_wall_stands_by_its_name_and_a_height_lifts_nothing(side):
+    """Even compression: p = c^2 r does work, and w (c^2 r^2 - m^2) / (2 rho) is lost, m = w (rho + r)."""
+    travel, lost = smooth_ramp(0.0, 1.0, 0.0, -0.2 if side == "east" else 0.2, 401), []
+    times = np.linspace(0.0, 1.0, 2001)
+    x = 2.0 - 0.2 * np.array([smooth_step(t, 0.0, 1.0) for t in times])
+    dense, speed, section, square = RHO * (2.0 / x - 1.0), np.gradient(x, times), 0.1 * 0.05, 50.0**2
+    work = -trapezoid(speed * (2e5 - AMBIENT + square * dense), times) * section
+    beside = trapezoid(speed * (square * dense**2 - (speed * (RHO + dense)) ** 2), times) * 0.5 * section / RHO
+    for height in (0.0, 50.0):
+        pond = column("linear", {side: {"travel": travel}}, side=side, wave_speed=50.0, elevation=height)
+        numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
+        found = energy(scene({"b": pond}, {}, 1.0, numerics, every=0.1))
+        assert found.supplied[f"b.{side}"][-1] == pytest.approx(work, rel=1e-3)  # but for its waves
+        assert found.law[f"b.{side}"][-1] == pytest.approx(beside, rel=6e-3)
+        assert sum(found.scheme.values())[-1] < 0.02 * abs(found.law[f"b.{side}"][-1])
+        lost.append([found.stored["b"][-1], found.law[f"b.{side}"][-1]])
+    assert lost[1] == pytest.approx(lost[0], rel=1e-9)

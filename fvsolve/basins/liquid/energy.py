@@ -24,7 +24,7 @@ def add_power(t, y, dydt, out, handle, power):
 @njit
 def liquid_power(st, basin, plane, y, dydt, rows):
     """Rate of storage of a liquid."""
-    n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["area"] :]
+    n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["drawn"] :]
     rate, square = 0.0, basin["speed"] * basin["speed"]
     for i in range(n):
         moves = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]

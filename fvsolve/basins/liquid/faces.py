@@ -34,7 +34,8 @@ from fvsolve.kernels.records import LAW_LOG, UPWIND
 # rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step, flow through the side
 _U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-ROWS = 11
+_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of what moves: pressure at the side, energy that is lost beside it
+ROWS = 13
 
 
 @njit
@@ -59,12 +60,26 @@ def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
 
 
 @njit
-def show(edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v):
+def driven(law, c0, rho, table, speed, w, u):
+    """What u is at a wall that moves at a speed, where w and u across it come from inside.
+
+    Under `linear` m = speed (rho + r), with c r + m = w + u: no mass passes.
+    """
+    if table is not None or law == LAW_LOG:
+        return speed
+    return speed * ((w + u) + rho * c0) / (c0 + speed)
+
+
+@njit
+def show(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
     """What the boundary shows of the cells inside: a mirror at 1 and -1, and the same again where waves leave, at 0."""
     for q in range(edges.size):
         i = place(edges[q], ring)
         r = reflect[number[q]] if reflect.size > 0 else 1.0
-        across = (min(1.0, 1.0 - 2.0 * r) - 1.0) * (u[i] * nx[q] + v[i] * ny[q])
+        out = u[i] * nx[q] + v[i] * ny[q]
+        if moves is not None:
+            out -= driven(law, c0, rho, table, moves[0][edges[q]], w[i], out)
+        across = (min(1.0, 1.0 - 2.0 * r) - 1.0) * out
         shown_w[q], shown_u[q], shown_v[q] = (
             min(1.0, 1.0 + 2.0 * r) * w[i],
             u[i] + across * nx[q],
@@ -73,12 +88,18 @@ def show(edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_
 
 
 @njit
-def show_sides(edges, nx, ny, number, reflect, wl, ul, vl, w):
-    """Put beyond sides of the boundary the wave that comes back: w - u beyond is `reflect` times w + u inside."""
+def show_sides(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, w, moves):
+    """Put beyond sides of the boundary the wave that comes back: w - u beyond is `reflect` times w + u inside.
+
+    A wall that moves sends back what makes u at it that of the wall.
+    """
     for q in range(edges.size):
         i = edges[q] % BLOCK
         r = reflect[number[q]] if reflect.size > 0 else 1.0
-        across = -(1.0 + r) * (ul[i] * nx[q] + vl[i] * ny[q])
+        out = ul[i] * nx[q] + vl[i] * ny[q]
+        if moves is not None:
+            out -= driven(law, c0, rho, table, moves[0][edges[q]], wl[i], out)
+        across = -(1.0 + r) * out
         w[i], w[_U + i], w[_V + i] = r * wl[i], ul[i] + across * nx[q], vl[i] + across * ny[q]
 
 
@@ -98,28 +119,66 @@ def settle_linear(c0, wl, ul, vl, geo, w):
 
 
 @njit
-def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w):
-    """The same, the full momentum flux; u0, v0, c : of the cells, for the step."""
+def settle_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
+    """The same of sides that move, F(U) - speed U; what is along a side stays where it is while the side passes."""
+    for i in range(BLOCK):
+        nx, ny, reach, speed = geo[_NX + i], geo[_NY + i], geo[_REACH + i], speeds[i]
+        forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
+        backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
+        m, pressure = forward - backward, c0 * (forward + backward)
+        mass = m - speed * (rho + (forward + backward) / c0)
+        tangent = vl[i] * nx - ul[i] * ny if speed < 0.0 else w[_V + i] * nx - w[_U + i] * ny
+        push, along = pressure - speed * m, -speed * tangent
+        w[_RR + i] -= reach * mass
+        w[_MASS + i] = mass
+        w[_RX + i] -= reach * (push * nx - along * ny)
+        w[_RY + i] -= reach * (push * ny + along * nx)
+        w[_FAST + i] += reach * (c0 + abs(speed))
+        w[_PUSH + i] = pressure
+        w[_LOSS + i] = speed * (pressure * pressure / (c0 * c0) - m * m - tangent * tangent)
+
+
+@njit
+def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds):
+    """The same, the full momentum flux; u0, v0, c : of the cells, for the step; speeds : of the sides, or None."""
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         u = forward - backward
+        through, own = u, u0[i] * nx + v0[i] * ny
+        if speeds is not None:
+            through, own = u - speeds[i], own - speeds[i]
         if table is not None:
             r, p = state(table, forward + backward)
-            mass = (rho + r) * u
+            mass = (rho + r) * through
             push = mass * u + p
         else:
             y = -per * (forward + backward)  # c = c0 (1 + y)
-            mass = rho * u / ((1.0 + y) * (1.0 + y))
-            push = mass * u - 2.0 * bulk * log_sum(y)
-        along = mass * (vl[i] * nx - ul[i] * ny if u > 0.0 else w[_V + i] * nx - w[_U + i] * ny)
+            mass = rho * through / ((1.0 + y) * (1.0 + y))
+            p = -2.0 * bulk * log_sum(y)
+            push = mass * u + p
+        along = mass * (vl[i] * nx - ul[i] * ny if through > 0.0 else w[_V + i] * nx - w[_U + i] * ny)
         w[_RR + i] -= reach * mass
         w[_RX + i] -= reach * (push * nx - along * ny)
         w[_RY + i] -= reach * (push * ny + along * nx)
-        w[_FAST + i] += reach * (abs(u0[i] * nx + v0[i] * ny) + c[i])
+        w[_FAST + i] += reach * (abs(own) + c[i])
         w[_MASS + i] = mass
+        if speeds is not None:
+            w[_PUSH + i], w[_LOSS + i] = p, 0.0
+
+
+@njit
+def push_walls(edges, number, reflect, geo, w, thrust):
+    """Let nothing pass walls; pressure on them, and what their way takes of the energy that the law knows."""
+    many = thrust.size // 2
+    for q in range(edges.size):
+        i = edges[q] % BLOCK
+        thrust[number[q]], thrust[many + number[q]] = w[_PUSH + i], w[_LOSS + i]
+        if reflect.size == 0 or reflect[number[q]] == 1.0:
+            w[_RR + i] += geo[_REACH + i] * w[_MASS + i]
+            w[_MASS + i] = 0.0
 
 
 @njit
@@ -146,8 +205,9 @@ def work_size(integers):
 
 @njit
 def liquid_rates(
-    law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
-):
+    law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
+    moves,
+):  # fmt: skip
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
@@ -157,6 +217,9 @@ def liquid_rates(
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
     through : float64[b]  what comes in through the boundary [kg/(m s)], or empty
     work : float64[work_size(integers)]
+    moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: on faces of the
+    boundary pressure over that at rest [Pa], then what law linear loses beside them, speed (c^2 r^2 - m^2)
+    [kg^2/(m3 s3)], float64[2 b]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -185,7 +248,10 @@ def liquid_rates(
             if not first_order:
                 k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
                 here, sp, su, sv = edges[k:wall], shown[k:], shown[b + k :], shown[2 * b + k :]
-                show(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, p, u, v, sp, su, sv)
+                show(
+                    law, c0, rho, table, here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, p, u, v,
+                    sp, su, sv, moves,
+                )  # fmt: skip
                 put_sides(sided, floats, integers, p, wide_by, free, sp, here, w, ps)
                 put_sides(sided, floats, integers, u, wide_by, free, su, here, w, us)
                 put_sides(sided, floats, integers, v, wide_by, free, sv, here, w, vs)
@@ -200,9 +266,20 @@ def liquid_rates(
             gather(us, beyond, w[_U:])
             gather(vs, beyond, w[_V:])
             i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
-            show_sides(edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, ps[own:], us[own:], vs[own:], w)
-            if table is not None or law == LAW_LOG:
-                settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w)
+            show_sides(
+                law, c0, rho, table, edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, ps[own:], us[own:],
+                vs[own:], w, moves,
+            )  # fmt: skip
+            full = table is not None or law == LAW_LOG
+            if moves is not None:
+                speeds = moves[0][(4 * j + k) * BLOCK :]
+                if full:
+                    settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, speeds)
+                else:
+                    settle_linear_moving(c0, rho, ps[own:], us[own:], vs[own:], geo, w, speeds)
+                push_walls(edges[i:edge], number[i:edge], reflect, geo, w, moves[1])
+            elif full:
+                settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, None)
             else:
                 settle_linear(c0, ps[own:], us[own:], vs[own:], geo, w)
             if through.size > 0:

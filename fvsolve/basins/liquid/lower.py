@@ -34,6 +34,7 @@ class LiquidRows(BasinRows):
         super().__init__(case, name)
         fluid = case.properties
         self.linear, self.waves = case.law.linear, None
+        self.is_grid = self.is_grid and not self.moves  # rows of a grid are for lines that stand still
         if case.law.tabulated:
             from fvsolve.basins.liquid.lower_waves import Waves
 
@@ -47,8 +48,14 @@ class LiquidRows(BasinRows):
     def pieces(self, valves: bool) -> Iterator[Pieces]:
         module = "table" if self.waves is not None else "rates"
         on_grid = "waves_on_grids" if self.linear else "rates_on_grids"
-        yield Pieces(home=HOME, rates=f"{module}: {on_grid if self.is_grid else 'rates_on_meshes'}")
+        if self.moves:
+            rates = "rates_on_moving_meshes" if self.waves is None else "rates_by_table"
+            yield Pieces(home=HOME, rates=f"moving: {rates}")
+        else:
+            yield Pieces(home=HOME, rates=f"{module}: {on_grid if self.is_grid else 'rates_on_meshes'}")
         yield LIQUID
+        if self.moves:
+            yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
         if self.waves is not None:
             yield Pieces(home=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
@@ -126,6 +133,12 @@ class LiquidRows(BasinRows):
         if field != "pressure":
             return super().lower_probe(row, field, cells, weights)
         row["side"], row["scale"], row["offset"] = PRESSURE, self.speed**2, self.part.pressure
+
+    def at_rest(self) -> float:
+        return self.density
+
+    def thrust_at_rest(self) -> np.ndarray:
+        return np.full(self.n, (self.part.pressure - self.case.ambient_pressure) * self.part.thickness)
 
     def mass(self) -> tuple[float, np.ndarray]:
         per, fluid = self.part.thickness * self.mesh.area, self.case.properties

@@ -22,6 +22,7 @@ class Liquid(Physics, name="liquid"):
     fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **MOVES}
     starts: ClassVar[type[MovingStart]] = LiquidStart
     laws: ClassVar[tuple[str, ...]] = ("linear", "log", "table")
+    moves: ClassVar[bool] = True
     carries: ClassVar[bool] = False
     echoes: ClassVar[bool] = True
 

@@ -18,8 +18,8 @@ def on_grid(basin):
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """Whether it is a liquid on any other mesh."""
-    return basin["kind"] == MINE and basin["nx"] == 0
+    """Whether it is a liquid on any other mesh that stands still."""
+    return basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0
 
 
 @njit
@@ -76,8 +76,8 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 
 @njit
-def any_mesh(tables, b, table, y, dydt, out):
-    """Rates on a mesh, of its waves or, with no table, under laws linear and log."""
+def any_mesh(tables, b, table, y, dydt, out, moves):
+    """Rates on a mesh, of its waves or, with no table, under laws linear and log; moves : as in `liquid_rates`."""
     plane, work, integers, basin = tables.plane, tables.work, tables.integers, tables.basins[b]
     n, o, through = basin["n"], basin["y"], basin["through"]
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
@@ -88,7 +88,7 @@ def any_mesh(tables, b, table, y, dydt, out):
         integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
         y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
         work[through : through + basin["outer_given"]], work[basin["work"] :],
-        rates[:n], rates[n : 2 * n], rates[2 * n :],
+        rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
     )  # fmt: skip
     book_open(tables, b, basin["thickness"], out)
     out[RATE] = max(out[RATE], rate)
@@ -100,4 +100,4 @@ def rates_on_meshes(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]) and wanted(tables.basins[b], dydt):
-            any_mesh(tables, b, None, y, dydt, out)
+            any_mesh(tables, b, None, y, dydt, out, None)

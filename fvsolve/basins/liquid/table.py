@@ -31,7 +31,7 @@ def rates_on_meshes(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if on_mesh(basin) and wanted(basin, dydt):
-            any_mesh(tables, b, tables.plane[basin["table"] :], y, dydt, out)
+            any_mesh(tables, b, tables.plane[basin["table"] :], y, dydt, out, None)
 
 
 @njit
