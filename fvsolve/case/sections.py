@@ -202,6 +202,10 @@ class OutputUnits(Value):
         "position",
         "force",
         "torque",
+        "angle",
+        "angular_velocity",
+        "acceleration",
+        "energy",
         "power",
         "time",
     )

@@ -17,6 +17,7 @@ SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
 ALIKE = 1e-8  # share of the largest row of pins that a row has beside all others: below, it says nothing new
 LOOSE = 1e-6  # rate at which a pin may open at the start [m/s]
+ROUNDS = 3  # of what holds bodies
 SNAP = 1e-12  # share of what makes up a joint's force below which their sum is rounding
 KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
@@ -172,7 +173,7 @@ def factored(model, y: np.ndarray) -> np.ndarray:
     written, t = wiped(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
     pieces = ("joints: kinematics", "matrix: accelerate")
-    call_pieces((*model.tables, *written), pieces, t, y, model.new_out())
+    call_pieces((*model.tables, *written), pieces, t, y.copy(), model.new_out())
     return written.scratch
 
 
@@ -274,9 +275,13 @@ def holding_pressures(draft, start) -> dict[int, float]:
     for k, row in enumerate(draft.piston_table):
         if k not in pistons:
             pushes[first + k] = row["area_a"] * gauge["a"][k] - row["area_b"] * gauge["b"][k]
-    left = at.under(pushes)
-    unit = np.array([at.under(pushes + np.eye(pushes.size)[first + k]) - left for k in pistons]).T
-    forces = np.linalg.lstsq(unit, -left, rcond=None)[0]
+    size = draft.case.ambient_pressure * float(max(draft.piston_table["area_a"]))
+    alone, nothing = size * np.eye(pushes.size)[first:], at.under(0.0 * pushes)
+    unit = np.array([at.under(alone[k]) - nothing for k in pistons]).T / size
+    forces = np.zeros(len(pistons))
+    for _ in range(ROUNDS):  # the second to rounding
+        pushes[[first + k for k in pistons]] = forces
+        forces = forces - np.linalg.lstsq(unit, at.under(pushes), rcond=None)[0]
     found = {}
     for (k, free), force in zip(pistons.items(), forces, strict=True):
         row = draft.piston_table[k]

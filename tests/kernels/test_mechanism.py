@@ -10,6 +10,9 @@ from truth.trees import pinocchio_of, random_tree
 import fvsolve
 from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, TURNING
 from fvsolve.kernels.records import BODY_OUT
+from fvsolve.model import Slate
+from fvsolve.model.energy_ledger import Accounts
+from fvsolve.model.mechanism import factored
 
 pytest.importorskip("pinocchio", reason="pinocchio (pin) is the peer here")
 SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]
@@ -41,3 +44,48 @@ def test_forward_dynamics_of_random_trees_are_those_of_pinocchio(many, first, se
         assert here[PLACE : PLACE + 3] == pytest.approx(placed.translation, abs=1e-13 * many)
         assert here[ACCELERATION : ACCELERATION + 3] == pytest.approx(moved.linear, abs=1e-12 * scale)
         assert here[TURNING : TURNING + 3] == pytest.approx(moved.angular, abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
+    """M = L'L with L from the kernels, entries between freedoms of which neither hangs on the other zero."""
+    bodies = random_tree(np.random.default_rng([8, seed]), 8, "ball")
+    model = model_of(bodies)
+    pin, peer, data, q, _, rows = pinocchio_of(bodies, GRAVITY)
+    truth = pin.crba(peer, data, q)
+    truth = np.triu(truth) + np.triu(truth, 1).T
+    freedoms, n = model.tables.freedoms, len(model.tables.freedoms)
+    factor, entries = np.zeros((n, n)), factored(model, model.start)[8 * n :]
+    for j, row in enumerate(freedoms):
+        path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
+        factor[j, path] = entries[row["row"] : row["row"] + row["depth"] + 1]
+    table = dict(zip(model.body_names, model.tables.bodies, strict=True))
+    own = [int(table[name]["freedom"]) + k for name in rows for k in range(table[name]["freedoms"])]
+    assert (factor.T @ factor)[np.ix_(own, own)] == pytest.approx(truth, abs=1e-13 * np.abs(truth).max())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_energies_and_momenta_of_random_trees_are_those_of_pinocchio(seed):
+    bodies = random_tree(np.random.default_rng([6, seed]), 6, "free")
+    sums = ("kinetic_energy", *(f"{what}momentum_{axis}" for what in ("", "angular_") for axis in "xyz"))
+    probes = [f"{name}.{one}" for name in bodies for one in sums]
+    case = scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.01}, probes)
+    model = fvsolve.build(fvsolve.load(case))
+    found = model.observe(0.0, model.start).reshape(len(bodies), len(sums)).sum(axis=0)
+    pin, peer, data, q, v, _ = pinocchio_of(bodies, GRAVITY)
+    momentum = pin.computeCentroidalMomentum(peer, data, q, v)
+    centre = pin.centerOfMass(peer, data, q, v)
+    about = momentum.angular + np.cross(centre, momentum.linear)
+    truth = [pin.computeKineticEnergy(peer, data, q, v), *momentum.linear, *about]
+    assert found == pytest.approx(truth, rel=1e-12, abs=1e-12)
+
+
+def test_power_of_a_tree_is_that_of_its_weight():
+    """d/dt of v' M v / 2 = v . weight: what Coriolis' terms take adds up to nothing (M' - 2 C is skew)."""
+    bodies = random_tree(np.random.default_rng(9), 10, "free")
+    model = model_of(bodies)
+    accounts = Accounts(Slate(model))
+    dydt, out = np.zeros(model.y_size), model.new_out()
+    power = accounts.power_at(0.0, model.start.copy(), dydt, out)
+    kinetic = max(abs(one) for one in power)
+    assert abs(power.sum()) < 1e-12 * max(kinetic, 100.0)

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 from truth.bodies import CLOSE, OIL, Crane, bodies, pendulum
+from truth.cylinders import valve_flow
 from truth.scenes import AMBIENT, GRAVITY, scene
 from truth.trees import body, random_tree, turn
 
@@ -629,3 +630,49 @@ def test_a_tree_far_from_the_origin_moves_as_one_near_it():
     model.append(fvsolve.build(fvsolve.load(bodies(tree, 1.0))))
     near, far = (one.rhs(0.0, one.start) for one in model)
     assert far == approx(near, rel=1e-9, abs=1e-8)
+
+
+def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
+    """Boom and load as a double pendulum in the plane, pressures as states; orifices of the spool by their root."""
+    beta, rho, share = 1.2e9, 870.0, 8e-6
+    bore, ring = math.pi / 4 * 0.125**2, math.pi / 4 * (0.125**2 - 0.07**2)
+    result = fvsolve.run("cases/crane.toml", set={"numerics.end": 6.0})
+
+    def turned(angle, x, z):
+        c, s = math.cos(angle), math.sin(angle)
+        return np.array([c * x - s * z, s * x + c * z])
+
+    def rates(t, y, law):
+        a, b, u, v, p, q = y
+        arms = [turned(a, 2.2, 0.1), turned(a, 5.0, 0.0), turned(a + b, 0.0, -1.5)]
+        across = [np.array([-r[1], r[0]]) for r in arms]
+        jacobians = [np.column_stack([across[0], np.zeros(2)]), np.column_stack([across[1] + across[2], across[2]])]
+        drags = [-u * u * arms[0], -u * u * arms[1] - (u + v) ** 2 * arms[2]]
+        mass, force = np.zeros((2, 2)), np.array([0.0, -200.0 * v])
+        for m, j, d in zip((800.0, 1000.0), jacobians, drags, strict=True):
+            mass += m * j.T @ j
+            force -= m * j.T @ (d + [0.0, GRAVITY])
+        mass += [[1500.0 + 100.0, 100.0], [100.0, 100.0]]
+        eye = turned(a, 1.5, -0.1)
+        far = eye - [0.3, -1.4]
+        length = np.linalg.norm(far)
+        lever = float(far @ [-eye[1], eye[0]]) / length
+        speed, x = lever * u, length - 1.5
+        force[0] += lever * (bore * (p - 101325.0) - ring * (q - 101325.0) - 2e4 * speed)
+        open_, dense = law(t), lambda one: rho * math.exp((one - 101325.0) / beta)
+        into = valve_flow(share, open_, 250e5, p, dense(max(250e5, p))) if open_ else 0.0
+        out = valve_flow(share, open_, q, 1e5, dense(max(q, 1e5))) if open_ else 0.0
+        return [u, v, *np.linalg.solve(mass, force), beta / (5e-4 + bore * x) * (into / dense(p) - bore * speed),
+                beta / (5e-4 + ring * (1.2 - x)) * (ring * speed - out / dense(q))]  # fmt: skip
+
+    y = [math.radians(10.0), -math.radians(10.0), 0.0, 0.0, 1e5 * result["lift.A.gauge_pressure"][0] + 101325.0, 10e5]
+    assert rates(0.0, y, lambda t: 0.0)[2:4] == approx([0.0, 0.0], abs=1e-9)
+    ramps = [(1.2, lambda t: (t - 1.0) / 0.2), (4.0, lambda t: 1.0), (4.2, lambda t: (4.2 - t) / 0.2)]
+    ramps.append((6.0, lambda t: 0.0))
+    at = 1.0
+    for until, law in ramps:
+        y = solve_ivp(rates, (at, until), y, method="LSODA", args=(law,), rtol=1e-9, atol=1e-9, max_step=0.01).y[:, -1]
+        at = until
+    assert math.radians(result["boom.angle"][-1]) == approx(y[0], abs=1e-5)
+    assert math.radians(result["load.angle"][-1]) == approx(y[1], abs=1e-4)
+    assert np.all(result["boom.angle"][result.t < 1.0] == result["boom.angle"][0])

@@ -12,7 +12,19 @@ from fvsolve.parts.body.points import Inertia, PlacesByName
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table import Inside, Table
-from fvsolve.parts.value import Choice, Misfit, Quantity, Rows, Setting, Text, Usual, Value, nonnegative, positive
+from fvsolve.parts.value import (
+    PROFILE,
+    Choice,
+    Misfit,
+    Quantity,
+    Rows,
+    Setting,
+    Text,
+    Usual,
+    Value,
+    nonnegative,
+    positive,
+)
 from fvsolve.units import show
 
 JOINTS = {  # kind -> keys that go with it, beside `on`, `at` and `attitude`
@@ -37,6 +49,8 @@ def along(name: str, dimension: str) -> dict[str, str]:
 
 class OfJoint(Value):
     """A number whose unit hangs on the kind of joint, or three of them along the body's axes."""
+
+    changes = PROFILE
 
     def __init__(self, dimension: str, about: str) -> None:
         self.dimension, self.about = dimension, about
