@@ -1,7 +1,8 @@
 """Power of what comes into basins by patches, under the linear law. Knows the tables; adds nothing up over time.
 
 Rows of `power`, last of all, a basin: what comes in by patches at their potential, what is lost there (what enters has
-no speed, what leaves takes its own along and is not paid for it), friction, rate of storage [W]; of `stored`: its
+no speed, what leaves takes its own along and is not paid for it), friction, rate of storage, what its law takes of it
+besides where it rides on a body [W]; of `stored`: its
 change since the profile [J]. A physics fills what is not zero of its own, squares being those of a cell's mean.
 """
 

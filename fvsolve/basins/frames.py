@@ -35,7 +35,7 @@ from fvsolve.kernels.mechanism.room import (
     row_of,
     turned,
 )
-from fvsolve.kernels.mechanism.tanks import ARM_OF, EAST, MOMENTS, TANK_OUT
+from fvsolve.kernels.mechanism.tanks import ARM_OF, EAST, LOAD, MOMENTS, TANK_OUT
 from fvsolve.kernels.records import NO_WEIGHT, RATE, STATUS, WHERE
 
 AT, TURN = 0, 3  # numbers of a frame: place of its origin and attitude, by rows, in axes of its body,
@@ -139,6 +139,12 @@ def turn_water(t, y, dydt, out, handle):
         load_body(tables, basin, b, y, to, first, out)
 
 
+@njit(forceinline=True)
+def ground(plane, basin, i):
+    """Height of the bed of cell i above the level at rest, in axes of its basin [m]."""
+    return plane[int(plane[basin["frame"] + SURFACE]) + i] - plane[basin["plan"] + i]
+
+
 @njit
 def load_body(tables, basin, b, y, rates, first, out):
     """Force and torque of the water in a basin on its body with joints held, and its moments along the normal."""
@@ -157,7 +163,8 @@ def load_body(tables, basin, b, y, rates, first, out):
             per * rates[first + n + i],
             per * rates[first + 2 * n + i],
         )
-        m, sx, sy, lever = m + mass, sx + mass * x, sy + mass * z, lever + 0.5 * mass * depth
+        bed = ground(plane, basin, i)
+        m, sx, sy, lever = m + mass, sx + mass * x, sy + mass * z, lever + mass * (bed + 0.5 * depth)
         xx, xy, yy = xx + mass * x * x, xy + mass * x * z, yy + mass * z * z
         dx, dy = dx + more * x, dy + more * z
         dxx, dxy, dyy = dxx + more * x * x, dxy + more * x * z, dyy + more * z * z
@@ -188,6 +195,8 @@ def load_body(tables, basin, b, y, rates, first, out):
         out[tank + EAST + 3 * k + 1] = x * a + z * c + v * e
         x, z, v = out[body + ATTITUDE + 6], out[body + ATTITUDE + 7], out[body + ATTITUDE + 8]
         out[tank + EAST + 3 * k + 2] = x * a + z * c + v * e
+    put(out, tank + LOAD, hx, hy, hz)
+    put(out, tank + LOAD + 3, tx, ty, tz)
     put(out, tank + MOMENTS, m, sx, sy)
     put(out, tank + MOMENTS + 3, xx, xy, yy)
     e = tank + EAST

@@ -2,7 +2,7 @@
 
 from fvsolve.jit import njit
 
-OF_BODY, OF_DEVICE, OF_WALL, OF_BASIN = 3, 3, 2, 4  # rows of `power` each has; of `stored` one, a wall none
+OF_BODY, OF_DEVICE, OF_WALL, OF_BASIN = 3, 3, 2, 5  # rows of `power` each has; of `stored` one, a wall none
 
 
 @njit(forceinline=True)

@@ -33,8 +33,6 @@ class Accounts:
     def __init__(self, slate: Slate) -> None:
         self.slate, self.model = slate, slate.model
         model, case = slate.model, slate.model.case
-        if any(basin.part.on is not None for basin in model.basins):
-            raise FvsolveError("the energy of basins that ride on bodies is not booked yet")
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies
@@ -155,12 +153,14 @@ class Accounts:
 
     def basins(self) -> None:
         for basin in self.model.basins:
-            at = self.take(4)
+            at = self.take(5)
             self.add("dissipated", basin.name, "patches", at + 1)
             self.add("dissipated", basin.name, "friction", at + 2)
             self.hold(basin.name, "basin", at + 3)
-            rows = (at, at + 1, at + 2, at + 3)
-            self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1)))
+            if basin.part.on is not None:
+                self.add("law", basin.name, "basin", at + 4)
+            rows = (at, at + 1, at + 2, at + 3, at + 4)
+            self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1, -1)))
 
     def of(self, what: str) -> list[int]:
         """Numbers of the lines of one kind."""

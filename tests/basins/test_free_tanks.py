@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from fvsolve import advance, build, load, run
 from fvsolve.model.model import State
+from fvsolve.studies.energy.energy import energy
 from tests.truth.scenes import GRAVITY, RHO, scene
 
 LENGTH, DEPTH = 2.0, 0.1
@@ -93,3 +94,49 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
     state = advance(model, State(0.0, model.start.copy()), 2.0)
     assert abs(state.y[at]) > 1e-3
     assert momentum(state.y) == pytest.approx(momentum(model.start), rel=1e-13)
+
+
+# energy -----------
+
+
+def rocking(n=24, **numerics):
+    """A hull that rolls on a torsion spring with a tank across, swinging by two hundredths of a radian."""
+    hull = {
+        "type": "body", "mass": 400.0, "inertia": [800.0, 800.0, 800.0], "centre_of_mass": [0, 0, -0.5],
+        "points": {"right": [0, 2.0, 0], "left": [0, -2.0, 0]},
+        "joint": {"kind": "revolute", "axis": [1, 0, 0], "rate": 0.03},
+    }  # fmt: skip
+    basin = {"type": "basin", "on": "hull", "at": [-0.5, -1.0, 0.4], "size": [1.0, 2.0], "cells": [1, n], "level": 0.1}
+    world = {"type": "frame", "points": {"right": [0, 2.0, -3.0], "left": [0, -2.0, -3.0]}}
+    links = {
+        side: {"type": "spring", "from": f"world.{side}", "to": f"hull.{side}", "stiffness": 400.0, "preload": 0.0}
+        for side in ("right", "left")
+    }
+    nodes = {"hull": hull, "world": world, "b": basin}
+    return scene(nodes, links, 2.0, {"scheme": "muscl", "method": "ssp-rk3", **numerics}, ["hull.angle"], every=0.02)
+
+
+def test_energy_of_a_hull_and_its_water_is_lost_by_the_scheme_alone_and_never_made():
+    parts = []
+    for step in (4e-3, 2e-3):
+        found = energy(rocking(step=step))
+        swung = 0.5 * 800.0 * 0.03**2
+        scheme = sum(found.scheme.values())
+        assert (np.diff(scheme) > -1e-6 * swung).all()
+        assert scheme[-1] < 0.1 * swung
+        parts.append(abs(found.step[-1]) / swung)
+    assert parts[1] < parts[0] / 5.0 and parts[1] < 1e-4
+
+
+def test_what_drives_a_tank_is_what_its_water_gains_and_loses():
+    body = {
+        "type": "body", "mass": 50.0, "inertia": [5.0, 5.0, 5.0],
+        "joint": {"kind": "revolute", "axis": [0, 1, 0], "angle": {"mean": 0, "amplitude": 0.03, "period": 1.7}},
+    }  # fmt: skip
+    basin = {"type": "basin", "on": "cart", "at": [-1, -0.5, 0.6], "size": [2.0, 1.0], "cells": [30, 2], "level": 0.2}
+    case = scene({"cart": body, "b": basin}, {}, 1.6, {"scheme": "muscl", "method": "ssp-rk3", "step": 2e-3})
+    found = energy(case)
+    passed = max(np.abs(one).max() for one in found.supplied.values())
+    assert passed > 1.0
+    assert abs(found.step[-1]) < 1e-4 * passed
+    assert 0.0 <= sum(found.scheme.values())[-1] < 0.1 * passed

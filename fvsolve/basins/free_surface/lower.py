@@ -19,8 +19,9 @@ from fvsolve.kernels.phases import Pieces
 
 HOME = __package__
 FRAMES = Pieces(
-    home="fvsolve.basins", prepare="frames: set_frames", enter="frames: turn_water", follow="frames: follow_bodies"
-)
+    home="fvsolve.basins", prepare="frames: set_frames", enter="frames: turn_water", follow="frames: follow_bodies",
+    power="frames_energy: add_power", stored="frames_energy: add_stored",
+)  # fmt: skip
 WATER = Pieces(
     home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_water",
     power="energy: add_power", stored="energy: add_stored",

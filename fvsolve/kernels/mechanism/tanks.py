@@ -1,15 +1,16 @@
 """What water in tanks adds to the mass matrix: along the normals of their beds alone. Knows moments; knows no flow.
 
 Row b of what basins say, from layout["tank"] + TANK_OUT b: moments of mass 1, x, y, xx, xy, yy in axes of the basin,
-these axes in the world, and where its origin lies from o (`room`). A basin that rides on nothing says zeros.
+these axes in the world, where its origin lies from o (`room`), and force and torque about its origin that it puts on
+its body with joints held, in its own axes. A basin that rides on nothing says zeros.
 """
 
 from fvsolve.jit import njit
 from fvsolve.kernels.records import TANK_OUT
 
-MOMENTS, EAST, NORTH, NORMAL, ARM_OF = 0, 6, 9, 12, 15
+MOMENTS, EAST, NORTH, NORMAL, ARM_OF, LOAD = 0, 6, 9, 12, 15, 18
 
-__all__ = ["ARM_OF", "EAST", "MOMENTS", "NORMAL", "NORTH", "TANK_OUT", "add_tanks"]
+__all__ = ["ARM_OF", "EAST", "LOAD", "MOMENTS", "NORMAL", "NORTH", "TANK_OUT", "add_tanks"]
 
 
 @njit
