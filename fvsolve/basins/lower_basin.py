@@ -14,7 +14,8 @@ from fvsolve.basins.diffusion import diffusion_work
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.basins.observe import SPEED, U, V
-from fvsolve.case.basins import behind, is_grid, means, samples
+from fvsolve.case.basins import behind
+from fvsolve.case.cells import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fvsolve.case import riding, walls
+from fvsolve.case.cells import means, samples
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
 from fvsolve.parts.basin.part import MovingWall, Place, StartOfFields
-from fvsolve.parts.formula import Formula
 from fvsolve.parts.value import Misfit, Setting
 from fvsolve.units import show
 
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from fvsolve.mesh.points import MeshPoints
 
 Found = Iterator[tuple[tuple, str]]
-# Three Gauss points along either side of a rectangle, of sqrt(3 / 5) of half of it: centre, corners, sides.
-GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0, 1)
 
 
 @dataclass(frozen=True)
@@ -132,35 +130,6 @@ def behind(mesh: Mesh, patch: str) -> np.ndarray:
     return np.unique(mesh.left[mesh.patch(patch)])
 
 
-def is_grid(mesh: Mesh) -> bool:
-    """Whether cells are all of a rectangle."""
-    return mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny
-
-
-def samples(shape: Formula | None, mesh: Mesh) -> np.ndarray:
-    """A formula in cells, centres first: on grids at nine Gauss points, elsewhere there alone : float64[points, n]."""
-    x, y = np.ascontiguousarray(mesh.centre.T)
-    if not is_grid(mesh):
-        places = np.array([x]), np.array([y])
-    else:
-        wide, high = np.tile(np.diff(mesh.grid.x), mesh.grid.ny), np.repeat(np.diff(mesh.grid.y), mesh.grid.nx)
-        to = 0.5 * math.sqrt(0.6) * np.array(GAUSS)[:, :, None]
-        places = x + to[:, 0] * wide, y + to[:, 1] * high
-    if shape is None:
-        return np.zeros(places[0].shape)
-    return shape.at(*(one.ravel() for one in places)).reshape(places[0].shape)
-
-
-def means(found: np.ndarray) -> np.ndarray:
-    """Means over cells of `samples`, in sums that mirrored and turned cells share; what is even stays so to the bit."""
-    if len(found) == 1:
-        return found[0]
-    corners = (found[1] + found[2]) + (found[3] + found[4])
-    sides = (found[5] + found[6]) + (found[7] + found[8])
-    mean = (25.0 * corners + (40.0 * sides + 64.0 * found[0])) / 324.0
-    return np.where(np.ptp(found, axis=0) > 0.0, mean, found[0])
-
-
 def place_kind(basin: Basin, patch: str) -> type[Place]:
     """What a patch is as a place."""
     stated = basin.patches.get(patch)
@@ -195,10 +164,10 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         if fluid is not None and not own.goes(fluid.law):
             wanted = named(lambda law, own=own: own.goes(law.name))
             yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.described}; wanted {wanted}"
+        yield from riding.misfits(name, basin, nodes, joined)
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
-        yield from riding.misfits(name, basin, nodes, joined)
         yield from walls.misfits(name, basin, meshes[name], nodes, joined, times)
         for patch, one in basin.patches.items():
             if patch not in known:

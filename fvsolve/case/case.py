@@ -54,6 +54,7 @@ class Case(Shown):
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
     folder: Path | None = field(repr=False)
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
+    frozen: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is one with its body
 
     picture = "fvsolve.draw.objects:case_figure"
 
@@ -111,7 +112,14 @@ class Case(Shown):
     @cached_property
     def poses(self) -> dict[str, Any]:
         """Where bodies stand at the start, name -> `bodies.Pose`, each behind the one that it hangs on."""
-        return bodies.poses(self.nodes, self.numerics.start)
+        return bodies.poses(self.loaded, self.numerics.start)
+
+    @cached_property
+    def loaded(self) -> dict[str, Node]:
+        """Nodes, bodies with the mass of the frozen water that rides on them."""
+        from fvsolve.case.riding import loaded
+
+        return loaded(self.nodes, self.frozen, self.properties.density) if self.frozen else self.nodes
 
     def ahead(self, first: str, second: str) -> float:
         """How far place `second` lies ahead of `first` at the start [m]; of points their distance."""

@@ -101,6 +101,7 @@ class _Reader:
         self.raw = raw
         self.faults: list[Fault] = override(raw, settings, _alternatives())
         self.setting = Setting(folder=raw.folder)
+        self.frozen: dict[str, Any] = {}  # meshes of basins that are but mass of a body
 
     def case(self) -> Case:
         top = self.top()
@@ -120,7 +121,9 @@ class _Reader:
                 kinds["nodes"][name] = bodies.Riding(node)
             kinds["nodes"] |= {f"{name}.{point}": BodyPoint for point in getattr(node, "points", {})}
         for name, kind in [*kinds["nodes"].items()]:
-            if kind is Basin and name not in meshes:
+            if name in self.frozen:
+                kinds["nodes"][name] = basins.Pool({}, self.frozen[name])
+            elif kind is Basin and name not in meshes:
                 kinds["nodes"][name] = None  # at fault itself
             if name in meshes:
                 pool = parts["nodes"][name]
@@ -166,6 +169,7 @@ class _Reader:
             raw=self.raw.table,
             folder=self.raw.folder,
             meshes=meshes,
+            frozen=self.frozen,
             **top,
         )
         return made if named is None else self.exact(made)
@@ -311,10 +315,10 @@ class _Reader:
         for name, node in nodes.items():
             try:
                 if isinstance(node, Basin):
-                    made[name] = basins.mesh_of(node, self.setting)
+                    (self.frozen if node.frozen else made)[name] = basins.mesh_of(node, self.setting)
             except Misfit as error:
                 self.misfit(("nodes", name), error)
-        if len(made) < sum(isinstance(node, Basin) for node in nodes.values()):
+        if len(made) + len(self.frozen) < sum(isinstance(node, Basin) for node in nodes.values()):
             self.stop()
         return made
 

@@ -1,11 +1,14 @@
-"""What must hold between what rides on bodies and the rest of a case. Knows no network."""
+"""What must hold between what rides on bodies and the rest of a case, and what it weighs. Knows no network."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from fvsolve.case.bodies import hangs_on
+from fvsolve.case.cells import means, samples
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.body.part import Body
 from fvsolve.units import show
@@ -20,6 +23,8 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str]) -> F
         for other in ("at", "attitude"):
             if getattr(basin, other) is not None:
                 yield (*key, other), "is a place on a body; name that with on"
+        if "sloshing" in basin.model_fields_set:
+            yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
         return
     yield from (((*key, "on"), text) for text in body_faults(basin.on, nodes))
     if basin.elevation is not None:
@@ -56,3 +61,44 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
         if joint.kind != "fixed" and joint.driven is None:
             yield on
         on = hangs_on(nodes[on])[0]
+
+
+def loaded(nodes: dict[str, Any], frozen: dict[str, Any], density: float) -> dict[str, Any]:
+    """Nodes, bodies with the mass, centre and inertia of the water that rides on them and is one with them."""
+    found = dict(nodes)
+    for name, mesh in frozen.items():
+        basin, body = nodes[name], found[nodes[name].on]
+        mass, centre, inertia = as_mass(basin, mesh, density)
+        turn = np.eye(3) if basin.attitude is None else basin.attitude.rotation
+        centre = np.array(basin.at or (0.0, 0.0, 0.0)) + turn @ centre
+        both, own = body.mass + mass, np.array(body.centre_of_mass)
+        middle = (body.mass * own + mass * centre) / both
+        total = body.moment() + apart(body.mass, own - middle) + turn @ inertia @ turn.T + apart(mass, centre - middle)
+        change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
+        found[nodes[name].on] = body.model_copy(update=change)
+    return found
+
+
+def apart(mass: float, r: np.ndarray) -> np.ndarray:
+    """What a mass at r from an origin has of inertia about it : float64[3, 3] [kg m2]."""
+    return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
+
+
+def as_mass(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
+    """(mass [kg], centre [m], inertia about it [kg m2]) of water at rest, in axes of its basin: prisms on cells."""
+    bed = means(samples(basin.bed, mesh))
+    depth = np.maximum(basin.level - bed, 0.0)
+    mass = density * mesh.area * depth
+    places = np.column_stack([mesh.centre, bed + 0.5 * depth])
+    total, wide = float(mass.sum()), mesh.area / 12.0
+    centre = mass @ places / total
+    if mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny:
+        along, across = np.diff(mesh.grid.x) ** 2 / 12.0, np.diff(mesh.grid.y) ** 2 / 12.0
+        along, across = np.tile(along, mesh.grid.ny), np.repeat(across, mesh.grid.nx)
+    else:
+        along = across = wide
+    high = depth**2 / 12.0
+    inertia = np.diag([mass @ (across + high), mass @ (along + high), mass @ (along + across)])
+    for one, place in zip(mass, places - centre, strict=True):
+        inertia += apart(float(one), place)
+    return total, centre, inertia

@@ -33,7 +33,7 @@ STATES = {  # of each kind: coordinates, then velocities; with how small each is
 
 def lower_bodies(draft) -> None:
     """Fill the tables of bodies and of their freedoms, each body behind the one that it hangs on."""
-    nodes = draft.case.nodes
+    nodes = draft.case.loaded
     draft.body_names = list(draft.case.poses)
     table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
     paths: list[list[int]] = []

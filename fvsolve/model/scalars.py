@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.basins import means, samples
+from fvsolve.case.cells import means, samples
 from fvsolve.kernels import records as rec
 from fvsolve.steppers.methods import METHODS
 

@@ -140,3 +140,34 @@ def test_what_drives_a_tank_is_what_its_water_gains_and_loses():
     assert passed > 1.0
     assert abs(found.step[-1]) < 1e-4 * passed
     assert 0.0 <= sum(found.scheme.values())[-1] < 0.1 * passed
+
+
+# frozen -----------
+
+
+def test_frozen_water_is_the_body_that_weighs_as_much():
+    """A block of water of 2 m x 1 m x 0.1 m at an angle on its cart, and the same block said as a body of its own."""
+    turn = {"yaw": "30 deg", "roll": "10 deg"}
+    hull = {
+        "type": "body", "mass": 300.0, "inertia": [30.0, 60.0, 70.0], "centre_of_mass": [0.1, 0.0, -0.2],
+        "joint": {"kind": "revolute", "axis": [0, 1, 0], "angle": 0.3},
+    }  # fmt: skip
+    basin = {**tank(8), "on": "hull", "at": [0.3, -0.2, -1.0], "attitude": turn, "sloshing": "frozen"}
+    block = {
+        "type": "body", "mass": 200.0, "centre_of_mass": [1.0, 0.5, 0.05],
+        "inertia": [200.0 * (1 + 0.01) / 12, 200.0 * (4 + 0.01) / 12, 200.0 * 5 / 12],
+        "joint": {"kind": "fixed", "on": "hull", "at": [0.3, -0.2, -1.0], "attitude": turn},
+    }  # fmt: skip
+    numerics = {"method": "rk4", "step": 0.01}
+    one = run(scene({"hull": hull, "b": basin}, {}, 2.0, numerics, ["hull.angle"]))
+    two = run(scene({"hull": hull, "block": block}, {}, 2.0, numerics, ["hull.angle"]))
+    assert one["hull.angle"] == pytest.approx(two["hull.angle"], abs=1e-12)
+    assert np.ptp(one["hull.angle"]) > 0.3
+
+
+def test_in_heave_cells_and_frozen_water_are_one():
+    case = sprung({**tank(1), "sloshing": "cells"}, cart(axis=(0, 0, 1), rate=0.05), 2e4, 1.0, {"step": 2e-3},
+                  ["cart.z"], (0, 0, 9.0), preload=-300.0 * GRAVITY)  # fmt: skip
+    cells = run(case)
+    case["nodes"]["b"]["sloshing"] = "frozen"
+    assert run(case)["cart.z"] == pytest.approx(cells["cart.z"], abs=1e-12)

@@ -12,7 +12,7 @@ from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.lower_pieces import MARKED
-from fvsolve.case.basins import means, samples
+from fvsolve.case.cells import means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces

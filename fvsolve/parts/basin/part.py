@@ -34,6 +34,7 @@ from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
 OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
+SLOSHING = ("frozen", "cells")
 MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of what has velocities
 
 
@@ -284,6 +285,9 @@ class Basin(Node, kind="basin"):
         Rows("position", length=3, about="its origin in axes of that body, in place of elevation [m]; 0 if left out"),
     ] = None
     attitude: Annotated[Attitude | None, Inside(Attitude, "of its axes in those of that body")] = None
+    sloshing: Annotated[str, Choice("sloshing", SLOSHING, "of water that rides: as one with its body, or by cells")] = (
+        "cells"
+    )
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
 
     @property
@@ -312,6 +316,14 @@ class Basin(Node, kind="basin"):
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
         patches = given.get("patches")
         return tuple(patches) if isinstance(patches, dict) else ()
+
+    @property
+    def frozen(self) -> bool:
+        """Whether it is but mass of the body that it rides on."""
+        return self.on is not None and self.sloshing == "frozen"
+
+    def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
+        return {}, {}
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
