@@ -1,8 +1,8 @@
 """Bushings: force by the gap of two points, torque by the deviation (56) of two attitudes. Loaded by scenes with one.
 
 In axes of the body of `from`: rho the place of `to`, less that of `from`; R~ = R R_d' with R the attitude of the body
-of `to` there and R_d that of the start. 2 eta eps is the skew part of R~, and eps.eps = (3 - trace R~) / 4. The force acts
-on both bodies where `to` is, so that what it does is force times d(rho)/dt.
+of `to` there and R_d that of the start. 2 eta eps is the skew part of R~, and eps.eps = (3 - trace R~) / 4. The force
+acts on both bodies where `to` is, so that what it does is force times d(rho)/dt.
 """
 
 from math import sqrt

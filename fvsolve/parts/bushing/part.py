@@ -9,7 +9,7 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
 
 class Bushing(TwoPort, kind="bushing"):
-    """Pulls point `to` to point `from`, and turns its body back to the attitude of the start, R~ = R R_d' (56).
+    """Pulls point `to` to point `from`, and turns its body back to where it stood at the start, R~ = R R_d' (56).
 
     force = -stiffness gap - damping d(gap)/dt, torque = -2 rotational_stiffness eta eps - rotational_damping w~ (57), in
     the axes of `from`, on both bodies at point `to`. Ports: from, to. Stored energy: stiffness gap^2 / 2 + 2
@@ -20,9 +20,7 @@ class Bushing(TwoPort, kind="bushing"):
     quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force", "torque": "torque"}
 
     stiffness: Annotated[float, Quantity("stiffness", nonnegative, "force per gap [N/m]", changes=VALUE)] = 0.0
-    damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of the gap [N s/m]", changes=VALUE)] = (
-        0.0
-    )
+    damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of that [N s/m]", changes=VALUE)] = 0.0
     rotational_stiffness: Annotated[
         float, Quantity("torque", nonnegative, "torque per angle, of small ones [N m]", changes=VALUE)
     ] = 0.0
