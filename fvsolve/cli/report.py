@@ -17,6 +17,10 @@ NODE = {"elevation": ("elevation", "length"), "pressure": ("pressure", "pressure
 MASS = {
     "position": ("position", "position"), "velocity": ("velocity", "velocity"), "force": ("net force", "force")
 }  # fmt: skip
+BODY = {
+    **{key: (key, "position") for key in "xyz"}, **{key: (key, "angle") for key in ("roll", "pitch", "yaw")},
+    "speed": ("speed", "velocity"), "spin": ("spin", "angular_velocity"),
+}  # fmt: skip
 PIPE = {
     "length": ("length", "length"),
     "cells": ("cells", "number"),
@@ -80,7 +84,12 @@ def checks(case, found: dict, every: bool = False) -> None:
     _line(console, case.title or case.name, "bold")
     _line(console, _fluid(case, found["fluid"]))
     odd = {one["place"] for one in found["warnings"]}
-    for group, word, keys in (("nodes", "node", NODE), ("masses", "mass", MASS), ("pipes", "pipe", PIPE)):
+    for group, word, keys in (
+        ("nodes", "node", NODE),
+        ("masses", "mass", MASS),
+        ("bodies", "body", BODY),
+        ("pipes", "pipe", PIPE),
+    ):
         place = "links" if group == "pipes" else "nodes"
         _states(
             console, case, word, found[group], keys, every, {name for name in found[group] if f"{place}.{name}" in odd}

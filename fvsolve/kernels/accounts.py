@@ -1,8 +1,8 @@
-"""Where rows of `power` and `stored` begin that count from the end: bodies, devices, walls, basins. Knows sizes."""
+"""Where rows of `power` and `stored` begin that count from the end, bushings first, basins last. Knows sizes."""
 
 from fvsolve.jit import njit
 
-OF_BODY, OF_DEVICE, OF_WALL, OF_BASIN = 3, 3, 2, 5  # rows of `power` each has; of `stored` one, a wall none
+OF_BUSHING, OF_BODY, OF_DEVICE, OF_WALL, OF_BASIN = 2, 3, 3, 2, 5  # rows of `power`; of `stored` one, a wall none
 
 
 @njit(forceinline=True)
@@ -30,6 +30,12 @@ def body_rows(tables, power):
 
 
 @njit(forceinline=True)
+def bushing_rows(tables, power):
+    """First row of `power` of bushings."""
+    return body_rows(tables, power) - OF_BUSHING * tables.bushings.size
+
+
+@njit(forceinline=True)
 def device_stores(tables, stored):
     """First row of `stored` of devices."""
     return stored.size - tables.basins.size - tables.devices.size
@@ -39,3 +45,9 @@ def device_stores(tables, stored):
 def body_stores(tables, stored):
     """First row of `stored` of bodies."""
     return device_stores(tables, stored) - tables.bodies.size
+
+
+@njit(forceinline=True)
+def bushing_stores(tables, stored):
+    """First row of `stored` of bushings."""
+    return body_stores(tables, stored) - tables.bushings.size

@@ -98,6 +98,11 @@ MEMBERS = {
     ),
     "no pins": Pieces(accelerate="mechanism.matrix: accelerate"),
     "pins": Pieces(accelerate="mechanism.pins: accelerate_pinned", observe="mechanism.pins: observe_pins"),
+    "bushings": Pieces(
+        move="mechanism.bushings: push_bushings", accelerate="mechanism.bushings: quicken_by_bushings",
+        observe="mechanism.bushings: observe_bushings", power="mechanism.bushings: power_bushings",
+        stored="mechanism.bushings: stored_bushings",
+    ),
     "stretches": Pieces(events="mechanism.joints: stretch_again"),
     "lines": Pieces(move="mechanism.lines: push_bodies"),
     "masses": Pieces(
@@ -137,6 +142,7 @@ class Cast:
     bodies: bool = False
     lines: bool = False
     pins: bool = False
+    bushings: bool = False
     memory: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
@@ -168,6 +174,8 @@ class Cast:
         if self.bodies:
             yield MEMBERS["bodies"]
             yield MEMBERS["pins" if self.pins else "no pins"]
+        if self.bushings:
+            yield MEMBERS["bushings"]
         if self.lines:
             yield MEMBERS["stretches"]
         if self.masses:

@@ -255,6 +255,20 @@ PIN = np.dtype(
     align=True,
 )
 
+BUSHING = np.dtype(
+    [
+        ("from_point", "i8"),
+        ("to_point", "i8"),
+        ("stiffness", "f8"),
+        ("damping", "f8"),
+        ("turn_stiffness", "f8"),
+        ("turn_damping", "f8"),
+        ("attitude", "f8", (9,)),  # of the body of `to` in axes of that of `from` at the start
+        ("energy", "f8"),  # stored at the start [J]
+    ],
+    align=True,
+)
+
 MASS = np.dtype(
     [
         ("y", "i8"),  # offset of its position, velocity follows; both as deviations; -1 for a frame
@@ -401,7 +415,12 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
 GIVEN_FLOW = 18  # of a patch that a given velocity passes
 WALL_VALUE = 19  # of a wall that moves
-BODY_VALUE, POINT_VALUE, PIN_VALUE = 20, 21, 22  # `side` says which, as `kernels.mechanism.observe` numbers them
+BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = (
+    20,
+    21,
+    22,
+    23,
+)  # `side` says which, as `kernels.mechanism.observe` numbers them
 
 BASIN = np.dtype(
     [
@@ -537,6 +556,7 @@ RECORDS = {
     "points": POINT,
     "lines": LINE,
     "pins": PIN,
+    "bushings": BUSHING,
     "masses": MASS,
     "braces": BRACE,
     "stops": STOP,

@@ -94,7 +94,7 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
     draft.tables = rec.Tables(
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
-        np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.mass_table,
+        np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table, draft.mass_table,
         draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
         draft.wall_table,
@@ -186,7 +186,7 @@ def model_of(draft: Draft) -> Model:
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,
-        draft.mass_names, draft.body_names,
+        draft.mass_names, draft.body_names, draft.bushing_names,
         {name: case.elevation(name) for name in case.places}, case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.attitude import roll_pitch_yaw
 from fvsolve.case.basins import behind, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
@@ -40,6 +41,7 @@ def checks(model) -> dict[str, Any]:
         name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
         for name, row in zip(model.mass_names, model.tables.masses, strict=False)
     }
+    bodies = {name: stands(pose) for name, pose in model.case.poses.items()}
     pipes, remembered = {}, model.steady["unsteady"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
         velocity = row["flow"] / (rho * row["area"])
@@ -63,13 +65,21 @@ def checks(model) -> dict[str, Any]:
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     return {
-        "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "pipes": pipes,
+        "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
+        "pipes": pipes,
         "basins": {one.name: basin_facts(one) for one in model.basins},
         "states": model.y_size, "cells": model.all_cells, "step": step,
         "step_set_by": set_by, "steps": steps, "expected_seconds": expected,
         "moving": model.steady["moving"],
         "warnings": [one.plain() for one in (*model.warnings, *dear(model, steps, set_by))],
     }  # fmt: skip
+
+
+def stands(pose) -> dict[str, float]:
+    """Where a body stands at the start, and how fast it moves and turns."""
+    place = dict(zip("xyz", pose.place.tolist(), strict=True))
+    angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
+    return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
 
 
 def rubbed(loss: float, link, rho: float, velocity: float) -> float:

@@ -60,6 +60,7 @@ class Draft:
     point_index: dict[str, int] = field(default_factory=dict)
     points: list[tuple] = field(default_factory=list)  # rows, as they are asked for
     pin_names: list[str] = field(default_factory=list)
+    bushing_names: list[str] = field(default_factory=list)
     lines: list[tuple] = field(default_factory=list)
     factor_size: int = 0  # entries of a mass matrix
     mass_names: list[str] = field(default_factory=list)
@@ -84,6 +85,7 @@ class Draft:
     freedom_table: np.ndarray = rows(rec.FREEDOM)
     line_table: np.ndarray = rows(rec.LINE)
     pin_table: np.ndarray = rows(rec.PIN)
+    bushing_table: np.ndarray = rows(rec.BUSHING)
     mass_table: np.ndarray = rows(rec.MASS)
     brace_table: np.ndarray = rows(rec.BRACE)
     stop_table: np.ndarray = rows(rec.STOP)

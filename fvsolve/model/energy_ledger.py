@@ -121,6 +121,10 @@ class Accounts:
             self.add("law", name, "cylinder", at + 2)
 
     def bodies(self) -> None:
+        for name in self.model.bushing_names:
+            at = self.take(2)
+            self.hold(name, "bushing", at)
+            self.add("dissipated", name, "bushing", at + 1)
         for name, row in zip(self.model.body_names, self.model.tables.bodies, strict=True):
             at = self.take(3)
             self.hold(name, "body", at)

@@ -15,6 +15,7 @@ from fvsolve.parts.body.part import Body
 WATER = ("frames: set_frames", "frames: turn_water")  # what loads bodies beside pushes, at rest
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
+BETWEEN = (-1, -1, -1, rec.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
 ALIKE = 1e-8  # share of the largest row of pins that a row has beside all others: below, it says nothing new
 LOOSE = 1e-6  # rate at which a pin may open at the start [m/s]
 ROUNDS = 3  # of what holds bodies
@@ -129,6 +130,10 @@ def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direc
 def lower_lines(draft) -> None:
     """Number pushes as `lines` name them; pins."""
     draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
+    draft.bushing_names, draft.bushing_table = draft.fill("bushing", rec.BUSHING)
+    for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
+        link = draft.case.links[name]
+        row["energy"] = 0.5 * row["stiffness"] * apart(draft, (link.from_, link.to), BETWEEN)[0] ** 2
     draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
     rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
     for k, row in enumerate(rows):
@@ -187,7 +192,8 @@ class Statics:
         self.layout = draft.tables.layout[0]
         self.out = np.zeros(int(self.layout["size"]))
         self.y, self.tables, rides = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
-        self.pushes = ("joints: kinematics", "lines: push_bodies", *(WATER if rides else ()))
+        rubber = ("bushings: push_bushings",) if len(draft.bushing_table) else ()
+        self.pushes = ("joints: kinematics", "lines: push_bodies", *rubber, *(WATER if rides else ()))
         if rides:
             self.y, self.tables = (
                 at_start(draft.basins, draft.size),
@@ -226,7 +232,7 @@ class Statics:
         self.run("joints: kinematics")
         at = int(self.layout["push"])
         self.out[at : at + pushes.size] = pushes
-        self.run("lines: push_bodies")
+        self.run(*self.pushes[1:])
         return self.forces()
 
     def shares(self, pushes: np.ndarray) -> np.ndarray:

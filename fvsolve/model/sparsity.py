@@ -45,6 +45,7 @@ class Couplings:
         self.masses, self.pistons = tables.masses["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
         self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
+        self.bushings = tables.bushings
         joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
@@ -159,6 +160,11 @@ class Couplings:
         for root in np.unique([self.tied(root) for root in self.bodies["root"]]):
             own = [self.of_tree(root, what) for what in (0, 1)]
             yield every(states(*own), states(*own))
+        for row in self.bushings:
+            ends = [self.points[row[end]]["body"] for end in ("from_point", "to_point")]
+            felt = [self.of_chain(i, what) for i in ends if i >= 0 for what in (0, 1)]
+            roots = {self.tied(self.bodies[i]["root"]) for i in ends if i >= 0}
+            yield every(states(*(self.of_tree(root, 1) for root in roots)), states(*felt))
         for row in [*self.braces, *self.pistons]:
             if row["line"] < 0:
                 continue

@@ -491,6 +491,39 @@ def test_what_drives_a_joint_may_not_jump_nor_its_rate(driven):
         fvsolve.build(fvsolve.load(bodies({"arm": pendulum(driven)}, 1.0)))
 
 
+# bushings ---------------------------------------------------------------------------------------------------
+
+
+def test_a_body_on_a_bushing_swings_by_its_stiffnesses_and_fades_by_its_damping():
+    """m x'' = -k x - d x', and about z, where a turn by q is eps = sin(q / 2): J q'' = -K sin q - D q'."""
+    m, k, d, j, turn_k, turn_d = 2.0, 300.0, 1.5, 0.4, 50.0, 0.2
+    block = body(m, [j, j, j], {"kind": "free", "velocity": [0.5, 0, 0], "rate": [0, 0, 12.0]})
+    links = {"rubber": {"type": "bushing", "from": "ground.top", "to": "block", "stiffness": k, "damping": d,
+                        "rotational_stiffness": turn_k, "rotational_damping": turn_d}}  # fmt: skip
+    nodes = {"block": block, "ground": {"type": "frame", "points": {"top": [0, 0, 0]}}}
+    case = {**bodies(nodes, 2.0, ["block.x", "block.yaw", "rubber.gap", "rubber.torque"], links), **WEIGHTLESS}
+    result = run(case)
+    y = solve_ivp(lambda t, y: [y[1], -(k * y[0] + d * y[1]) / m, y[3], -(turn_k * math.sin(y[2]) + turn_d * y[3]) / j],
+                  (0.0, 2.0), [0.0, 0.5, 0.0, 12.0], rtol=1e-12, atol=1e-13).y[:, -1]  # fmt: skip
+    assert result["block.x"][-1] == approx(y[0], abs=1e-8) and result["rubber.gap"][-1] == approx(abs(y[0]), abs=1e-8)
+    assert result["block.yaw"][-1] == approx(y[2], abs=1e-7)
+    assert result["rubber.torque"][-1] == approx(abs(turn_k * math.sin(y[2]) + turn_d * y[3]), abs=1e-5)
+
+
+def test_a_bushing_between_two_free_bodies_keeps_their_momenta():
+    tree = random_tree(np.random.default_rng(12), 1, "free")
+    other = random_tree(np.random.default_rng(13), 1, "free")["b0"]
+    links = {"rubber": {"type": "bushing", "from": "b0.p", "to": "b1.p", "stiffness": 100.0, "damping": 1.0,
+                        "rotational_stiffness": 20.0, "rotational_damping": 0.3}}  # fmt: skip
+    sums = [f"{what}momentum_{axis}" for what in ("", "angular_") for axis in "xyz"]
+    probes = [f"{name}.{one}" for name in ("b0", "b1") for one in sums]
+    result = run({**bodies({**tree, "b1": other}, 2.0, probes, links), **WEIGHTLESS})
+    for one in sums:
+        total = result[f"b0.{one}"] + result[f"b1.{one}"]
+        assert np.ptp(total) < 1e-7
+        assert np.ptp(result[f"b0.{one}"]) > 0.1
+
+
 # energy -----------------------------------------------------------------------------------------------------
 
 
@@ -508,6 +541,8 @@ def machine() -> dict:
         "load": {"type": "force", "to": "lower.bob", "force": {"mean": 0.0, "amplitude": 5.0, "period": 0.7},
                  "direction": [1, 1, 0]},
         "motor": {"type": "torque", "from": "arm", "to": "lower", "torque": 0.5, "axis": [0, 0, 1]},
+        "rubber": {"type": "bushing", "from": "cart", "to": "lower.bob", "stiffness": 20.0, "damping": 0.5,
+                   "rotational_stiffness": 3.0, "rotational_damping": 0.1},
     }  # fmt: skip
     return held(links, {"cart": cart, "arm": upper, "lower": lower}, 1.5, [], method="rk4", step=2e-3)
 

@@ -1,0 +1,160 @@
+"""Bushings: force by the gap of two points, torque by the deviation (56) of two attitudes. Loaded by scenes with one.
+
+In axes of the body of `from`: rho the place of `to`, less that of `from`; R~ = R R_d' with R the attitude of the body
+of `to` there and R_d that of the start. 2 eta eps is the skew part of R~, and eps.eps = (3 - trace R~) / 4. The force
+acts on both bodies where `to` is, so that what it does is force times d(rho)/dt.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.accounts import bushing_rows, bushing_stores
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.mechanism.lines import point_at, spin_of
+from fvsolve.kernels.mechanism.matrix import ease, lean_at, lean_by
+from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE, SPIN, VELOCITY, add_force, add_torque, cross, row_of
+from fvsolve.kernels.records import BUSHING_VALUE, RATE
+
+
+@njit(forceinline=True)
+def entry(out, tables, i, r, c):
+    """Entry of the attitude of a body, of the world (i < 0) of the identity."""
+    if i < 0:
+        return 1.0 if r == c else 0.0
+    return out[row_of(tables, i) + ATTITUDE + 3 * r + c]
+
+
+@njit
+def gap_of(out, tables, bushing):
+    """Place of `to` less `from`, and its rate as the body of `from` sees it, in axes of the world: 6 numbers."""
+    i = tables.points[bushing["from_point"]]["body"]
+    x, y, z, u, v, w = point_at(out, tables, bushing["to_point"], PLACE)
+    p, q, s, _, _, _ = point_at(out, tables, bushing["from_point"], PLACE)
+    if i >= 0:
+        here = row_of(tables, i)
+        a, b, c = cross(out, here + SPIN, x - out[here + PLACE], y - out[here + PLACE + 1], z - out[here + PLACE + 2])
+        k = here + VELOCITY
+        u, v, w = u - out[k] - a, v - out[k + 1] - b, w - out[k + 2] - c
+    return x - p, y - q, z - s, u, v, w
+
+
+@njit
+def deviation(out, tables, bushing, r, c):
+    """Entry of R~ in the world, R_to R_d' R_from' with R_d the start's of `to` in axes of `from`."""
+    i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
+    total = 0.0
+    for k in range(3):
+        for m in range(3):
+            total += entry(out, tables, j, r, k) * bushing["attitude"][3 * m + k] * entry(out, tables, i, c, m)
+    return total
+
+
+@njit
+def twist(out, tables, bushing):
+    """2 eta eps in axes of the world, w~, and eps.eps: 7 numbers."""
+    x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
+    y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))
+    z = 0.5 * (deviation(out, tables, bushing, 1, 0) - deviation(out, tables, bushing, 0, 1))
+    trace = deviation(out, tables, bushing, 0, 0) + deviation(out, tables, bushing, 1, 1)
+    trace += deviation(out, tables, bushing, 2, 2)
+    a, b, c = spin_of(out, tables, bushing["from_point"])
+    u, v, w = spin_of(out, tables, bushing["to_point"])
+    return x, y, z, u - a, v - b, w - c, 0.25 * (3.0 - trace)
+
+
+@njit
+def loads(out, tables, bushing):
+    """(force, torque) on the body of `to`, in axes of the world."""
+    x, y, z, u, v, w = gap_of(out, tables, bushing)
+    a, b, c, p, q, s, _ = twist(out, tables, bushing)
+    k, d, h, e = bushing["stiffness"], bushing["damping"], bushing["turn_stiffness"], bushing["turn_damping"]
+    return -k * x - d * u, -k * y - d * v, -k * z - d * w, -h * a - e * p, -h * b - e * q, -h * c - e * s
+
+
+@njit
+def push_bushings(t, y, dydt, out, handle):
+    """Forces and torques of all bushings on their bodies."""
+    tables = open_tables(handle)
+    bushings = tables.bushings
+    for k in range(bushings.size):
+        fx, fy, fz, tx, ty, tz = loads(out, tables, bushings[k])
+        px, py, pz, _, _, _ = point_at(out, tables, bushings[k]["to_point"], PLACE)
+        for end, sign in ((bushings[k]["to_point"], 1.0), (bushings[k]["from_point"], -1.0)):
+            i = tables.points[end]["body"]
+            if i >= 0:
+                here = row_of(tables, i)
+                rx, ry, rz = px - out[here + PLACE], py - out[here + PLACE + 1], pz - out[here + PLACE + 2]
+                add_force(out, here, rx, ry, rz, sign * fx, sign * fy, sign * fz)
+                add_torque(out, here, sign * tx, sign * ty, sign * tz)
+
+
+@njit
+def quicken_by_bushings(t, y, dydt, out, handle):
+    """Let steps see how quickly bushings answer, as lines in `matrix.quickest_body`."""
+    tables = open_tables(handle)
+    bushings, work, n = tables.bushings, tables.scratch, tables.freedoms.size
+    stiffness, damping = 0.0, 0.0
+    for k in range(bushings.size):
+        bushing = bushings[k]
+        i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
+        px, py, pz, _, _, _ = point_at(out, tables, bushing["to_point"], PLACE)
+        for axis in range(6):
+            x, y0, z = 1.0 * (axis % 3 == 0), 1.0 * (axis % 3 == 1), 1.0 * (axis % 3 == 2)
+            for m in range(n):
+                work[7 * n + m] = 0.0
+            if axis < 3:
+                lean_at(out, tables, j, px, py, pz, x, y0, z, 7 * n)
+                lean_at(out, tables, i, px, py, pz, -x, -y0, -z, 7 * n)
+            else:
+                lean_by(tables, j, x, y0, z, 0.0, 0.0, 0.0, 7 * n)
+                lean_by(tables, i, -x, -y0, -z, 0.0, 0.0, 0.0, 7 * n)
+            easy = ease(tables, 7 * n)
+            stiffness += easy * (bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"])
+            damping += easy * (bushing["damping"] if axis < 3 else bushing["turn_damping"])
+    out[RATE] = max(out[RATE], 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
+
+
+@njit
+def observe_bushings(t, y, out, handle, values):
+    """Gap [m], force [N] and torque [N m] of a bushing."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        if probes[k]["kind"] == BUSHING_VALUE:
+            bushing = tables.bushings[probes[k]["index"]]
+            x, y0, z, _, _, _ = gap_of(out, tables, bushing)
+            fx, fy, fz, tx, ty, tz = loads(out, tables, bushing)
+            if probes[k]["side"] == 1:
+                x, y0, z = fx, fy, fz
+            elif probes[k]["side"] == 2:
+                x, y0, z = tx, ty, tz
+            values[k] = sqrt(x * x + y0 * y0 + z * z)
+
+
+@njit
+def power_bushings(t, y, dydt, out, handle, power):
+    """Rows of bushings: rate of what they store, what they dissipate [W]."""
+    tables = open_tables(handle)
+    at = bushing_rows(tables, power)
+    for k in range(tables.bushings.size):
+        bushing = tables.bushings[k]
+        x, y0, z, u, v, w = gap_of(out, tables, bushing)
+        a, b, c, p, q, s, _ = twist(out, tables, bushing)
+        power[at] = bushing["stiffness"] * (x * u + y0 * v + z * w)
+        power[at] += bushing["turn_stiffness"] * (a * p + b * q + c * s)
+        power[at + 1] = bushing["damping"] * (u * u + v * v + w * w)
+        power[at + 1] += bushing["turn_damping"] * (p * p + q * q + s * s)
+        at += 2
+
+
+@njit
+def stored_bushings(t, y, dydt, out, handle, stored):
+    """Rows of bushings: k gap^2 / 2 + 2 k eps.eps since the start [J]."""
+    tables = open_tables(handle)
+    at = bushing_stores(tables, stored)
+    for k in range(tables.bushings.size):
+        bushing = tables.bushings[k]
+        x, y0, z, _, _, _ = gap_of(out, tables, bushing)
+        eps = twist(out, tables, bushing)[6]
+        own = 0.5 * bushing["stiffness"] * (x * x + y0 * y0 + z * z) + 2.0 * bushing["turn_stiffness"] * eps
+        stored[at + k] = own - bushing["energy"]

@@ -1,0 +1,27 @@
+"""Bushings in the tables of a model."""
+
+from __future__ import annotations
+
+from fvsolve.case import bodies
+from fvsolve.kernels import records as rec
+from fvsolve.model.lowering import Lowering
+from fvsolve.model.mechanism import point_row
+
+
+class BushingRows(Lowering, kind="bushing"):
+    """Six forces between two bodies."""
+
+    table = "bushing"
+
+    def fill(self, draft, name, link, rows) -> None:
+        (row,) = rows
+        row["from_point"], row["to_point"] = point_row(draft, link.from_), point_row(draft, link.to)
+        row["stiffness"], row["damping"] = link.stiffness, link.damping
+        row["turn_stiffness"], row["turn_damping"] = link.rotational_stiffness, link.rotational_damping
+        poses = [draft.case.poses.get(bodies.point_of(draft.case.nodes, end)[0], bodies.AT_REST)
+                 for end in (link.from_, link.to)]  # fmt: skip
+        row["attitude"] = (poses[0].attitude.T @ poses[1].attitude).ravel()
+
+    def probe(self, draft, name, probe, row) -> None:
+        row["kind"], row["side"] = rec.BUSHING_VALUE, ("gap", "force", "torque").index(probe.quantity)
+        row["index"] = draft.bushing_names.index(name)

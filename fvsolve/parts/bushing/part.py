@@ -1,0 +1,29 @@
+"""A block of rubber between two bodies. Knows how stiff it is; computes no force."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from fvsolve.parts.link import TwoPort
+from fvsolve.parts.value import VALUE, Quantity, nonnegative
+
+
+class Bushing(TwoPort, kind="bushing"):
+    """Pulls point `to` to point `from`, and turns its body back to where it stood at the start, R~ = R R_d' (56).
+
+    force = -stiffness gap - damping d(gap)/dt, torque = -2 rotational_stiffness eta eps - rotational_damping w~ (57), in
+    the axes of `from`, on both bodies at point `to`. Ports: from, to. Stored energy: stiffness gap^2 / 2 + 2
+    rotational_stiffness eps.eps [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w~^2 [W].
+    """
+
+    joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
+    quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force", "torque": "torque"}
+
+    stiffness: Annotated[float, Quantity("stiffness", nonnegative, "force per gap [N/m]", changes=VALUE)] = 0.0
+    damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of that [N s/m]", changes=VALUE)] = 0.0
+    rotational_stiffness: Annotated[
+        float, Quantity("torque", nonnegative, "torque per angle, of small ones [N m]", changes=VALUE)
+    ] = 0.0
+    rotational_damping: Annotated[
+        float, Quantity("rotational_damping", nonnegative, "torque per rate of turning [N m s]", changes=VALUE)
+    ] = 0.0
