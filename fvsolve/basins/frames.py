@@ -17,7 +17,7 @@ accelerations are solved, flow feels them (`follow_bodies`). Momentum of the who
 the sum of x dm/dt in the load is that of mass fluxes.
 """
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.room import (
     ACCELERATION,
@@ -122,21 +122,47 @@ def place_of(plane, basin, i):
 def turn_water(t, y, dydt, out, handle):
     """Add Coriolis and Euler forces to rates of flow, and let bodies feel what is in them."""
     tables = open_tables(handle)
-    plane = tables.plane
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["frame"] < 0:
             continue
-        twice, euler = 2.0 * plane[basin["frame"] + WZ], plane[basin["frame"] + AZ]
+        twice, euler = 2.0 * tables.plane[basin["frame"] + WZ], tables.plane[basin["frame"] + AZ]
         out[RATE] = max(out[RATE], abs(twice))
-        n, o = basin["n"], basin["y"]
-        to, first = (dydt, o) if dydt.size > 0 else (tables.work, basin["unused"])
-        for i in range(n if twice != 0.0 or euler != 0.0 else 0):
-            x, z = place_of(plane, basin, i)
-            depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
-            to[first + n + i] += twice * y[o + 2 * n + i] + euler * depth * z
-            to[first + 2 * n + i] -= twice * y[o + n + i] + euler * depth * x
-        load_body(tables, basin, b, y, to, first, out)
+        to, first = (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["unused"])
+        if twice != 0.0 or euler != 0.0:
+            push_flow(tables.plane, basin, y, to, first, twice, 0.0, 0.0, euler)
+        if basin["heavy"] == 1:
+            load_body(tables, basin, b, y, to, first, out)
+
+
+@njit
+def push_flow(plane, basin, y, rates, first, twice, east, north, turn):
+    """Add to rates of flow 2 W q and depth times a push that is even but for `turn` times the place."""
+    n, o, nx, places = basin["n"], basin["y"], basin["nx"], int(plane[basin["frame"] + PLACES])
+    rows, wide = (basin["ny"], nx) if nx > 0 else (1, n)
+    for row in range(rows):
+        at = row * wide
+        a, z, p = o + at, o + at + wide, basin["plan"] + at
+        x = plane[places : places + wide]
+        if nx > 0:
+            level = plane[places + nx + row]
+            push_row(x, plane[p : p + wide], y[a:z], y[a + n : z + n], y[a + 2 * n : z + 2 * n], twice,
+                     east + turn * level, north, turn, rates[first + n + at : first + n + at + wide],
+                     rates[first + 2 * n + at : first + 2 * n + at + wide])  # fmt: skip
+        else:
+            for i in range(n):
+                depth = max(plane[p + i] + y[o + i], 0.0)
+                rates[first + n + i] += twice * y[o + 2 * n + i] + depth * (east + turn * plane[places + n + i])
+                rates[first + 2 * n + i] += depth * (north - turn * x[i]) - twice * y[o + n + i]
+
+
+@inner
+def push_row(x, rest, dh, qx, qy, twice, east, north, turn, rate_x, rate_y):
+    """`push_flow` of a row of cells of a grid."""
+    for i in range(rate_x.size):
+        depth = max(rest[i] + dh[i], 0.0)
+        rate_x[i] += twice * qy[i] + depth * east
+        rate_y[i] += depth * (north - turn * x[i]) - twice * qx[i]
 
 
 @njit(forceinline=True)
@@ -149,27 +175,30 @@ def ground(plane, basin, i):
 def load_body(tables, basin, b, y, rates, first, out):
     """Force and torque of the water in a basin on its body with joints held, and its moments along the normal."""
     plane, n, o, rho = tables.plane, basin["n"], basin["y"], tables.settings[0]["rho"]
-    m = sx = sy = xx = xy = yy = lever = 0.0  # moments of mass, and half of that times depth
+    m = sx = sy = xx = xy = yy = lever = 0.0  # moments of mass, and of its weight along the normal
     dx = dy = dxx = dxy = dyy = 0.0  # their rates
     qx = qy = turn = fx = fy = spin = 0.0  # momentum, its moment about z, and their rates
-    for i in range(n):
-        x, z = place_of(plane, basin, i)
-        per = rho * plane[basin["area"] + i]
-        depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
-        mass, more = per * depth, per * rates[first + i]
-        u, v, du, dv = (
-            per * y[o + n + i],
-            per * y[o + 2 * n + i],
-            per * rates[first + n + i],
-            per * rates[first + 2 * n + i],
-        )
-        bed = ground(plane, basin, i)
-        m, sx, sy, lever = m + mass, sx + mass * x, sy + mass * z, lever + mass * (bed + 0.5 * depth)
-        xx, xy, yy = xx + mass * x * x, xy + mass * x * z, yy + mass * z * z
-        dx, dy = dx + more * x, dy + more * z
-        dxx, dxy, dyy = dxx + more * x * x, dxy + more * x * z, dyy + more * z * z
-        qx, qy, turn = qx + u, qy + v, turn + x * v - z * u
-        fx, fy, spin = fx + du, fy + dv, spin + x * dv - z * du
+    nx, places = basin["nx"], int(plane[basin["frame"] + PLACES])
+    surface, rows, wide = int(plane[basin["frame"] + SURFACE]), basin["ny"] if nx > 0 else n, nx if nx > 0 else 1
+    for row in range(rows):
+        z = plane[places + (nx if nx > 0 else n) + row]
+        r0 = r1 = r2 = d0 = d1 = d2 = p0 = p1 = v0 = v1 = f0 = f1 = g0 = 0.0  # of a row: its cells have one y
+        for k in range(wide):
+            i = row * wide + k
+            x, per = plane[places + (k if nx > 0 else row)], rho * plane[basin["area"] + i]
+            depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
+            mass, more = per * depth, per * rates[first + i]
+            v, dv = per * y[o + 2 * n + i], per * rates[first + 2 * n + i]
+            r0, r1, r2 = r0 + mass, r1 + mass * x, r2 + mass * x * x
+            d0, d1, d2 = d0 + more, d1 + more * x, d2 + more * x * x
+            p0, v0, v1 = p0 + per * y[o + n + i], v0 + v, v1 + v * x
+            p1, f0, f1 = p1 + per * rates[first + n + i], f0 + dv, f1 + dv * x
+            g0 += mass * (plane[surface + i] - plane[basin["plan"] + i] + 0.5 * depth)
+        m, sx, sy, lever = m + r0, sx + r1, sy + r0 * z, lever + g0
+        xx, xy, yy = xx + r2, xy + r1 * z, yy + r0 * z * z
+        dx, dy, dxx, dxy, dyy = dx + d1, dy + d0 * z, dxx + d2, dxy + d1 * z, dyy + d0 * z * z
+        qx, qy, turn = qx + p0, qy + v0, turn + v1 - p0 * z
+        fx, fy, spin = fx + p1, fy + f0, spin + f1 - p1 * z
     at = basin["frame"]
     gx, gy, gz = plane[at + GX], plane[at + GY], -plane[at + GN]
     wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
@@ -230,12 +259,8 @@ def follow_bodies(t, y, dydt, out, handle):
         wx, wy, wz = beyond(out, row + TURNING, row + SPIN_BIAS)
         ax, ay, az = beyond(out, row + ACCELERATION, row + BIAS)
         ax, ay, az = ax + wy * rz - wz * ry, ay + wz * rx - wx * rz, az + wx * ry - wy * rx
-        e, n, o = tank + EAST, basin["n"], basin["y"]
+        e = tank + EAST
         east, north, turn = dot(out, e, ax, ay, az), dot(out, e + 3, ax, ay, az), dot(out, e + 6, wx, wy, wz)
         if east == 0.0 and north == 0.0 and turn == 0.0:
             continue
-        for i in range(n):
-            x, z = place_of(plane, basin, i)
-            depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
-            dydt[o + n + i] -= depth * (east - turn * z)
-            dydt[o + 2 * n + i] -= depth * (north + turn * x)
+        push_flow(plane, basin, y, dydt, basin["y"], 0.0, -east, -north, turn)

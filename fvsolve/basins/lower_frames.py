@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.basins.frames import FRAME, PLACES, SURFACE
+from fvsolve.case.riding import free_joints
 
 ENOUGH = 200  # halvings
 
@@ -26,6 +27,8 @@ def lower_frame(draft, basin, row) -> None:
     numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
     numbers[PLACES] = draft.to_plane(places)
     row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
+    joints = any(probe.quantity.startswith("joint_") for probe in draft.case.probes)
+    row["heavy"] = joints or any(free_joints(part.on, draft.case.nodes))
 
 
 def level_at_start(basin) -> np.ndarray:

@@ -10,7 +10,7 @@ lines and areas as they are. Corners of other meshes are what lines are to grids
 from math import sqrt
 
 from fvsolve.basins.energy import row_of
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.accounts import OF_WALL, wall_rows
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
@@ -42,13 +42,61 @@ def row_across(basin, i):
 @njit
 def see(t, y, seen, out, handle):
     """Lines and areas of basins as they are at y, and in `seen` the state as all others see it."""
-    tables = open_tables(handle)
-    for i in range(y.size):
-        seen[i] = y[i]
+    tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):
-        if tables.basins[b]["walls"] > 0:
-            stretch_cells(tables, tables.basins[b], y)
-            see_cells(tables, tables.basins[b], y, seen)
+        basin = tables.basins[b]
+        if basin["walls"] > 0:
+            for i in range(done, basin["y"]):
+                seen[i] = y[i]
+            stretch_cells(tables, basin, y)
+            done = see_cells(tables, basin, y, seen)
+    for i in range(done, y.size):
+        seen[i] = y[i]
+
+
+@njit(forceinline=True)
+def rows_of(basin):
+    """How many rows its cells stand in, one of any mesh, and how many in each."""
+    return (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, basin["n"])
+
+
+@njit(forceinline=True)
+def widths_of(plane, basin, row):
+    """Where in `plane` the areas of a row of cells over those as drawn stand."""
+    if basin["nx"] == 0 or basin["turn"] == 0:
+        return basin["stretch"]
+    at = basin["stretch"] + 2 * basin["ny"]
+    for i in range(basin["nx"]):
+        plane[at + i] = plane[basin["stretch"] + row]
+    return at
+
+
+@inner
+def widen_row(wide, drawn, area):
+    """Areas of a row of cells."""
+    for i in range(area.size):
+        area[i] = drawn[i] * wide[i]
+
+
+@inner
+def see_deviations(wide, rest, held, seen):
+    """U - U0 of a row of cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    for i in range(seen.size):
+        seen[i] = (held[i] - rest[i] * (wide[i] - 1.0)) / wide[i]
+
+
+@inner
+def see_values(wide, held, seen):
+    """The same of what is nothing at rest."""
+    for i in range(seen.size):
+        seen[i] = held[i] / wide[i]
+
+
+@inner
+def swell_row(wide, rate):
+    """Rates of what a row of cells contains."""
+    for i in range(rate.size):
+        rate[i] *= wide[i]
 
 
 @njit
@@ -62,8 +110,10 @@ def stretch_cells(tables, basin, y):
         weights = walls[k]["weights"] + lines
         for i in range(many):
             plane[at + i] += plane[weights + i] * y[walls[k]["y"]]
-    for i in range(basin["n"]):
-        plane[basin["area"] + i] = plane[basin["drawn"] + i] * stretched(plane, basin, i)
+    rows, wide = rows_of(basin)
+    for row in range(rows):
+        k, a, z = widths_of(plane, basin, row), basin["drawn"] + row * wide, basin["area"] + row * wide
+        widen_row(plane[k : k + wide], plane[a : a + wide], plane[z : z + wide])
     if basin["nx"] == 0:
         return
     spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
@@ -98,16 +148,22 @@ def stretched(plane, basin, i):
 
 @njit
 def see_cells(tables, basin, y, seen):
-    """U - U0 of all cells, from what they contain: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
-    plane, n, first = tables.plane, basin["n"], basin["y"]
-    for i in range(n):
-        wide = stretched(plane, basin, i)
-        rest = plane[basin["plan"] + i] if basin["deep"] == 1 else basin["density"]
-        share = 1.0 / wide
-        seen[first + i] = (y[first + i] - rest * (wide - 1.0)) * share
-        seen[first + n + i], seen[first + 2 * n + i] = y[first + n + i] * share, y[first + 2 * n + i] * share
-    for k in range(basin["carried"], basin["carried"] + tables.scalars.size * n if basin["carried"] >= 0 else -1):
-        seen[k] = y[k] / stretched(plane, basin, (k - basin["carried"]) % n)
+    """Deviations and values of all cells, from what they contain; returns where its states end."""
+    plane, n, first, (rows, wide) = tables.plane, basin["n"], basin["y"], rows_of(basin)
+    many = 3 + (tables.scalars.size if basin["carried"] >= 0 else 0)  # amounts stand behind quantities
+    for row in range(rows):
+        k = widths_of(plane, basin, row)
+        width, at = plane[k : k + wide], row * wide
+        if basin["deep"] == 1:
+            rest = plane[basin["plan"] + at : basin["plan"] + at + wide]
+            see_deviations(width, rest, y[first + at : first + at + wide], seen[first + at : first + at + wide])
+        else:
+            for i in range(first + at, first + at + wide):
+                seen[i] = (y[i] - basin["density"] * (width[i - first - at] - 1.0)) / width[i - first - at]
+        for q in range(1, many):
+            a = first + q * n + at
+            see_values(width, y[a : a + wide], seen[a : a + wide])
+    return first + many * n
 
 
 @njit
@@ -209,13 +265,12 @@ def swell(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["walls"] == 0:
             continue
-        n, many = basin["n"], tables.scalars.size if basin["carried"] >= 0 else 0
-        for i in range(n):
-            wide = stretched(tables.plane, basin, i)
-            for q in range(3):
-                dydt[basin["y"] + q * n + i] *= wide
+        many, (rows, wide) = 3 + (tables.scalars.size if basin["carried"] >= 0 else 0), rows_of(basin)
+        for row in range(rows):
+            k = widths_of(tables.plane, basin, row)
             for q in range(many):
-                dydt[basin["carried"] + q * n + i] *= wide
+                a = basin["y"] + q * basin["n"] + row * wide
+                swell_row(tables.plane[k : k + wide], dydt[a : a + wide])
 
 
 @njit

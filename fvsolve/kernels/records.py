@@ -470,6 +470,7 @@ BASIN = np.dtype(
         ("thrust", "i8"),  # and in `work`: on faces of the boundary, see `free_surface.grid`
         ("turn", "i8"),  # 0 where lines along x move, 1 where those along y do
         ("body", "i8"),  # that it rides on; -1 for none
+        ("heavy", "i8"),  # 1 where that body feels it: forces move it, or someone asks what its joint holds
         ("frame", "i8"),  # in `plane`: where and how it stands there, and how its axes move; see `basins.frames`
         ("corners", "i8"),  # of a mesh: how many, and offsets in `plane`:
         ("places", "i8"),  # of these, then centres of cells, see `moving_meshes`

@@ -40,7 +40,8 @@ class Slate:
     def __init__(self, model: Model) -> None:
         self.model, self.written, self.tables = model, wiped(model.shapes), model.tables
         if len(model.tables.walls) > 0 or (model.tables.basins["frame"] >= 0).any():  # what is drawn moves
-            self.tables = model.tables._replace(plane=lined(model.tables.plane.size))
+            basins = model.tables.basins.copy()
+            self.tables = model.tables._replace(plane=lined(model.tables.plane.size), basins=basins)
             self.tables.plane[:] = model.tables.plane
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks

@@ -176,7 +176,9 @@ FAULTS = {
     "rides on body; say where with at": ({}, {"elevation": 1.0}),
     "wanted a body: body; did you mean": ({}, {"on": "bdy"}),
     "name that with on": ({}, {"on": None, "at": [0, 0, 1]}),
-    "moves freely": ({"joint": {"kind": "revolute", "axis": [0, 0, 1]}}, {}),
+    "would have to feel what leaves here": (
+        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}}, {"patches": {"gap": {"side": "east", "boundary": "open"}}},
+    ),
     "rides on no body yet": ({}, {"physics": "liquid", "level": None, "pressure": 2e5, "thickness": 0.1}),
     "one of both": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
     "unknown key": ({}, {"attitude": {"rol": 0.1}}),
