@@ -120,6 +120,11 @@ def point_row(draft, place: str) -> int:
     return draft.point_index[place]
 
 
+def pose_of(draft, place: str) -> bodies.Pose:
+    """How the body of a point stands at the start; the world's of a frame."""
+    return draft.case.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
+
+
 def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
     """Row of a line between two points, whose push is numbered later."""
     ends = [-1 if place is None else point_row(draft, place) for place in places]
