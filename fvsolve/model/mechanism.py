@@ -120,6 +120,11 @@ def point_row(draft, place: str) -> int:
     return draft.point_index[place]
 
 
+def pose_of(draft, place: str) -> bodies.Pose:
+    """How the body of a point stands at the start; the world's of a frame."""
+    return draft.case.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
+
+
 def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
     """Row of a line between two points, whose push is numbered later."""
     ends = [-1 if place is None else point_row(draft, place) for place in places]
@@ -284,10 +289,11 @@ def holding_pressures(draft, start) -> dict[int, float]:
     size = draft.case.ambient_pressure * float(max(draft.piston_table["area_a"]))
     alone, nothing = size * np.eye(pushes.size)[first:], at.under(0.0 * pushes)
     unit = np.array([at.under(alone[k]) - nothing for k in pistons]).T / size
+    unit = np.hstack([unit, pin_rows(draft, at).T])  # what pins hold, pistons need not
     forces = np.zeros(len(pistons))
     for _ in range(ROUNDS):  # the second to rounding
         pushes[[first + k for k in pistons]] = forces
-        forces = forces - np.linalg.lstsq(unit, at.under(pushes), rcond=None)[0]
+        forces = forces - np.linalg.lstsq(unit, at.under(pushes), rcond=None)[0][: forces.size]
     found = {}
     for (k, free), force in zip(pistons.items(), forces, strict=True):
         row = draft.piston_table[k]
@@ -339,16 +345,22 @@ def start_bodies(draft, start) -> list[str]:
     return moves(draft, at.accelerations())
 
 
+def pin_rows(draft, at: Statics) -> np.ndarray:
+    """G of all rows of pins at the start : float64[rows, freedoms]."""
+    n, many = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
+    if many:
+        at.run(*at.pushes, "pins: accelerate_pinned")
+    first = 8 * n + draft.factor_size + 16 * len(draft.body_table)
+    return at.written.scratch[first : first + many * n].reshape(many, n).copy()
+
+
 def start_pins(draft, at: Statics) -> tuple[np.ndarray, np.ndarray]:
     """Gaps and forces of pins at the start: (what is left of forces of freedoms with these, their size). Faults."""
     at.run(*at.pushes, "pins: gaps")
     first = int(at.layout["pin"])
     for k, row in enumerate(draft.pin_table):
         row["gap"][: row["rows"]] = at.out[first + 3 * k :][: row["rows"]]
-    at.run(*at.pushes, "pins: accelerate_pinned")
-    n, many = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
-    first = 8 * n + draft.factor_size + 16 * len(draft.body_table)
-    rows = at.written.scratch[first : first + many * n].reshape(many, n).copy()
+    rows = pin_rows(draft, at)
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant(rows, names)):
         text = "in some direction nothing can open it, or others hold it there already"

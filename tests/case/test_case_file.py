@@ -394,7 +394,7 @@ def test_what_the_schema_refers_to_is_what_it_says_unshared():
 
     assert expanded({**made, "$defs": {name: defs[name] for name in unshared["$defs"]}}) == unshared
     assert json.loads(printed(made)) == made
-    assert len(printed(made).splitlines()) < 3000 and len(printed(made)) < 0.7 * len(printed(unshared))
+    assert len(printed(made).splitlines()) < 3200 and len(printed(made)) < 0.7 * len(printed(unshared))
 
 
 def test_a_parts_key_is_documented_with_its_unit():

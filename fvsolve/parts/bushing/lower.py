@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from fvsolve.case import bodies
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import Lowering
-from fvsolve.model.mechanism import point_row
+from fvsolve.model.mechanism import point_row, pose_of
 
 
 class BushingRows(Lowering, kind="bushing"):
@@ -18,8 +17,7 @@ class BushingRows(Lowering, kind="bushing"):
         row["from_point"], row["to_point"] = point_row(draft, link.from_), point_row(draft, link.to)
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["turn_stiffness"], row["turn_damping"] = link.rotational_stiffness, link.rotational_damping
-        poses = [draft.case.poses.get(bodies.point_of(draft.case.nodes, end)[0], bodies.AT_REST)
-                 for end in (link.from_, link.to)]  # fmt: skip
+        poses = [pose_of(draft, end) for end in (link.from_, link.to)]
         row["attitude"] = (poses[0].attitude.T @ poses[1].attitude).ravel()
 
     def probe(self, draft, name, probe, row) -> None:

@@ -9,11 +9,11 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
 
 class Bushing(TwoPort, kind="bushing"):
-    """Pulls point `to` to point `from`, and turns its body back to where it stood at the start, R~ = R R_d' (56).
+    """Pulls point `to` to point `from`, and turns its body back to how it stood at the start, by the deviation (56).
 
-    force = -stiffness gap - damping d(gap)/dt, torque = -2 rotational_stiffness eta eps - rotational_damping w~ (57), in
-    the axes of `from`, on both bodies at point `to`. Ports: from, to. Stored energy: stiffness gap^2 / 2 + 2
-    rotational_stiffness eps.eps [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w~^2 [W].
+    force = -stiffness gap - damping d(gap)/dt, torque = -2 rotational_stiffness eta eps - rotational_damping w~ (57),
+    in the axes of `from`, on both bodies at point `to`. Ports: from, to; velocity and force. Stored energy: stiffness
+    gap^2 / 2 + 2 rotational_stiffness eps.eps [J]. Dissipated power: damping (d(gap)/dt)^2 + rotational_damping w~^2.
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
