@@ -42,28 +42,60 @@ def row_across(basin, i):
 @njit
 def see(t, y, seen, out, handle):
     """Lines and areas of basins as they are at y, and in `seen` the state as all others see it."""
-    tables = open_tables(handle)
-    for i in range(y.size):
-        seen[i] = y[i]
+    tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):
-        if tables.basins[b]["walls"] > 0:
-            stretch_cells(tables, tables.basins[b], y)
-            see_cells(tables, tables.basins[b], y, seen)
+        basin = tables.basins[b]
+        if basin["walls"] > 0:
+            stretch_cells(tables, basin, y)
+            copy(y[done : basin["y"]], seen[done:])
+            see_cells(tables, basin, y, seen)
+            done = basin["y"] + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
+    copy(y[done:], seen[done:])
+
+
+@njit
+def copy(source, target):
+    """target = source."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
+@njit(forceinline=True)
+def rows_of(basin):
+    """Where in `plane` it stands by how much rows are stretched; of grids behind that of cells."""
+    return basin["stretch"] + (basin["n"] if basin["nx"] > 0 else 0)
+
+
+@njit
+def spread(rows, turn, nx, wide):
+    """By how much cells are stretched, of a grid from columns or rows."""
+    for j in range(wide.size // nx):
+        for i in range(nx):
+            wide[j * nx + i] = rows[j if turn == 1 else i]
+
+
+@njit
+def multiply(values, factors, products):
+    """products = values * factors; either may be the same array as another."""
+    for i in range(products.size):
+        products[i] = values[i] * factors[i]
 
 
 @njit
 def stretch_cells(tables, basin, y):
     """By how much cells are stretched, and areas, with walls where they are; of grids widths and patches too."""
-    plane, walls, at = tables.plane, tables.walls, basin["stretch"]
+    plane, walls, at, n = tables.plane, tables.walls, rows_of(basin), basin["n"]
     many, lines = across(basin)
+    rows, wide = plane[at : at + many], plane[basin["stretch"] : basin["stretch"] + n]
     for i in range(many):
-        plane[at + i] = 1.0
+        rows[i] = 1.0
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
-        weights = walls[k]["weights"] + lines
+        weights, travel = plane[walls[k]["weights"] + lines :], y[walls[k]["y"]]
         for i in range(many):
-            plane[at + i] += plane[weights + i] * y[walls[k]["y"]]
-    for i in range(basin["n"]):
-        plane[basin["area"] + i] = plane[basin["drawn"] + i] * stretched(plane, basin, i)
+            rows[i] += weights[i] * travel
+    if basin["nx"] > 0:
+        spread(rows, basin["turn"], basin["nx"], wide)
+    multiply(plane[basin["drawn"] :], wide, plane[basin["area"] : basin["area"] + n])
     if basin["nx"] == 0:
         return
     spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
@@ -93,21 +125,43 @@ def stretch_patch(tables, basin, patch):
 @njit(forceinline=True)
 def stretched(plane, basin, i):
     """Area of cell i over that as drawn."""
-    return plane[basin["stretch"] + row_across(basin, i)]
+    return plane[basin["stretch"] + i]
 
 
 @njit
 def see_cells(tables, basin, y, seen):
     """U - U0 of all cells, from what they contain: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
     plane, n, first = tables.plane, basin["n"], basin["y"]
-    for i in range(n):
-        wide = stretched(plane, basin, i)
-        rest = plane[basin["plan"] + i] if basin["deep"] == 1 else basin["density"]
-        share = 1.0 / wide
-        seen[first + i] = (y[first + i] - rest * (wide - 1.0)) * share
-        seen[first + n + i], seen[first + 2 * n + i] = y[first + n + i] * share, y[first + 2 * n + i] * share
-    for k in range(basin["carried"], basin["carried"] + tables.scalars.size * n if basin["carried"] >= 0 else -1):
-        seen[k] = y[k] / stretched(plane, basin, (k - basin["carried"]) % n)
+    wide = plane[basin["stretch"] : basin["stretch"] + n]
+    if basin["deep"] == 1:
+        see_depths(plane[basin["plan"] :], wide, y[first:], seen[first:])
+    else:
+        see_densities(basin["density"], wide, y[first:], seen[first:])
+    many = tables.scalars.size if basin["carried"] >= 0 else 0
+    for q in range(1, 3 + many):
+        at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
+        divide(y[at:], wide, seen[at : at + n])
+
+
+@njit
+def see_depths(rest, wide, content, seen):
+    """Deviations of depths from those at rest."""
+    for i in range(wide.size):
+        seen[i] = (content[i] - rest[i] * (wide[i] - 1.0)) / wide[i]
+
+
+@njit
+def see_densities(rest, wide, content, seen):
+    """Deviations of densities from that at rest."""
+    for i in range(wide.size):
+        seen[i] = (content[i] - rest * (wide[i] - 1.0)) / wide[i]
+
+
+@njit
+def divide(content, wide, seen):
+    """seen = content / wide."""
+    for i in range(seen.size):
+        seen[i] = content[i] / wide[i]
 
 
 @njit
@@ -138,7 +192,7 @@ def drive_lines(t, y, dydt, out, handle):
                 dydt[walls[k]["y"]] = speed
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
         for i in range(many):
-            if not plane[basin["stretch"] + i] > ROOM:
+            if not plane[rows_of(basin) + i] > ROOM:
                 out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
         for i in range(many if basin["nx"] > 0 else 0):
             most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
@@ -210,12 +264,10 @@ def swell(t, y, dydt, out, handle):
         if basin["walls"] == 0:
             continue
         n, many = basin["n"], tables.scalars.size if basin["carried"] >= 0 else 0
-        for i in range(n):
-            wide = stretched(tables.plane, basin, i)
-            for q in range(3):
-                dydt[basin["y"] + q * n + i] *= wide
-            for q in range(many):
-                dydt[basin["carried"] + q * n + i] *= wide
+        wide = tables.plane[basin["stretch"] :]
+        for q in range(3 + many):
+            at = basin["y"] + q * n if q < 3 else basin["carried"] + (q - 3) * n
+            multiply(dydt[at:], wide, dydt[at : at + n])
 
 
 @njit

@@ -76,7 +76,8 @@ def as_it_is(mesh, points):
 @pytest.mark.parametrize("many", [(12, 4), (40, 9)])
 def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(tmp_path, kind, many):
     patches = {"west": {"travel": straight(0.2), "zone": 0.7}, "east": {"travel": straight(-0.3)}}
-    case = scene({"b": pool(tub(tmp_path, kind, many), patches)}, {}, 1.0, {**STEPPED, "step": 0.01})
+    case = scene({"b": pool(tub(tmp_path, kind, many), patches)}, {}, 1.0, {**STEPPED, "step": 0.01},
+                 scalars={"dye": {"initial": 1.0, "diffusivity": 1e-3}})  # fmt: skip
     model = build(load(case))
     basin, y = model.basins[0], model.start.copy()
     y[[int(row["y"]) for row in model.tables.walls]] = 0.2, -0.3
