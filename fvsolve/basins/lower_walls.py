@@ -58,7 +58,7 @@ def lower_lines(draft, basin, row) -> None:
         lower_corners(draft, basin, row, axis)
         return
     drawn = 1.0 / np.diff((mesh.grid.x, mesh.grid.y)[axis])
-    row["stretch"] = draft.to_plane(np.concatenate([np.ones(drawn.size), drawn, np.ones(mesh.grid.nx)]))
+    row["stretch"] = draft.to_plane(np.concatenate([np.ones(basin.n + drawn.size), drawn]))
     row["lines"] = draft.to_plane(np.zeros(drawn.size + 1 + BESIDE))
 
 

@@ -29,6 +29,7 @@ from fvsolve.basins.faces import (
     NY,
     REACH,
     SHARE,
+    TINY,
     WX,
     WY,
     blocks,
@@ -38,7 +39,11 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
 
 START, STOP, BEYOND, ENDS = range(4)
-ROOM = 3 * BLOCK  # floats that sums of a block take
+# rows of BLOCK in the room of a block: sums over sides, 1 / area, centre; of one side its ends, the centre beyond, 1
+# where there is a cell, length
+_XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LONG = (k * BLOCK for k in range(14))
+ROOM = 14 * BLOCK
+_NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in (NX, NY, REACH, DX, DY, WX, WY))
 
 
 @njit(forceinline=True)
@@ -105,52 +110,92 @@ def put_centres(first, last, corners, x, y, cx, cy):
 
 
 @njit
-def put_side(first, start, stop, beyond, x, y, cx, cy, area, geo, far, sums):
-    """Measures of one side of each cell of a block, and sums over sides of what a plane is fitted to."""
+def gather_cells(area, cx, cy, room):
+    """1 / areas and centres of a block of cells; sums over their sides begin."""
     for i in range(BLOCK):
-        a, b, c = start[i], stop[i], first + i
-        if a == b:
-            continue
-        dx, dy = x[b] - x[a], y[b] - y[a]
-        length = sqrt(dx * dx + dy * dy)
-        nx, ny = dy / length, (0.0 - dx) / length
-        to_x, to_y = 0.5 * (x[a] + x[b]) - cx[c], 0.5 * (y[a] + y[b]) - cy[c]
-        back = 2.0 * (to_x * nx + to_y * ny)  # to the mirror image
-        ax, ay = back * nx, back * ny
-        if beyond[i] >= 0:
-            ax, ay = cx[beyond[i]] - cx[c], cy[beyond[i]] - cy[c]
-        share, gap, weight = 1.0 / area[c], 1.0 / (ax * nx + ay * ny), 1.0 / (ax * ax + ay * ay)
-        geo[NX * BLOCK + i], geo[NY * BLOCK + i], geo[REACH * BLOCK + i] = nx, ny, length * share
-        geo[DX * BLOCK + i], geo[DY * BLOCK + i] = to_x, to_y
-        geo[WX * BLOCK + i], geo[WY * BLOCK + i] = weight * ax, weight * ay
-        far[SHARE * BLOCK + i], far[GAP * BLOCK + i] = share, gap
-        far[LEAN_X * BLOCK + i], far[LEAN_Y * BLOCK + i] = nx - ax * gap, ny - ay * gap
-        sums[i] += weight * ax * ax
-        sums[BLOCK + i] += weight * ax * ay
-        sums[2 * BLOCK + i] += weight * ay * ay
+        room[i], room[_XY + i], room[_YY + i], room[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
+    for i in range(area.size):
+        room[_SHARE + i], room[_CX + i], room[_CY + i] = 1.0 / area[i], cx[i], cy[i]
 
 
 @njit
-def weigh_side(sums, geo):
-    """Weights of a side's difference in the gradient, once the sums are known."""
+def gather_ends(start, stop, beyond, x, y, cx, cy, room):
+    """Where a side of each cell of a block begins and ends, the centre beyond, and whether there is a cell there."""
     for i in range(BLOCK):
-        xx, xy, yy = sums[i], sums[BLOCK + i], sums[2 * BLOCK + i]
-        wx, wy = geo[WX * BLOCK + i], geo[WY * BLOCK + i]
-        scale = 1.0 / max(xx * yy - xy * xy, 1e-300)
-        geo[WX * BLOCK + i], geo[WY * BLOCK + i] = scale * (yy * wx - xy * wy), scale * (xx * wy - xy * wx)
+        a, b, other = start[i], stop[i], max(beyond[i], 0)
+        room[_XA + i], room[_YA + i], room[_XB + i], room[_YB + i] = x[a], y[a], x[b], y[b]
+        room[_OX + i], room[_OY + i], room[_INSIDE + i] = cx[other], cy[other], 1.0 if beyond[i] >= 0 else 0.0
+
+
+@njit
+def put_side(room, geo):
+    """Measures of one side of each cell of a block, and sums over sides of what a plane is fitted to."""
+    for i in range(BLOCK):
+        xa, ya, xb, yb, cx, cy = (
+            room[_XA + i], room[_YA + i], room[_XB + i], room[_YB + i], room[_CX + i], room[_CY + i]
+        )  # fmt: skip
+        dx, dy = xb - xa, yb - ya
+        long = sqrt(dx * dx + dy * dy)
+        there = long > 0.0  # else a side that the cell has not
+        per = 1.0 / (long + TINY)
+        nx, ny = per * dy if there else 1.0, 0.0 - per * dx
+        to_x, to_y = 0.5 * (xa + xb) - cx if there else 0.0, 0.5 * (ya + yb) - cy if there else 0.0
+        back = 2.0 * (to_x * nx + to_y * ny)  # to the mirror image
+        inside = room[_INSIDE + i] > 0.0
+        ax, ay = room[_OX + i] - cx if inside else back * nx, room[_OY + i] - cy if inside else back * ny
+        weight = 1.0 / (ax * ax + ay * ay) if there else 0.0
+        room[_LONG + i] = long
+        geo[_NX + i], geo[_NY + i], geo[_REACH + i] = nx, ny, long * room[_SHARE + i]
+        geo[_DX + i], geo[_DY + i] = to_x, to_y
+        geo[_WX + i], geo[_WY + i] = weight * ax, weight * ay
+        room[i] += weight * ax * ax
+        room[_XY + i] += weight * ax * ay
+        room[_YY + i] += weight * ay * ay
+
+
+@njit
+def put_distance(room, geo, far):
+    """What scalars that are carried or spread want of the same side."""
+    for i in range(BLOCK):
+        nx, ny = geo[_NX + i], geo[_NY + i]
+        back = 2.0 * (geo[_DX + i] * nx + geo[_DY + i] * ny)
+        inside, there = room[_INSIDE + i] > 0.0, room[_LONG + i] > 0.0
+        ax = room[_OX + i] - room[_CX + i] if inside else back * nx
+        ay = room[_OY + i] - room[_CY + i] if inside else back * ny
+        gap = 1.0 / (ax * nx + ay * ny) if there else 0.0
+        far[SHARE * BLOCK + i], far[GAP * BLOCK + i] = room[_SHARE + i] if there else 0.0, gap
+        far[LEAN_X * BLOCK + i] = nx - ax * gap if there else 0.0
+        far[LEAN_Y * BLOCK + i] = ny - ay * gap if there else 0.0
+
+
+@njit
+def invert(room):
+    """The matrix that makes gradients of sums over sides."""
+    for i in range(BLOCK):
+        xx, xy, yy = room[i], room[_XY + i], room[_YY + i]
+        scale = 1.0 / max(xx * yy - xy * xy, TINY)
+        room[i], room[_XY + i], room[_YY + i] = scale * yy, scale * xy, scale * xx
+
+
+@njit
+def weigh_side(room, geo):
+    """Weights of a side's difference in the gradient."""
+    for i in range(BLOCK):
+        wx, wy, cross = geo[_WX + i], geo[_WY + i], room[_XY + i]
+        geo[_WX + i], geo[_WY + i] = room[i] * wx - cross * wy, room[_YY + i] * wy - cross * wx
 
 
 @njit
 def move_sides(tables, basin):
     """All that `faces` reads of sides, where anything moves."""
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
-    x, y, _, cx, cy, sums = places_of(tables.plane, basin)
+    x, y, _, cx, cy, room = places_of(tables.plane, basin)
     area = tables.plane[basin["area"] :]
     stirs, corners, ends = ends_of(tables.integers, basin)
     slots, n, f, b = integers[0], integers[1], integers[2], integers[3]
     m = stirs.size * slots * BLOCK
     lies = HEAD + INDICES * m // 2 + stirs.size
-    edges, face = integers[lies : lies + b], integers[lies + 2 * b :]
+    edges, number, face = integers[lies : lies + b], integers[lies + b : lies + 2 * b], integers[lies + 2 * b :]
     lengths, distances = floats[MEASURES * m + 2 * b :], floats[MEASURES * m + 2 * b + f :]
     for j in range(stirs.size):
         if stirs[j] == 1:
@@ -158,30 +203,32 @@ def move_sides(tables, basin):
     for j in range(stirs.size):
         if stirs[j] == 0:
             continue
-        for i in range(ROOM):
-            sums[i] = 0.0
+        first, last = j * BLOCK, min((j + 1) * BLOCK, n)
+        gather_cells(area[first:last], cx[first:last], cy[first:last], room)
         for slot in range(j * slots, (j + 1) * slots):
             own, geo = ends[slot * ENDS * BLOCK :], floats[slot * MEASURES * BLOCK :]
-            put_side(
-                j * BLOCK, own, own[STOP * BLOCK :], own[BEYOND * BLOCK :], x, y, cx, cy, area, geo,
-                distances[slot * DISTANCES * BLOCK :], sums,
-            )  # fmt: skip
-            put_lengths(own, own[STOP * BLOCK :], face[slot * BLOCK :], x, y, lengths)
+            gather_ends(own, own[STOP * BLOCK :], own[BEYOND * BLOCK :], x, y, cx, cy, room)
+            put_side(room, geo)
+            if basin["carried"] >= 0:
+                put_distance(room, geo, distances[slot * DISTANCES * BLOCK :])
+            if basin["flows"] >= 0:
+                put_lengths(face[slot * BLOCK :], room[_LONG:], lengths)
+        invert(room)
         for slot in range(j * slots, (j + 1) * slots):
-            weigh_side(sums, floats[slot * MEASURES * BLOCK :])
+            weigh_side(room, floats[slot * MEASURES * BLOCK :])
     for q in range(b):
         side = edges[q] // BLOCK
         geo = floats[(side // 4 * slots + side % 4) * MEASURES * BLOCK + edges[q] % BLOCK :]
-        floats[MEASURES * m + q], floats[MEASURES * m + b + q] = geo[NX * BLOCK], geo[NY * BLOCK]
+        floats[MEASURES * m + q], floats[MEASURES * m + b + q] = geo[_NX], geo[_NY]
+        lengths[f - b + number[q]] = geo[_REACH] * area[side // 4 * BLOCK + edges[q] % BLOCK]
 
 
 @njit
-def put_lengths(start, stop, face, x, y, lengths):
+def put_lengths(face, long, lengths):
     """Lengths of faces, from the cells that have them on their left."""
     for i in range(BLOCK):
         if face[i] >= 0:
-            dx, dy = x[stop[i]] - x[start[i]], y[stop[i]] - y[start[i]]
-            lengths[face[i]] = sqrt(dx * dx + dy * dy)
+            lengths[face[i]] = long[i]
 
 
 @njit
@@ -213,7 +260,7 @@ def drive_sides(t, y, dydt, out, handle):
 def put_speeds(tables, basin):
     """Fill them from those of corners; returns the greatest share of a cell that a side sweeps [1/s]."""
     plane, slots, most = tables.plane, tables.integers[basin["links"]], 0.0
-    v, across = plane[basin["lines"] :], (NY if basin["turn"] == 1 else NX) * BLOCK
+    v, across = plane[basin["lines"] :], _NY if basin["turn"] == 1 else _NX
     stirs, _, ends = ends_of(tables.integers, basin)
     for slot in range(stirs.size * slots):
         if stirs[slot // slots] == 0:
@@ -223,7 +270,7 @@ def put_speeds(tables, basin):
         speeds = plane[basin["sides"] + (slot // slots * 4 + slot % slots) * BLOCK :]
         for i in range(BLOCK):
             speeds[i] = 0.5 * (v[start[i]] + v[stop[i]]) * geo[across + i]
-            most = max(most, abs(speeds[i]) * geo[REACH * BLOCK + i])
+            most = max(most, abs(speeds[i]) * geo[_REACH + i])
     return most
 
 

@@ -10,7 +10,7 @@ lines and areas as they are. Corners of other meshes are what lines are to grids
 from math import sqrt
 
 from fvsolve.basins.energy import row_of
-from fvsolve.jit import inner, njit
+from fvsolve.jit import njit
 from fvsolve.kernels.accounts import OF_WALL, wall_rows
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
@@ -46,74 +46,56 @@ def see(t, y, seen, out, handle):
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["walls"] > 0:
-            for i in range(done, basin["y"]):
-                seen[i] = y[i]
             stretch_cells(tables, basin, y)
-            done = see_cells(tables, basin, y, seen)
-    for i in range(done, y.size):
-        seen[i] = y[i]
+            copy(y[done : basin["y"]], seen[done:])
+            see_cells(tables, basin, y, seen)
+            done = basin["y"] + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
+    copy(y[done:], seen[done:])
+
+
+@njit
+def copy(source, target):
+    """target = source."""
+    for i in range(source.size):
+        target[i] = source[i]
 
 
 @njit(forceinline=True)
 def rows_of(basin):
-    """How many rows its cells stand in, one of any mesh, and how many in each."""
-    return (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, basin["n"])
+    """Where in `plane` it stands by how much rows are stretched; of grids behind that of cells."""
+    return basin["stretch"] + (basin["n"] if basin["nx"] > 0 else 0)
 
 
-@njit(forceinline=True)
-def widths_of(plane, basin, row):
-    """Where in `plane` the areas of a row of cells over those as drawn stand."""
-    if basin["nx"] == 0 or basin["turn"] == 0:
-        return basin["stretch"]
-    at = basin["stretch"] + 2 * basin["ny"]
-    for i in range(basin["nx"]):
-        plane[at + i] = plane[basin["stretch"] + row]
-    return at
+@njit
+def spread(rows, turn, nx, wide):
+    """By how much cells are stretched, of a grid from columns or rows."""
+    for j in range(wide.size // nx):
+        for i in range(nx):
+            wide[j * nx + i] = rows[j if turn == 1 else i]
 
 
-@inner
-def widen_row(wide, drawn, area):
-    """Areas of a row of cells."""
-    for i in range(area.size):
-        area[i] = drawn[i] * wide[i]
-
-
-@inner
-def see_deviations(wide, rest, held, seen):
-    """U - U0 of a row of cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
-    for i in range(seen.size):
-        seen[i] = (held[i] - rest[i] * (wide[i] - 1.0)) / wide[i]
-
-
-@inner
-def see_values(wide, held, seen):
-    """The same of what is nothing at rest."""
-    for i in range(seen.size):
-        seen[i] = held[i] / wide[i]
-
-
-@inner
-def swell_row(wide, rate):
-    """Rates of what a row of cells contains."""
-    for i in range(rate.size):
-        rate[i] *= wide[i]
+@njit
+def multiply(values, factors, products):
+    """products = values * factors; either may be the same array as another."""
+    for i in range(products.size):
+        products[i] = values[i] * factors[i]
 
 
 @njit
 def stretch_cells(tables, basin, y):
     """By how much cells are stretched, and areas, with walls where they are; of grids widths and patches too."""
-    plane, walls, at = tables.plane, tables.walls, basin["stretch"]
+    plane, walls, at, n = tables.plane, tables.walls, rows_of(basin), basin["n"]
     many, lines = across(basin)
+    rows, wide = plane[at : at + many], plane[basin["stretch"] : basin["stretch"] + n]
     for i in range(many):
-        plane[at + i] = 1.0
+        rows[i] = 1.0
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
-        weights = walls[k]["weights"] + lines
+        weights, travel = plane[walls[k]["weights"] + lines :], y[walls[k]["y"]]
         for i in range(many):
-            plane[at + i] += plane[weights + i] * y[walls[k]["y"]]
-    rows, wide = rows_of(basin)
-    for row in range(rows):
-        k, a, z = widths_of(plane, basin, row), basin["drawn"] + row * wide, basin["area"] + row * wide
-        widen_row(plane[k : k + wide], plane[a : a + wide], plane[z : z + wide])
+            rows[i] += weights[i] * travel
+    if basin["nx"] > 0:
+        spread(rows, basin["turn"], basin["nx"], wide)
+    multiply(plane[basin["drawn"] :], wide, plane[basin["area"] : basin["area"] + n])
     if basin["nx"] == 0:
         return
     spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
@@ -143,27 +125,43 @@ def stretch_patch(tables, basin, patch):
 @njit(forceinline=True)
 def stretched(plane, basin, i):
     """Area of cell i over that as drawn."""
-    return plane[basin["stretch"] + row_across(basin, i)]
+    return plane[basin["stretch"] + i]
 
 
 @njit
 def see_cells(tables, basin, y, seen):
-    """Deviations and values of all cells, from what they contain; returns where its states end."""
-    plane, n, first, (rows, wide) = tables.plane, basin["n"], basin["y"], rows_of(basin)
-    many = 3 + (tables.scalars.size if basin["carried"] >= 0 else 0)  # amounts stand behind quantities
-    for row in range(rows):
-        k = widths_of(plane, basin, row)
-        width, at = plane[k : k + wide], row * wide
-        if basin["deep"] == 1:
-            rest = plane[basin["plan"] + at : basin["plan"] + at + wide]
-            see_deviations(width, rest, y[first + at : first + at + wide], seen[first + at : first + at + wide])
-        else:
-            for i in range(first + at, first + at + wide):
-                seen[i] = (y[i] - basin["density"] * (width[i - first - at] - 1.0)) / width[i - first - at]
-        for q in range(1, many):
-            a = first + q * n + at
-            see_values(width, y[a : a + wide], seen[a : a + wide])
-    return first + many * n
+    """U - U0 of all cells, from what they contain: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    plane, n, first = tables.plane, basin["n"], basin["y"]
+    wide = plane[basin["stretch"] : basin["stretch"] + n]
+    if basin["deep"] == 1:
+        see_depths(plane[basin["plan"] :], wide, y[first:], seen[first:])
+    else:
+        see_densities(basin["density"], wide, y[first:], seen[first:])
+    many = tables.scalars.size if basin["carried"] >= 0 else 0
+    for q in range(1, 3 + many):
+        at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
+        divide(y[at:], wide, seen[at : at + n])
+
+
+@njit
+def see_depths(rest, wide, content, seen):
+    """Deviations of depths from those at rest."""
+    for i in range(wide.size):
+        seen[i] = (content[i] - rest[i] * (wide[i] - 1.0)) / wide[i]
+
+
+@njit
+def see_densities(rest, wide, content, seen):
+    """Deviations of densities from that at rest."""
+    for i in range(wide.size):
+        seen[i] = (content[i] - rest * (wide[i] - 1.0)) / wide[i]
+
+
+@njit
+def divide(content, wide, seen):
+    """seen = content / wide."""
+    for i in range(seen.size):
+        seen[i] = content[i] / wide[i]
 
 
 @njit
@@ -194,7 +192,7 @@ def drive_lines(t, y, dydt, out, handle):
                 dydt[walls[k]["y"]] = speed
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
         for i in range(many):
-            if not plane[basin["stretch"] + i] > ROOM:
+            if not plane[rows_of(basin) + i] > ROOM:
                 out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
         for i in range(many if basin["nx"] > 0 else 0):
             most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
@@ -265,12 +263,11 @@ def swell(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["walls"] == 0:
             continue
-        many, (rows, wide) = 3 + (tables.scalars.size if basin["carried"] >= 0 else 0), rows_of(basin)
-        for row in range(rows):
-            k = widths_of(tables.plane, basin, row)
-            for q in range(many):
-                a = basin["y"] + q * basin["n"] + row * wide
-                swell_row(tables.plane[k : k + wide], dydt[a : a + wide])
+        n, many = basin["n"], tables.scalars.size if basin["carried"] >= 0 else 0
+        wide = tables.plane[basin["stretch"] :]
+        for q in range(3 + many):
+            at = basin["y"] + q * n if q < 3 else basin["carried"] + (q - 3) * n
+            multiply(dydt[at:], wide, dydt[at : at + n])
 
 
 @njit

@@ -465,7 +465,7 @@ BASIN = np.dtype(
         ("wall", "i8"),  # first of its walls that move, and
         ("walls", "i8"),  # how many these are; with any, its states are contents, see `basins.walls`
         ("drawn", "i8"),  # offsets in `plane`: areas of cells as drawn; else those of cells now
-        ("stretch", "i8"),  # area of cells over that as drawn
+        ("stretch", "i8"),  # area of cells over that as drawn; of a grid then of its columns or rows
         ("lines", "i8"),  # speeds of lines, of a mesh of its corners [m/s]
         ("thrust", "i8"),  # and in `work`: on faces of the boundary, see `free_surface.grid`
         ("turn", "i8"),  # 0 where lines along x move, 1 where those along y do
