@@ -15,6 +15,7 @@ from fvsolve.solve.soundness import Soundness, parted
 from fvsolve.solve.summary import (
     Event,
     Summary,
+    drifts,
     find_cavities,
     find_envelope,
     find_extremes,
@@ -356,6 +357,7 @@ class Run:
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         told = [notice for one in self.watches for notice in one.notices()]
         warnings = [*told, *self.soundness.warnings(ledgers), *run_downs(self.slate)]
+        warnings += drifts(model, loop.now)
         warnings += parted(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(

@@ -11,6 +11,8 @@ from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, Slate
 
+DRIFT = 1e-6  # of the length of Euler parameters, beyond which it is said
+
 
 @dataclass(frozen=True)
 class Mark:
@@ -122,6 +124,22 @@ def run_downs(slate: Slate) -> list[Notice]:
             text = (f"{name}: it runs down, from {time:.6g} s on beyond its curve's last flow, where its head is "
                     "that of a parabola; suter in place of curve would tell it")  # fmt: skip
             found.append(Notice("range", f"links.{name}", text, "curve"))
+    return found
+
+
+def drifts(model: Model, y: np.ndarray) -> list[Notice]:
+    """Bodies whose Euler parameters are no longer of length 1, as steps leave them: a measure of these, no more."""
+    found = []
+    for name, row in zip(model.body_names, model.tables.bodies, strict=True):
+        if row["joint"] not in (rec.BALL, rec.FREE):
+            continue
+        first = 3 if row["joint"] == rec.FREE else 0
+        at = int(row["y"]) + first
+        length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
+        if abs(length - 1.0) > DRIFT:
+            text = (f"{name}: its Euler parameters have drifted to a length of {length:.9g}, by which they are "
+                    "divided; its attitude is off by about as much, and gauss-4 would keep it")  # fmt: skip
+            found.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
     return found
 
 

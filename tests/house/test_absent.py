@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from truth.bodies import bodies, pendulum
 from truth.folders import CASES
 from truth.scenes import WATER, chamber, junction, pipe, reservoir, scene, tank, valve
 
@@ -18,13 +19,14 @@ from fvsolve.steppers import slots
 
 PIPES = {"pipes", "ends", "reconstruction", "limiters", "leap"}
 MASSES = {"masses"}
+BODIES = {"joints", "matrix", "room", "pins", "bushings"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"memory"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
 CAVITIES = {"cavitating", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
 SCALARS = {"scalars", "mixing"}
-ALL = SCALARS | PIPES | MASSES | DEVICES | MEMORY | CAVITIES | IMPLICIT
+ALL = SCALARS | PIPES | MASSES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
 def compiled_with(*functions) -> set[str]:
@@ -98,7 +100,9 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
     assert found & ALL == CAVITIES | {"reconstruction", "limiters"}
     cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
-    assert files(cylinder) & (PIPES | MASSES) == MASSES
+    assert files(cylinder) & (PIPES | MASSES | BODIES) == MASSES
+    arm = fvsolve.build(fvsolve.load(bodies({"arm": pendulum()}, 1.0)))
+    assert files(arm) & BODIES == BODIES - {"pins", "bushings"} and not files(arm) & PIPES
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from truth.scenes import AMBIENT, GRAVITY, scene
 from truth.trees import body, random_tree, turn
 
 import fvsolve
-from fvsolve.studies import energy
+from fvsolve.studies import energy, linearise, stability
 
 
 def run(case, **more):
@@ -656,6 +656,40 @@ def test_a_run_broken_off_and_resumed_is_the_unbroken_one(method, step, tmp_path
     resumed = run(case, out=tmp_path / "broken", resume=True)
     assert 0.0 < calls[1] < 0.1 and resumed.ledger == whole.ledger
     assert np.array_equal(resumed["boom.angle"], whole["boom.angle"])
+
+
+def test_linearised_a_locked_crane_swings_at_its_frequency_and_fails_where_predicted():
+    """Eigenvalues of the whole right-hand side, and the step at which RK4 grows: 2.83 / w, by `stability` and run."""
+    crane = Crane()
+    case = crane.case(0.5, [], "log", joint={"rate": 1e-6}, method="rk4", step=1e-3)
+    values = np.linalg.eigvals(linearise(case).a)
+    stiffness = (
+        crane.spring() * crane.lever**2 + crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance
+    )
+    w = math.sqrt(stiffness / crane.inertia)
+    assert np.sort(values.imag)[[0, -1]] == approx([-w, w], rel=1e-6)
+    (found,) = stability(case).rows
+    assert found.eigenvalues == approx(math.sqrt(8.0) / w, rel=1e-6)
+    assert found.measured == approx(found.predicted, rel=0.05)
+
+
+def test_a_body_whose_parameters_drift_says_so():
+    nodes = {"stone": STONE}
+    result = run({**bodies(nodes, 8.0, [], method="rk4", step=0.2), **WEIGHTLESS})
+    (told,) = [one for one in result.warnings if one.kind == "drift"]
+    assert told.place == "nodes.stone" and 1e-6 < abs(told.value) < 0.1 and told.ok
+    result = run({**bodies(nodes, 8.0, [], method="gauss-4", step=0.2), **WEIGHTLESS})
+    assert not [one for one in result.warnings if one.kind == "drift"]
+
+
+def test_a_controller_may_hold_forces_on_bodies():
+    links = {"load": {"type": "force", "to": "arm.bob", "force": 0.0, "direction": [1, 0, 0]},
+             "motor": {"type": "torque", "to": "arm", "torque": 0.0, "axis": [0, 1, 0]}}  # fmt: skip
+    model = fvsolve.build(fvsolve.load(bodies({"arm": pendulum(0.0)}, 1.0, [], links)))
+    state = fvsolve.initial_state(model)
+    held = fvsolve.advance(model, state, 1e-4, inputs={"load.force": 3.0, "motor.torque": 0.7})
+    rate = held.y[model.state_names.index("arm.rate")]
+    assert rate == approx((-3.0 * 0.7 + 0.7) / (2.0 * 0.49) * 1e-4, rel=1e-6)
 
 
 def test_a_tree_far_from_the_origin_moves_as_one_near_it():
