@@ -43,7 +43,8 @@ GX, GY, GN, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n, W and dW/dt in its
 SURFACE = 21  # offsets in `plane`: of surfaces as drawn, and of places of columns and rows, or of cells
 PLACES = 22
 DOWN = 23  # gravity alone, three numbers
-FRAME = 26  # numbers
+LEVEL = 26  # of the water at rest above its origin [m]
+FRAME = 27  # numbers
 
 
 @njit
@@ -167,8 +168,9 @@ def push_row(x, rest, dh, qx, qy, twice, east, north, turn, rate_x, rate_y):
 
 @njit(forceinline=True)
 def ground(plane, basin, i):
-    """Height of the bed of cell i above the level at rest, in axes of its basin [m]."""
-    return plane[int(plane[basin["frame"] + SURFACE]) + i] - plane[basin["plan"] + i]
+    """Height of the bed of cell i above the origin of its basin [m]."""
+    at = basin["frame"]
+    return plane[int(plane[at + SURFACE]) + i] - plane[basin["plan"] + i] + plane[at + LEVEL]
 
 
 @njit
@@ -179,6 +181,7 @@ def load_body(tables, basin, b, y, rates, first, out):
     dx = dy = dxx = dxy = dyy = 0.0  # their rates
     qx = qy = turn = fx = fy = spin = 0.0  # momentum, its moment about z, and their rates
     nx, places = basin["nx"], int(plane[basin["frame"] + PLACES])
+    level = plane[basin["frame"] + LEVEL]
     surface, rows, wide = int(plane[basin["frame"] + SURFACE]), basin["ny"] if nx > 0 else n, nx if nx > 0 else 1
     for row in range(rows):
         z = plane[places + (nx if nx > 0 else n) + row]
@@ -193,7 +196,7 @@ def load_body(tables, basin, b, y, rates, first, out):
             d0, d1, d2 = d0 + more, d1 + more * x, d2 + more * x * x
             p0, v0, v1 = p0 + per * y[o + n + i], v0 + v, v1 + v * x
             p1, f0, f1 = p1 + per * rates[first + n + i], f0 + dv, f1 + dv * x
-            g0 += mass * (plane[surface + i] - plane[basin["plan"] + i] + 0.5 * depth)
+            g0 += mass * (plane[surface + i] - plane[basin["plan"] + i] + level + 0.5 * depth)
         m, sx, sy, lever = m + r0, sx + r1, sy + r0 * z, lever + g0
         xx, xy, yy = xx + r2, xy + r1 * z, yy + r0 * z * z
         dx, dy, dxx, dxy, dyy = dx + d1, dy + d0 * z, dxx + d2, dxy + d1 * z, dyy + d0 * z * z

@@ -224,6 +224,13 @@ class BasinRows:
         """Areas of cells over those as drawn, in a state of a model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
+    def normal_at(self, out: np.ndarray, layout) -> np.ndarray:
+        """Of what rides on a body, its normal in the world, for each cell : float64[n, 3]."""
+        from fvsolve.basins.lower_frames import corners
+
+        ends = corners(self, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), out, layout)
+        return np.tile(ends[1] - ends[0], (self.n, 1))
+
     def points_at(self, y: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
         """Corners of cells in a state of a model, of what rides on a body in the world : float64[p, 3] [m]."""
         x, z = np.ascontiguousarray(self.mesh.points.T)

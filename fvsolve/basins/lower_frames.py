@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.frames import FRAME, PLACES, SURFACE
+from fvsolve.basins.frames import FRAME, LEVEL, PLACES, SURFACE
 from fvsolve.case.riding import free_joints
 
 ENOUGH = 200  # halvings
@@ -23,6 +23,7 @@ def lower_frame(draft, basin, row) -> None:
         places = np.concatenate([0.5 * (one[1:] + one[:-1]) for one in (grid.x, grid.y)])
     numbers = np.zeros(FRAME)
     numbers[:3] = part.at or (0.0, 0.0, 0.0)
+    numbers[LEVEL] = part.level
     numbers[3:12] = attitude_of(part).ravel()
     numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
     numbers[PLACES] = draft.to_plane(places)

@@ -139,7 +139,8 @@ class _Reader:
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
-            self.add(basins.misfits(*parts.values(), meshes, properties, (numerics.start, numerics.end)))
+            self.add(basins.misfits(*parts.values(), meshes, properties, (numerics.start, numerics.end),
+                                     self.group("nodes")))  # fmt: skip
             self.add(check.claims(expect, numerics))
             carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
             numerics = numerics.filled(has_cells, carries)

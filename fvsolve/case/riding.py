@@ -16,7 +16,7 @@ from fvsolve.units import show
 Found = Iterator[tuple[tuple, str]]
 
 
-def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str]) -> Found:
+def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], named: Any = ()) -> Found:
     """Faults of a basin that rides on a body."""
     key = ("nodes", name)
     if basin.on is None:
@@ -26,7 +26,8 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str]) -> F
         if "sloshing" in basin.model_fields_set:
             yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
         return
-    yield from (((*key, "on"), text) for text in body_faults(basin.on, nodes))
+    if basin.on in nodes or basin.on not in named:  # else at fault itself
+        yield from (((*key, "on"), text) for text in body_faults(basin.on, nodes))
     if basin.elevation is not None:
         yield (*key, "elevation"), f"it rides on {basin.on}; say where with at, in axes of that body"
     if not basin.own.rides:

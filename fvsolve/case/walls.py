@@ -54,7 +54,13 @@ def widened(mesh: Any, axis: int, goes: np.ndarray) -> np.ndarray:
 
 
 def misfits(
-    name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str], times: tuple[float, float]
+    name: str,
+    basin: Any,
+    mesh: Any,
+    nodes: dict[str, Any],
+    joined: set[str],
+    times: tuple[float, float],
+    named: Any,
 ) -> Iterator[tuple[tuple, str]]:
     """Faults of walls that move; times : of start and end [s]."""
     key = ("nodes", name, "patches")
@@ -63,7 +69,9 @@ def misfits(
             yield (*key, patch, "zone"), "goes with a wall that moves; give it body or travel"
     walls = {patch: one for patch, one in moving(basin).items() if patch in mesh.patches[:-1]}
     for patch, one in walls.items():
-        yield from (((*key, patch, *below), text) for below, text in wall_faults(basin, mesh, patch, one, nodes, times))
+        yield from (
+            ((*key, patch, *below), text) for below, text in wall_faults(basin, mesh, patch, one, nodes, times, named)
+        )
         if f"{name}.{patch}" in joined:
             yield (*key, patch), "a link joins here, and it is a wall that moves; join a patch that stands still"
     yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls))
@@ -71,7 +79,9 @@ def misfits(
         yield ("nodes", name, "holes"), "would be drawn out where lines move; wanted none beside a wall that moves"
 
 
-def wall_faults(basin: Any, mesh: Any, patch: str, one: Any, nodes: dict, times: tuple) -> Iterator[tuple[tuple, str]]:
+def wall_faults(
+    basin: Any, mesh: Any, patch: str, one: Any, nodes: dict, times: tuple, named: Any
+) -> Iterator[tuple[tuple, str]]:
     """Faults of one wall, as keys below it."""
     if not basin.own.moves:
         yield (), f"walls do not move in physics {show(basin.physics)}"
@@ -80,7 +90,7 @@ def wall_faults(basin: Any, mesh: Any, patch: str, one: Any, nodes: dict, times:
             yield (other,), "goes with what waves or water pass, and this is a wall that moves; leave it out"
     if one.span is not None:
         yield ("span",), "a wall that moves is all of a side; leave span out"
-    if one.body is not None:
+    if one.body is not None and (one.body in nodes or one.body not in named):  # else at fault itself
         yield from ((("body",), text) for text in body_faults(one.body, nodes))
     normals = mesh.normal[mesh.patch(patch)]
     if np.ptp(normals, axis=0).max() > 1e-9 or np.abs(normals[0]).max() < 1.0 - 1e-9:

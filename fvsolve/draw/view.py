@@ -133,6 +133,10 @@ class Canvas:
             mesh = read(file, self.field)
             if "depth" in mesh.cell_data:
                 self.basin(plotter, mesh)
+            elif "body" in mesh.cell_data and (self.field != "speed" or self.water):
+                shape = limbs(mesh, self.box)
+                if shape.n_points:  # there are bodies without extent
+                    plotter.add_mesh(shape, color=INK)
             elif self.field in mesh.cell_data:
                 plane = not are_pipes(mesh)
                 mesh.points[:, 2] *= self.rise
@@ -234,18 +238,26 @@ def are_pipes(mesh: Any) -> bool:
 
 def box(mesh: Any) -> list[float]:
     """How far a frame reaches, water included: x, y, z, least and greatest of each."""
-    if are_pipes(mesh):
+    if are_pipes(mesh) and "body" not in mesh.cell_data:
         lower(mesh.points)
     found = list(mesh.bounds)
     if "surface" in mesh.cell_data:
-        found[5] = max(found[5], float(mesh["surface"].max()))
+        found[5] = max(found[5], float((mesh["depth"] + mesh.points[:, 2].max() if "normal" in mesh.cell_data
+                                        else mesh["surface"]).max()))  # fmt: skip
     return found
 
 
 def tube(mesh: Any) -> Any:
-    """Pipes as tubes."""
-    lower(mesh.points)
+    """Pipes as tubes, or bodies."""
+    if "body" not in mesh.cell_data:
+        lower(mesh.points)
     return mesh.extract_surface(algorithm=None).tube(radius=TUBE * max(mesh.length, 1e-9))
+
+
+def limbs(mesh: Any, box: list[float]) -> Any:
+    """Bodies and what pushes between them as tubes."""
+    reach = math.dist(box[::2], box[1::2])
+    return mesh.extract_surface(algorithm=None).tube(radius=TUBE * max(reach, 1e-9))
 
 
 def raised(mesh: Any, rise: float) -> Any:
@@ -253,7 +265,10 @@ def raised(mesh: Any, rise: float) -> Any:
     wet = mesh.threshold(WET, scalars="depth", preference="cell")
     if wet.n_cells:  # of these alone: the bed of a dry bank is no surface
         wet = wet.cell_data_to_point_data(pass_cell_data=True)
-        wet.points[:, 2] = rise * wet.point_data["surface"]
+        if "normal" in wet.point_data:  # it rides on a body
+            wet.points += wet.point_data["depth"][:, None] * wet.point_data["normal"]
+        else:
+            wet.points[:, 2] = rise * wet.point_data["surface"]
     return wet
 
 
@@ -266,7 +281,10 @@ def sides(water: Any, rise: float) -> Any:
         boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )  # fmt: skip
     low = rim.points.copy()
-    low[:, 2] = rise * rim.point_data["bed"]
+    if "normal" in rim.point_data:
+        low -= rim.point_data["depth"][:, None] * rim.point_data["normal"]
+    else:
+        low[:, 2] = rise * rim.point_data["bed"]
     ends = rim.lines.reshape(-1, 3)[:, 1:]
     faces = np.column_stack([np.full(len(ends), 4), ends, ends[:, ::-1] + rim.n_points])
     return pyvista.PolyData(np.vstack([rim.points, low]), faces.ravel())

@@ -328,6 +328,9 @@ class Model(Shown):
             found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
         found["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
                            if basin.moves or basin.part.on is not None}  # fmt: skip
+        for basin in self.basins:
+            if basin.part.on is not None:
+                found[basin.name]["normal"] = basin.normal_at(out, self.layout)
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])

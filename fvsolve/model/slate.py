@@ -80,6 +80,7 @@ class Slate:
     def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """`Model.fields`, with the least and greatest pressures of pipes so far."""
         found = self.model.fields(y, out)
+        found["out"] = out
         for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):
             own, cells = found[pipe.name], row["cell"] + np.arange(pipe.cells)
             least, greatest = (self.model.cell_pressure(k, self.envelope[i, cells]) for i in (0, 2))

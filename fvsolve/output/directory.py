@@ -38,7 +38,7 @@ class RunDirectory:
         _refuse_names(model.case)
         self.who = identity(model.case)
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
-        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) > 0
+        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) + len(model.body_names) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():

@@ -44,6 +44,7 @@ class FieldSeries:
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
         self.basins = {basin.name: (*shape(basin, places[basin.name]), units[basin.name]) for basin in model.basins}
+        self.bodies = skeleton_of(model)
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
@@ -58,7 +59,7 @@ class FieldSeries:
         """Keep the first `frames` of a series, drop what came after its checkpoint."""
         listed = self.folder / "fields.pvd"
         lines = listed.read_text(encoding="utf-8").splitlines() if listed.is_file() else []
-        many = frames * (len(self.basins) + (1 if self.pipes else 0))
+        many = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
         kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:many]
         named = [FILE.search(line) for line in kept]
         if len(kept) < many or not all(one and (self.folder / one[1]).is_file() for one in named):
@@ -81,6 +82,11 @@ class FieldSeries:
                 points = np.append(self.places[basin], 0.0) + frame["points"][basin]
             write_frame(self.folder / file, points, cells, found, units)
             self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
+        if self.bodies:
+            file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
+            found = {"body": [self.bodies.whose], "speed": [speed]}
+            write_frame(self.folder / file, points, [("line", self.bodies.lines)], found, {"speed": "m/s"})
+            self._list(f'<DataSet timestep="{float(t)!r}" part="{len(self.basins) + 1}" file="{file}"/>\n')
         if not self.pipes:
             self.frames += 1
             return
@@ -95,6 +101,15 @@ class FieldSeries:
         with open(self.folder / "fields.pvd", "r+b", buffering=0) as file:
             file.seek(-len(TAIL), 2)
             file.write((line + TAIL).encode())
+
+
+def skeleton_of(model):
+    """What is drawn of bodies, None of none."""
+    if not model.body_names:
+        return None
+    from fvsolve.output.skeleton import Skeleton
+
+    return Skeleton(model)
 
 
 def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:

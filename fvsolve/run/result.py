@@ -244,7 +244,9 @@ class Result(Shown):
         if field is None:
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
             basins = [node for node in self.case.nodes.values() if node.kind == "basin"]
+            bodies = any(node.kind == "body" for node in self.case.nodes.values())
             field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
+            field = "speed" if bodies and not pipes and not basins else field
         out = Path(path) if path else self.directory / f"{field}{suffix}"
         frames, what = self._frames(), f"{self.summary['title']}\n{field.replace('_', ' ')}"
         view(

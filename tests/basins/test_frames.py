@@ -177,7 +177,8 @@ FAULTS = {
     "wanted a body: body; did you mean": ({}, {"on": "bdy"}),
     "name that with on": ({}, {"on": None, "at": [0, 0, 1]}),
     "would have to feel what leaves here": (
-        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}}, {"patches": {"gap": {"side": "east", "boundary": "open"}}},
+        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}},
+        {"patches": {"gap": {"side": "east", "boundary": "open"}}},
     ),
     "rides on no body yet": ({}, {"physics": "liquid", "level": None, "pressure": 2e5, "thickness": 0.1}),
     "one of both": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),

@@ -81,8 +81,9 @@ def test_a_tank_on_a_spring_swings_at_the_root_of_the_tangent_law(along):
 
 
 def test_a_free_tank_on_rails_keeps_its_momentum():
-    case = scene({"cart": cart(50.0, rate=0.3), "b": tank(30, start={"level": f"{DEPTH} + 0.03 * cos(1.5 * x)"})}, {}, 2.0,
-                 {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}, [])  # fmt: skip
+    basin = tank(30, start={"level": f"{DEPTH} + 0.03 * cos(1.5 * x)"})
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
+    case = scene({"cart": cart(50.0, rate=0.3), "b": basin}, {}, 2.0, numerics)
     model = build(load(case))
     basin, at = model.basins[0], model.state_names.index("cart.travel_rate")
 
@@ -171,3 +172,43 @@ def test_in_heave_cells_and_frozen_water_are_one():
     cells = run(case)
     case["nodes"]["b"]["sloshing"] = "frozen"
     assert run(case)["cart.z"] == pytest.approx(cells["cart.z"], abs=1e-12)
+
+
+# roll -----------
+
+
+@pytest.mark.parametrize("high", [0.6, -0.4])
+def test_a_hull_rolls_with_its_tank_at_the_root_of_the_closed_form(high):
+    """-w^2 (I + I_f) + K - m g z_m + m (z_b w^2 + g)^2 / w^2 (1 - tan(s) / s) = 0, s = w L / (2 c)."""
+    inertia, stiff, depth = 900.0, 2e4, 0.2
+    c, water = math.sqrt(GRAVITY * depth), RHO * depth * LENGTH
+    frozen, middle = water * (LENGTH**2 / 12.0 + high**2), high + 0.5 * depth
+
+    def law(w):
+        s = 0.5 * w * LENGTH / c
+        slosh = water * (high * w * w + GRAVITY) ** 2 / (w * w) * (1.0 - math.tan(s) / s)
+        return -w * w * (inertia + frozen) + stiff - water * GRAVITY * middle + slosh
+
+    w = brentq(law, 0.3, 0.98 * math.pi * c / LENGTH)
+    a, k = 1e-5, w / c
+    push = -a * (GRAVITY + high * w * w) / w
+    tilt = push * (1.0 - math.cos(k * LENGTH)) / math.sin(k * LENGTH)
+    errors = []
+    for n in (20, 40):
+        hull = {
+            "type": "body", "mass": 100.0, "inertia": [inertia, 500.0, 600.0], "points": {"pin": [0, 0, 0]},
+            "joint": {"kind": "revolute", "axis": [1, 0, 0], "rate": a * w},
+        }  # fmt: skip
+        basin = {
+            "type": "basin", "on": "hull", "at": [-0.5, -0.5 * LENGTH, high], "size": [1.0, LENGTH], "cells": [1, n],
+            "level": depth, "start": {"v": f"{-push} + {push} * cos({k} * y) + {tilt} * sin({k} * y)"},
+        }  # fmt: skip
+        world = {"type": "frame", "points": {"pin": [0, 0, 0]}}
+        links = {"twist": {"type": "bushing", "from": "world.pin", "to": "hull.pin", "stiffness": 1e3,
+                           "rotational_stiffness": stiff}}  # fmt: skip
+        case = scene({"hull": hull, "world": world, "b": basin}, links, 3.0,
+                     {"scheme": "upwind5", "method": "rk4", "step": 0.08 / n}, ["hull.angle"], every=0.02)  # fmt: skip
+        result = run(case)
+        errors.append(np.abs(result["hull.angle"] - a * np.sin(w * result.t)).max() / a)
+    assert errors[1] < errors[0] / 2.5
+    assert errors[1] < 1e-2

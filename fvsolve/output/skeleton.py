@@ -1,0 +1,54 @@
+"""Bodies as lines between what is known of them: origins, centres of mass, points, and what pushes between points.
+
+Knows the tables of a model; knows no file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE, SPIN, VELOCITY
+from fvsolve.kernels.records import BODY_OUT
+
+UNITS = {"body": "-", "speed": "m/s"}
+
+
+class Skeleton:
+    """Points fixed in bodies or in the world, and lines between them; a line belongs to a body, -1 to none.
+
+    owner : int[p]  body of each point, -1 the world; place : float64[p, 3]  in its axes [m]; lines : int[l, 2]
+    """
+
+    def __init__(self, model) -> None:
+        self.model, names = model, model.body_names
+        owner, place, lines, whose = [], [], [], []
+        for i, name in enumerate(names):
+            body, first = model.case.nodes[name], len(owner)
+            ends = [(0.0, 0.0, 0.0), *dict.fromkeys([tuple(body.centre_of_mass), *map(tuple, body.points.values())])]
+            ends = list(dict.fromkeys(ends))
+            owner += [i] * len(ends)
+            place += ends
+            lines += [(first, first + k) for k in range(1, len(ends))] or [(first, first)]
+            whose += [i] * max(len(ends) - 1, 1)
+        for row in model.tables.lines:
+            if min(row["from_point"], row["to_point"]) >= 0:
+                for end in ("from_point", "to_point"):
+                    point = model.tables.points[row[end]]
+                    owner.append(int(point["body"]))
+                    place.append(tuple(point["place"]))
+                lines.append((len(owner) - 2, len(owner) - 1))
+                whose.append(-1)
+        self.owner, self.place = np.array(owner), np.array(place, dtype=float).reshape(-1, 3)
+        self.lines, self.whose = np.array(lines).reshape(-1, 2), np.array(whose, dtype=np.int32)
+
+    def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(points float64[p, 3] [m], speeds of middles of lines float64[l] [m/s]) where bodies are as `out` says."""
+        first, many = int(self.model.layout["body"]), len(self.model.body_names)
+        rows = out[first : first + BODY_OUT * many].reshape(many, BODY_OUT)
+        points, speed = self.place.copy(), np.zeros_like(self.place)
+        for i, row in enumerate(rows):
+            own = self.owner == i
+            arms = self.place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
+            points[own] = row[PLACE : PLACE + 3] + arms
+            speed[own] = row[VELOCITY : VELOCITY + 3] + np.cross(row[SPIN : SPIN + 3], arms)
+        return points, np.linalg.norm(speed[self.lines].mean(axis=1), axis=1)
