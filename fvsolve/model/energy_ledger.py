@@ -36,7 +36,7 @@ class Accounts:
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies
-        if len(model.tables.bodies):  # feel what rides on them, for its work
+        if model.basins and len(model.tables.bodies):  # feel what rides on them, for its work
             slate.tables.basins["heavy"] = 1
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # of stored energy: rows of `stored`

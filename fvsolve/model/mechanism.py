@@ -314,6 +314,19 @@ def is_shut(draft, start, i: int) -> bool:
     return all(j == i or np.isnan(start.held[j]) for j in start.reaches(i))
 
 
+def refuse_weightless(draft, at: Statics) -> None:
+    """Faults of bodies whose joint lets them move where neither they nor what hangs on them have inertia."""
+    at.run("joints: kinematics", "matrix: accelerate")
+    n = len(draft.freedom_table)
+    for name, row in reversed(list(zip(draft.body_names, draft.body_table, strict=True))):
+        own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
+        least = ALIKE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
+        for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
+            if not at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** 2 > least:
+                text = "nothing resists the motion that its joint leaves it: its inertia there is 0"
+                return draft.fault(f"nodes.{name}.inertia", f"{text}; give it some, about the axis of the joint")
+
+
 def start_bodies(draft, start) -> list[str]:
     """Lengths of lines, and of joints what is balanced at the start; returns what moves, in words."""
     if not len(draft.body_table):
@@ -327,6 +340,8 @@ def start_bodies(draft, start) -> list[str]:
         line["length"] = at.out[travel + 2 * line["push"]] if line["acts"] == rec.ALONG else 0.0
         if "speed" in rows[line["push"]].dtype.names:
             rows[line["push"]]["speed"] = at.out[travel + 2 * line["push"] + 1]
+    refuse_weightless(draft, at)
+    draft.check()
     size = np.abs(at.shares(pushes)).sum(axis=0)
     at.out[first : first + pushes.size] = pushes
     at.run(*at.pushes[:2])

@@ -160,7 +160,7 @@ BAD = {
     "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: length is missing"),
     "unknown type": (
         swap('"valve"', '"vavle"'),
-        'line 33: links.valve.type: no type "vavle"; types are check-valve, cylinder, damper, ',
+        'line 33: links.valve.type: no type "vavle"; types are bushing, check-valve, cylinder, damper, ',
     ),
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
     "missing type": (
