@@ -215,6 +215,14 @@ def test_a_u_tube_laid_over_settles_level(law):
     assert rise == pytest.approx(2 * HALF * np.tan(angle), rel=2e-3)
 
 
+def test_rolling_like_a_pendulum_as_long_as_its_lever_moves_no_water():
+    period = 2 * np.pi * np.sqrt((DEPTH + LEVEL) / GRAVITY)
+    run = fv.run(u_tube(angle={**ROLL, "period": period}))
+    beside = fv.run(u_tube(angle={**ROLL, "period": 1.3 * period}))
+    rise, other = (np.max(np.abs(one["port.level"] - LEVEL)) for one in (run, beside))
+    assert rise < 2e-3 * other
+
+
 def ring(**joint):
     """A column round a square on a body, between two places that are one."""
     ends = {one: {"type": "reservoir", "pressure": 1e5, "on": "rig", "at": [1, 0.5, 0]} for one in ("a", "b")}

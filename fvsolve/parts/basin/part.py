@@ -323,7 +323,8 @@ class Basin(Rider, kind="basin"):
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
         patches = given.get("patches")
-        stated = [one.get("body") for one in patches.values() if isinstance(one, dict)] if patches else []
+        tables = patches.values() if isinstance(patches, dict) else ()
+        stated = [one.get("body") for one in tables if isinstance(one, dict)]
         return (*(one for one in stated if isinstance(one, str)), *super().bodies(given))
 
 
