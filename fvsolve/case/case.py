@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import basins, bodies, ranges, text
+from fvsolve.case import basins, bodies, ranges, riding_networks, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.probe import Probe
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
@@ -101,7 +101,7 @@ class Case(Shown):
             if name in self.meshes:
                 found |= basins.places(name, node, self.meshes[name])
             elif node.domain == "hydraulic":
-                found |= node.inner(name)[0]
+                found |= riding_networks.standing(node, self.poses).inner(name)[0]
         for name, link in self.links.items():
             found |= link.inner(name)[0]
             if "A" in link.owns:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import bodies
+from fvsolve.case import bodies, riding_networks
 from fvsolve.case.bodies import WORLD
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
@@ -60,7 +60,7 @@ def network(table: dict[str, Any]) -> Found:
             yield ("nodes", name), "no link touches it"
     if not complete:
         return  # what hangs together is not known
-    own = {name: places for name, places in tied.items() if places}
+    own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
     own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := _points(name, node))}
     own |= {f"{k}..": group for k, group in enumerate(hanging)}
     islands = _islands(own | {f"links.{name}": places for name, places in ends.items()})
@@ -86,7 +86,8 @@ def parts(
     start: float,
 ) -> Found:
     """Faults of elevations, and what each part finds wrong beside the others."""
-    yield from _elevations(nodes, links)
+    poses = bodies.poses(nodes, start)
+    yield from _elevations({name: riding_networks.standing(node, poses) for name, node in nodes.items()}, links)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
         if fluid is not None:
@@ -94,7 +95,7 @@ def parts(
                 yield (ROOT, *keys), text
 
     yield from bodies.misfits(nodes)
-    poses = bodies.poses(nodes, start)
+    yield from riding_networks.misfits(nodes, links)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))

@@ -22,6 +22,7 @@ from fvsolve.parts.body.part import Joint
 from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
+from fvsolve.parts.node import Rider
 from fvsolve.parts.pipe.part import Wall
 from fvsolve.parts.table import Table, plain
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
@@ -29,11 +30,12 @@ from fvsolve.parts.valve.part import Sized
 from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
-    "every node": Node, "every link": TwoPort, "friction": Friction, "connection": Connection, "wall": Wall,
-    "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec, "numerics": Numerics,
+    "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
+    "wall": Wall, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec, "numerics": Numerics,
     "output": Output, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
-SHARED = {Node: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}  # whose keys -> the part that has them in full
+# whose keys -> the part that has them in full
+SHARED = {Node: "", Rider: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}
 LEFT_OUT = " if left out"
 HEAD = ("key", "what it may be", "default", "changes", "")
 MARK = re.compile(r"(<!-- keys: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)

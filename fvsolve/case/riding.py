@@ -11,6 +11,7 @@ from fvsolve.case.bodies import hangs_on
 from fvsolve.case.cells import means, samples
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.body.part import Body
+from fvsolve.parts.node import Rider
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
@@ -19,17 +20,11 @@ Found = Iterator[tuple[tuple, str]]
 def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], named: Any = ()) -> Found:
     """Faults of a basin that rides on a body."""
     key = ("nodes", name)
+    yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
-        for other in ("at", "attitude"):
-            if getattr(basin, other) is not None:
-                yield (*key, other), "is a place on a body; name that with on"
         if "sloshing" in basin.model_fields_set:
             yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
         return
-    if basin.on in nodes or basin.on not in named:  # else at fault itself
-        yield from (((*key, "on"), text) for text in body_faults(basin.on, nodes))
-    if basin.elevation is not None:
-        yield (*key, "elevation"), f"it rides on {basin.on}; say where with at, in axes of that body"
     if not basin.own.rides:
         yield (*key, "on"), f'physics {show(basin.physics)} rides on no body yet; wanted "free-surface"'
     if any(one.moves for one in basin.patches.values()):
@@ -42,6 +37,20 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
         if f"{name}.{patch}" in joined:
             text = "a link joins here, and the basin rides on a body: between these goes a hose, which there is not yet"
             yield (*key, "patches", patch), text
+
+
+def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any = ()) -> Found:
+    """Faults of where something rides."""
+    key = ("nodes", name)
+    if node.on is None:
+        for other in ("at", "attitude"):
+            if getattr(node, other, None) is not None:
+                yield (*key, other), "is a place on a body; name that with on"
+        return
+    if node.on in nodes or node.on not in named:  # else at fault itself
+        yield from (((*key, "on"), text) for text in body_faults(node.on, nodes))
+    if node.elevation is not None:
+        yield (*key, "elevation"), f"it rides on {node.on}; say where with at, in axes of that body"
 
 
 def body_faults(on: str, nodes: dict[str, Any]) -> Iterator[str]:

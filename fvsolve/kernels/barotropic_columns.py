@@ -1,7 +1,7 @@
 """Rigid columns under the laws log and table. Knows columns and the valves at their ends; solves no node."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import drive
+from fvsolve.kernels.barotropic_nodes import drive, mean_density
 from fvsolve.kernels.clusters import settled
 from fvsolve.kernels.columns import add_led, column_rate
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
@@ -9,7 +9,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.led import led_by_lift, led_end, led_flow, lone_lead
 from fvsolve.kernels.records import NOT_CONVERGED, STATUS
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.rigid import gate_area, join_given, number_rigid, rigid_space, settle_rigid
+from fvsolve.kernels.rigid import body_drive, gate_area, join_given, number_rigid, rigid_space, settle_rigid
 
 
 @njit
@@ -19,6 +19,8 @@ def drive_change(tables, out, k):
     i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
     now = drive(st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+    if column["ride"] >= 0:
+        now += mean_density(st, tables.floats, p_i, p_j) * body_drive(tables, out, column)
     return now - column["base"]
 
 
@@ -80,7 +82,7 @@ def hold_columns_barotropic(t, y, dydt, out, handle):
         i, x = column["from_node"], column["to_node"]
         if end == -1:
             i, x = x, i
-        rise = st["gravity"] * (nodes[x]["elevation"] - nodes[i]["elevation"])
+        rise = st["gravity"] * (nodes[x]["elevation"] - nodes[i]["elevation"]) - end * body_drive(tables, out, column)
         h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
         out[pressure + x] = pressure_of_enthalpy(st, floats, h - rise) - nodes[x]["pressure"]
         if lone_lead(tables, x) >= 0:

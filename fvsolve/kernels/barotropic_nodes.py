@@ -159,13 +159,21 @@ def offer_barotropic(t, y, dydt, out, handle):
 
 
 @njit
+def mean_density(st, floats, p_i, p_j):
+    """dp / dh between two pressures [kg/m3]."""
+    dp = p_i - p_j
+    if abs(dp) > 1e-3:
+        return dp / (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j))
+    return density(st, floats, p_i)
+
+
+@njit
 def drive(st, floats, p_i, z_i, p_j, z_j):
     """(rho_mean (dh + g dz), upstream density): the pressure that drives a link, p_i - p_j on one level."""
     dp = p_i - p_j
     if z_i != z_j:
         dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)
-        mean = dp / dh if abs(dp) > 1e-3 else density(st, floats, p_i)
-        dp = mean * (dh + st["gravity"] * (z_i - z_j))
+        dp = mean_density(st, floats, p_i, p_j) * (dh + st["gravity"] * (z_i - z_j))
     return dp, density(st, floats, p_i if dp >= 0.0 else p_j)
 
 

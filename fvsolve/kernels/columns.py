@@ -7,6 +7,7 @@ from fvsolve.kernels.records import CLOSING, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.rigid import (
     add_pushes,
+    body_drive,
     column_drag,
     gate_area,
     join_given,
@@ -87,6 +88,7 @@ def column_rates(t, y, dydt, out, handle):
     for k in range(columns.size if dydt.size > 0 else 0):
         column = columns[k]
         change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]]
+        change += tables.settings[0]["rho"] * body_drive(tables, out, column)
         dydt[column["y"]] = column_rate(t, y, tables, out, k, change)
 
 

@@ -18,7 +18,7 @@ from fvsolve.kernels.calls import call_lead
 from fvsolve.kernels.devices import LEAD
 from fvsolve.kernels.lead import leads
 from fvsolve.kernels.restrictions import conductance, conductance_at
-from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, pressure_at
+from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, offset_of, pressure_at
 
 NEARLY = 1e-3  # share of their full area below which valves lead their column
 LOST = 0.05  # share of the flow at which valves take the lead, more than is then missed of it
@@ -83,7 +83,7 @@ def standing_pressure(y, tables, out, k, end, solved):
     column = tables.columns[k]
     p, softness = far_side(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
-    return p + end * (column["offset"] + column["drag"] * inertia), inertia + softness
+    return p + end * (offset_of(tables, out, column) + column["drag"] * inertia), inertia + softness
 
 
 @njit

@@ -105,6 +105,14 @@ MEMBERS = {
     ),
     "stretches": Pieces(events="mechanism.joints: stretch_again"),
     "lines": Pieces(move="mechanism.lines: push_bodies"),
+    "rides": Pieces(
+        prepare="mechanism.rides: set_rides", store="mechanism.rides: press_tanks",
+        rates="mechanism.rides: push_cells",
+    ),
+    "rides, barotropic": Pieces(
+        prepare="mechanism.rides: set_rides", store="mechanism.rides_barotropic: press_tanks_barotropic",
+        rates="mechanism.rides_barotropic: push_cells_barotropic",
+    ),
     "masses": Pieces(
         prepare="masses: chambers", move="masses: finish_masses", observe="masses: observe_masses",
         record="masses: record_masses", events="masses: mass_events",
@@ -143,6 +151,7 @@ class Cast:
     lines: bool = False
     pins: bool = False
     bushings: bool = False
+    rides: bool = False
     memory: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
@@ -176,6 +185,8 @@ class Cast:
             yield MEMBERS["pins" if self.pins else "no pins"]
         if self.bushings:
             yield MEMBERS["bushings"]
+        if self.rides:
+            yield MEMBERS["rides" if linear else "rides, barotropic"]
         if self.lines:
             yield MEMBERS["stretches"]
         if self.masses:

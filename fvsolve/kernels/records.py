@@ -110,6 +110,7 @@ PIPE = np.dtype(
         ("to_base", "f8"),
         ("from_mass", "f8"),  # and the mass per length at the end that it computes to [kg/m]
         ("to_mass", "f8"),
+        ("ride", "i8"),  # of its first cell in `rides`; -1 where it stands still
     ],
     align=True,
 )
@@ -142,6 +143,7 @@ NODE = np.dtype(
         ("columns", "i8"),  # how many columns these are
         ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
         ("density", "f8"),  # of what a tank holds [kg/m3]
+        ("ride", "i8"),  # of a tank in `rides`; -1 where it stands still
     ],
     align=True,
 )
@@ -187,6 +189,7 @@ COLUMN = np.dtype(
         ("drag", "f8"),
         ("offset", "f8"),  # driving pressure of the profile that friction does not balance [Pa]
         ("base", "f8"),  # laws log and table: driving pressure of the profile [Pa]
+        ("ride", "i8"),  # in `rides`; -1 where it stands still
     ],
     align=True,
 )
@@ -265,6 +268,17 @@ BUSHING = np.dtype(
         ("turn_damping", "f8"),
         ("attitude", "f8", (9,)),  # of the body of `to` in axes of that of `from` at the start
         ("energy", "f8"),  # stored at the start [J]
+    ],
+    align=True,
+)
+
+RIDE = np.dtype(  # a stretch of a pipe, a column or what a tank holds, on a body and in its axes
+    [
+        ("body", "i8"),
+        ("start", "f8", (3,)),  # where it begins [m]; of a tank, its bottom
+        ("end", "f8", (3,)),  # where it ends; of a tank, what is above a bottom is along z
+        ("swept", "f8", (3,)),  # integral of r x dr along it [m2]
+        ("rest", "f8"),  # what gravity does along it at the start [J/kg]
     ],
     align=True,
 )
@@ -378,6 +392,7 @@ LAYOUT = np.dtype(
         ("edge", "i8"),  # values that the water of pipes has at both ends
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
+        ("ride", "i8"),  # what drives stretches on bodies since the start [J/kg]
         ("tank", "i8"),  # of basins that ride on bodies, what their mass is along their normal
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
@@ -558,6 +573,7 @@ RECORDS = {
     "lines": LINE,
     "pins": PIN,
     "bushings": BUSHING,
+    "rides": RIDE,
     "masses": MASS,
     "braces": BRACE,
     "stops": STOP,

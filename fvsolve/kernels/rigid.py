@@ -57,6 +57,18 @@ def column_drag(column, flow):
     return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)
 
 
+@njit(forceinline=True)
+def body_drive(tables, out, column):
+    """What the motion of its body drives a column by since the start [J/kg]; 0 where it stands still."""
+    return out[tables.layout[0]["ride"] + column["ride"]] if column["ride"] >= 0 else 0.0
+
+
+@njit(forceinline=True)
+def offset_of(tables, out, column):
+    """Driving pressure of a column beside that of its ends [Pa]."""
+    return column["offset"] + tables.settings[0]["rho"] * body_drive(tables, out, column)
+
+
 @njit
 def pressure_at(tables, out, i, extra, solved):
     """p' of node i; of a junction, until nodes are `solved`, a guess from what its pipes and `extra` [kg/s] bring."""
@@ -232,7 +244,7 @@ def add_pushes(y, tables, out, n, skip, solved):
         flow = out[layout["column"] + k] if solved else column["flow"] + y[column["y"]]
         p_i = 0.0 if rows[i] >= 0.0 else pressure_at(tables, out, i, -flow, solved)
         p_j = 0.0 if rows[j] >= 0.0 else pressure_at(tables, out, j, flow, solved)
-        rate = column["area"] / column["length"] * (p_i - p_j + column["offset"])
+        rate = column["area"] / column["length"] * (p_i - p_j + offset_of(tables, out, column))
         rate -= column_drag(column, flow) - column["drag"]
         if rows[i] >= 0.0:
             right[int(rows[i])] -= rate

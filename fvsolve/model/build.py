@@ -22,6 +22,7 @@ from fvsolve.model.model import Model
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
 from fvsolve.model.ranges import flow_notices
+from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
 
@@ -51,7 +52,7 @@ def build(case) -> Model:
 def fill_places(draft: Draft) -> None:
     """A row for every place of the fluid."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
-    table["y"] = table["shape"] = table["schedule"] = table["row"] = -1
+    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["ride"] = -1
     table["full"] = np.inf
     for row, (name, node) in zip(table, draft.case.places.items(), strict=True):
         row["elevation"] = draft.case.elevation(name)
@@ -68,6 +69,7 @@ def fill_links(draft: Draft) -> None:
         draft.node_table["admittance"][row["from_node"]] += row["admittance"]
         draft.node_table["admittance"][row["to_node"]] += row["admittance"]
     lower_bodies(draft)
+    lower_rides(draft)
     lower_masses(draft)
     lower_lines(draft)
 
@@ -94,7 +96,8 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
     draft.tables = rec.Tables(
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
-        np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table, draft.mass_table,
+        np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
+        draft.ride_table, draft.mass_table,
         draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
         draft.wall_table,
@@ -143,6 +146,7 @@ def layout_of(draft: Draft) -> np.ndarray:
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", many * nodes), ("edge", 2 * pipes * many),
         ("carried", 2 * pipes * many), ("brought", many * nodes), ("wall", len(draft.wall_table)),
+        ("ride", len(draft.ride_table)),
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),

@@ -86,6 +86,7 @@ class Draft:
     line_table: np.ndarray = rows(rec.LINE)
     pin_table: np.ndarray = rows(rec.PIN)
     bushing_table: np.ndarray = rows(rec.BUSHING)
+    ride_table: np.ndarray = rows(rec.RIDE)
     mass_table: np.ndarray = rows(rec.MASS)
     brace_table: np.ndarray = rows(rec.BRACE)
     stop_table: np.ndarray = rows(rec.STOP)
@@ -178,6 +179,8 @@ class Draft:
         if table == "valve":
             rows["device"] = rows["hooks"] = rows["data"] = rows["event"] = -1
             rows["back"] = 1.0
+        if "ride" in record.names:
+            rows["ride"] = -1
         for name, link, lowering in parts:
             lowering.fill(self, name, link, rows[at : at + lowering.rows])
             at += lowering.rows

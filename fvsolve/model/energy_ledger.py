@@ -33,6 +33,8 @@ class Accounts:
     def __init__(self, slate: Slate) -> None:
         self.slate, self.model = slate, slate.model
         model, case = slate.model, slate.model.case
+        if len(model.tables.rides):
+            raise FvsolveError("the energy of networks that ride on bodies is not booked yet")
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies

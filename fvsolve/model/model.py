@@ -193,6 +193,7 @@ class Model(Shown):
 
         many = rec.Tables(*(len(table) > 0 for table in self.tables))
         there = [many.clusters, many.columns, many.masses, many.bodies, many.lines, many.pins, many.bushings]
+        there.append(many.rides)
         basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
         alone = bool(self.basins and patches) and not (self.cells or valves or many.devices or any(there))

@@ -19,6 +19,7 @@ from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, tra
 from fvsolve.model.lowering import lowering_of
 from fvsolve.model.masses import start_masses
 from fvsolve.model.mechanism import start_bodies
+from fvsolve.model.rides import driven_at_start
 from fvsolve.model.slate import wiped
 from fvsolve.steady import Edge, solve_steady, union
 
@@ -408,7 +409,8 @@ class Start:
         return float(self.valves[k]["conductance"]) * denser, drop
 
     def report(self) -> dict[str, Any]:
-        moving = start_masses(self.draft, self) + start_bodies(self.draft, self) + self.moving
+        moving = start_masses(self.draft, self) + start_bodies(self.draft, self)
+        moving += driven_at_start(self.draft, self) + self.moving
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
         for row in self.pistons:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import VALUE, Quantity, Rows, Usual
+from fvsolve.parts.value import VALUE, Quantity, Rows, Text, Usual
 from fvsolve.units import show
 
 HEIGHTS = Usual(-12e3, 9e3, "boreholes to mountains")
@@ -64,3 +64,31 @@ class Node(Table):
                 raise FvsolveError(f"a node of type {show(kind)} is there already; wanted another name")
             cls.kind = kind
             Node.kinds[kind] = cls
+
+
+class Rider(Node):
+    """A place that may ride on a body."""
+
+    on: Annotated[str | None, Text("a body that it rides on; it stands still if left out")] = None
+    at: Annotated[
+        tuple[float, ...] | None,
+        Rows(
+            "position",
+            length=3,
+            about="its origin in axes of that body, in place of elevation [m]; 0 if left out",
+        ),
+    ] = None
+
+    @classmethod
+    def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
+        return (given["on"],) if isinstance(given.get("on"), str) else ()
+
+    @property
+    def stands(self) -> dict[str, Any]:
+        """Its keys that say where it is."""
+        return {"elevation": self.elevation, "on": self.on, "at": self.at}
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """Where it is in axes of its body [m]."""
+        return self.at or (0.0, 0.0, 0.0)

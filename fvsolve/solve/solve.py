@@ -333,7 +333,9 @@ class Run:
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_ROOM:
             return f"stopped: the wall has left no room{place} at {when}; give its mass an end-stop, or a wider zone"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
-            name = model.basins[int(loop.out[rec.WHERE])].name
+            which = int(loop.out[rec.WHERE])
+            names = [*(basin.name for basin in model.basins), *model.node_names]
+            name = names[which].removesuffix(".inside")
             return f"stopped: the water in {name} has no weight left at {when}; wanted a body that falls less fast"
         if code == slots.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"

@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.attitude import Attitude
 from fvsolve.parts.formula import Formula, Shaped, even
-from fvsolve.parts.node import Node
+from fvsolve.parts.node import Node, Rider
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.series import copy_name, find_file
@@ -246,7 +246,7 @@ class Physics(Table):
         return law in (cls.laws or (law,))
 
 
-class Basin(Node, kind="basin"):
+class Basin(Rider, kind="basin"):
     """Fields in the plane between walls, joined to the network by patches."""
 
     fixes_pressure: ClassVar[bool] = True
@@ -279,11 +279,6 @@ class Basin(Node, kind="basin"):
         Inside(StartOfFields, "level or pressure above that at rest, and velocities; at rest if left out"),
     ] = None
 
-    on: Annotated[str | None, Text("a body that it rides on; it stands still if left out")] = None
-    at: Annotated[
-        tuple[float, ...] | None,
-        Rows("position", length=3, about="its origin in axes of that body, in place of elevation [m]; 0 if left out"),
-    ] = None
     attitude: Annotated[Attitude | None, Inside(Attitude, "of its axes in those of that body")] = None
     sloshing: Annotated[str, Choice("sloshing", SLOSHING, "of water that rides: as one with its body, or by cells")] = (
         "cells"
@@ -328,9 +323,9 @@ class Basin(Node, kind="basin"):
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
         patches = given.get("patches")
-        stated = [one.get("body") for one in patches.values() if isinstance(one, dict)] if patches else []
-        stated.append(given.get("on"))
-        return tuple(one for one in stated if isinstance(one, str))
+        tables = patches.values() if isinstance(patches, dict) else ()
+        stated = [one.get("body") for one in tables if isinstance(one, dict)]
+        return (*(one for one in stated if isinstance(one, str)), *super().bodies(given))
 
 
 ABOUT = Basin.__doc__  # to which every physics adds a line

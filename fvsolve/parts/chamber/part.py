@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.node import Node
+from fvsolve.parts.node import Rider
 from fvsolve.parts.value import VALUE, Quantity, Usual, positive
 
 
-class Chamber(Node, kind="chamber"):
+class Chamber(Rider, kind="chamber"):
     """A rigid vessel full of fluid, (V / beta) dp/dt = net flow into it (80).
 
     Ports: any number. Stored energy, p from ambient: V p^2 / (2 beta) [J] under the linear law,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.node import Node
+from fvsolve.parts.node import Rider
 from fvsolve.parts.schedule import Schedule, Scheduled
 
 
-class Inflow(Node, kind="inflow"):
+class Inflow(Rider, kind="inflow"):
     """A place without volume that feeds `flow(t)` into its links.
 
     Ports: any number. Stored energy: none. Dissipated energy: none; it brings p times flow [W].

@@ -7,13 +7,13 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.node import Node
+from fvsolve.parts.node import Rider
 from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Number, Quantity, between
 
 
-class Junction(Node, kind="junction"):
+class Junction(Rider, kind="junction"):
     """A place without volume: the flows into its links and its demand sum to zero.
 
     Ports: any number. Stored energy: none. Dissipated energy: none; the demand leaves with p demand [W].

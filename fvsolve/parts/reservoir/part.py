@@ -6,11 +6,11 @@ from typing import Annotated, ClassVar
 
 from fvsolve import units
 from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.node import Node
+from fvsolve.parts.node import Rider
 from fvsolve.parts.schedule import Schedule, Scheduled
 
 
-class Reservoir(Node, kind="reservoir"):
+class Reservoir(Rider, kind="reservoir"):
     """A place of given pressure, p = pressure(t) or p = ambient + rho g (head(t) - elevation) [Pa].
 
     Ports: any number; it takes or gives whatever flow they ask. Stored energy: none of its own; what passes

@@ -38,7 +38,8 @@ class TankRows(Lowering, kind="tank"):
         row["y"] = draft.states([f"{name}.mass"], 0.1 * rho * row["area"])
 
     def pressure_at_start(self, start, i, node, row) -> float:
-        return start.law.pressure_under(row["level"])
+        upright = 1.0 if node.on is None else start.case.poses[node.on].attitude[2, 2]
+        return start.law.pressure_under(row["level"] * upright)
 
     def moves(self, name, node, row, inflow, flow) -> str:
         what = "rises" if flow > 0 else "falls"

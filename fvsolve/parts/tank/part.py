@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, Joined, joined
 from fvsolve.parts.junction.part import Junction
-from fvsolve.parts.node import Node
+from fvsolve.parts.node import Rider
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.table import keys_json, read_keys
 from fvsolve.parts.value import (
@@ -86,7 +86,7 @@ class Surface(Value):
         return {"anyOf": [Quantity("area").json(), keys_json(self.keys)]}
 
 
-class Tank(Node, kind="tank"):
+class Tank(Rider, kind="tank"):
     """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at its bottom.
 
     Ports: any number, all at the bottom, before its `connection` if it has one (the throttle of a surge tank). Stored
@@ -95,7 +95,7 @@ class Tank(Node, kind="tank"):
     """
 
     own_scalars: ClassVar[str] = "start"
-    quantities: ClassVar[dict[str, str]] = {**Node.quantities, "level": "level"}
+    quantities: ClassVar[dict[str, str]] = {**Rider.quantities, "level": "level"}
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
@@ -107,7 +107,7 @@ class Tank(Node, kind="tank"):
     connection: Annotated[Connection | None, Joined()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        return joined(name, self, Junction.model_construct(elevation=self.elevation, demand=constant(0.0)))
+        return joined(name, self, Junction.model_construct(**self.stands, demand=constant(0.0)))
 
     def faults(self, name: str, around: Around) -> Faults:
         if self.height is not None and self.level > self.height:

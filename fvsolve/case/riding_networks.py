@@ -1,0 +1,64 @@
+"""What must hold of places of a network that ride on bodies, and of links that join them. Knows no basin's fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case.riding import free_joints, place_faults
+from fvsolve.parts.basin.part import Basin
+from fvsolve.parts.node import Node, Rider
+
+Found = Iterator[tuple[tuple, str]]
+CLOSE = 1e-6  # of a length: places are typed with a few digits
+
+
+def standing(node: Node, poses: dict[str, Any]) -> Node:
+    """A node whose elevation is that at the start where it rides on a body."""
+    pose = poses.get(getattr(node, "on", None))
+    if pose is None or isinstance(node, Basin):
+        return node
+    return node.model_copy(update={"elevation": float(pose.at(node.place)[2])})
+
+
+def misfits(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
+    """Faults of places of a network that ride on bodies, and of links that join them."""
+    for name, node in nodes.items():
+        if isinstance(node, Basin) or not isinstance(node, Rider):
+            continue
+        yield from place_faults(name, node, nodes)
+        if node.on is not None and (free := next(free_joints(node.on, nodes), None)) is not None:
+            text = f"{free} moves freely, and does not feel its network yet; wanted a driven joint"
+            yield ("nodes", name, "on"), text
+        if node.on is not None and getattr(node, "head", None) is not None:
+            yield ("nodes", name, "head"), f"it rides on {node.on}, and a head counts from the ground; wanted pressure"
+    for name, link in links.items():
+        ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
+        yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes))
+
+
+def link_faults(link: Any, ends: list[str], nodes: dict[str, Any]) -> Found:
+    """Faults of a link between places of which one or more ride."""
+    stand = [nodes.get(place) for place in ends]
+    on = [getattr(node, "on", None) for node in stand]
+    if not any(on):
+        if getattr(link, "route", None):
+            yield ("route",), "is a way on a body, and its ends ride on none; give both on and at"
+        return
+    if len(set(on)) > 1:
+        each = zip(ends, on, strict=True)
+        said = " and ".join(f"{end}, on {body}" if body else f"{end}, which stands still" for end, body in each)
+        yield (), f"joins {said}: between these goes a hose, which there is not yet"
+        return
+    if any(isinstance(node, Basin) for node in stand):
+        return  # said of its patch
+    length = getattr(link, "length", None)
+    points = np.array([stand[0].place, *getattr(link, "route", []), stand[-1].place])
+    way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    if length is None and way > 0.0:
+        text = f"its ends lie {way:g} m apart, and a {link.kind} has no way between; wanted both at one place"
+        yield (), f"{text}, and a pipe or rigid-column to the next"
+    elif length is not None and way > length * (1.0 + CLOSE):
+        yield ("length",), f"{length:g} m is too short: its way on {on[0]} is {way:g} m long"

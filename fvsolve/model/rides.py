@@ -1,0 +1,80 @@
+"""Pipes, columns and tanks on bodies as rows of tables, and what drives them at the start. Knows names; no rhs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+
+SMALL = 1e-9  # of what drives a stretch [J/kg], below which it is rounding
+
+
+def lower_rides(draft) -> None:
+    """A row for every cell of a pipe, every rigid column and every tank that rides."""
+    found: list[tuple] = []
+    links, places = draft.case.conduits, draft.case.places
+    for name, row in [*zip(draft.pipe_names, draft.pipe_table, strict=True),
+                      *zip(draft.column_names, draft.column_table, strict=True)]:  # fmt: skip
+        link = links[name]
+        first, last = places[link.from_], places[link.to]
+        if getattr(first, "on", None) is None:
+            continue
+        row["ride"] = len(found)
+        ends = np.array(first.place), np.array(last.place)
+        if "cells" in row.dtype.names:
+            shares = np.linspace(0.0, 1.0, int(row["cells"]) + 1)[:, None]
+            points = ends[0] + shares * (ends[1] - ends[0])
+            found += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
+        else:
+            found.append(stretch(draft, first.on, np.array([ends[0], *link.route, ends[1]])))
+    for node, row in zip(places.values(), draft.node_table, strict=True):
+        if row["kind"] == rec.TANK and node.on is not None:
+            row["ride"] = len(found)
+            foot = np.array(node.place)
+            body, start, end, swept, rise = stretch(draft, node.on, np.array([foot, foot + [0.0, 0.0, node.level]]))
+            found.append((body, start, end, swept, -rise))
+    draft.ride_table = np.array(found, rec.RIDE) if found else np.zeros(0, rec.RIDE)
+    if found:
+        refuse_joints(draft)
+
+
+def stretch(draft, on: str, points: np.ndarray) -> tuple:
+    """A row of `rides`: along straight lines between points in axes of a body [m]."""
+    swept = np.cross(points[:-1], points[1:]).sum(axis=0)
+    rise = (draft.case.poses[on].attitude @ (points[-1] - points[0]))[2]
+    return draft.body_names.index(on), points[0], points[-1], swept, -draft.case.gravity * rise
+
+
+def refuse_joints(draft) -> None:
+    """Forces of joints that hold what a network weighs are not booked yet."""
+    held = set()
+    for i in {int(one) for one in draft.ride_table["body"]}:
+        while i >= 0:
+            held.add(draft.body_names[i])
+            i = int(draft.body_table[i]["parent"])
+    for k, probe in enumerate(draft.case.probes):
+        if probe.part == "nodes" and probe.name in held and probe.quantity.startswith("joint_"):
+            text = f"{probe.name} carries a network, whose weight and recoil its joint's force lacks yet"
+            draft.fault(f"output.probes[{k}]", f"{text}; wanted none of these")
+
+
+def driven_at_start(draft, start) -> list[str]:
+    """What a body that moves drives at the start, in words."""
+    if not len(draft.ride_table):
+        return []
+    from fvsolve.model.mechanism import Statics
+
+    at = Statics(draft, start.t)
+    at.run("joints: kinematics", "rides: set_rides")
+    first, rho = int(at.layout["ride"]), draft.fluid.density
+    drives = at.out[first : first + len(draft.ride_table)]
+    found = []
+    for kind, names, table in (("pipe", draft.pipe_names, draft.pipe_table),
+                               ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
+        for name, row in zip(names, table, strict=True):
+            if row["ride"] >= 0:
+                many = int(row["cells"]) if "cells" in row.dtype.names else 1
+                push = float(drives[row["ride"] : row["ride"] + many].sum())
+                if abs(push) > SMALL:
+                    found.append(f"{kind} {name}: its body drives it with {rho * push:.4g} Pa")
+    return found
