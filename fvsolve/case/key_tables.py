@@ -31,8 +31,8 @@ from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
-    "wall": Wall, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec, "numerics": Numerics,
-    "output": Output, "joint": Joint, "attitude": Attitude,
+    "wall": Wall, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec,
+    "numerics": Numerics, "output": Output, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # whose keys -> the part that has them in full
 SHARED = {Node: "", Rider: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}

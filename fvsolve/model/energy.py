@@ -94,7 +94,7 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     own = energy_weights(model, y)
     names = [name.rsplit(".", 1)[0] for name in model.state_names]
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
-    grows = Growth(model, y)
+    grows = Lengthening(model, y)
     stored |= {e: (names[e], row) for e, row in swept(model, y, grows)}
     found = [*stored.values(), *stretched(model, y, grows), *of_devices(model, y), *kinetic(model, y)]
     entries = [(k, i, value) for k, (_, row) in enumerate(found) for i, value in row.items()]
@@ -197,7 +197,7 @@ def typical(model, q: int) -> float:
     return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
 
 
-def stretched(model, y: np.ndarray, grows: Growth):
+def stretched(model, y: np.ndarray, grows: Lengthening):
     """(name, row of L) of springs and of stops in touch."""
     braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
     for k, ((name, *_), row) in enumerate(zip(braces, model.tables.braces, strict=True)):
@@ -219,7 +219,7 @@ def of_devices(model, y: np.ndarray):
             yield name, square
 
 
-def swept(model, y: np.ndarray, grows: Growth):
+def swept(model, y: np.ndarray, grows: Lengthening):
     """(state, row of L) of moving chambers at y: with less room the same excess e [kg] is more pressure.
 
     Between points the state is the mass, e and what its volume has gained at the density of the start.
@@ -239,7 +239,7 @@ def swept(model, y: np.ndarray, grows: Growth):
             yield at, {at: root} | moved
 
 
-class Growth:
+class Lengthening:
     """By how much pushes have grown at a state, and what deviations of states add to that.
 
     out : what the rhs writes beside dydt there

@@ -9,7 +9,7 @@ from fvsolve.parts.value import Misfit, Rows, Setting, Value
 from fvsolve.units import show
 
 
-class Points(Value):
+class Way(Value):
     """Points in space, in order."""
 
     takes = "list of [x, y, z], m"
@@ -45,7 +45,7 @@ class RigidColumn(Conduit, kind="rigid-column"):
 
     route: Annotated[
         list[tuple[float, ...]],
-        Points("on its way between ends that ride on a body, in axes of that [m]; straight if left out"),
+        Way("on its way between ends that ride on a body, in axes of that [m]; straight if left out"),
     ] = []
     no_scalars: ClassVar[str] = "it has no cells to carry scalars; use a pipe"
 
