@@ -201,6 +201,11 @@ def quick_parts(model) -> str:
     """What may have a rate of its own beside the pipes: what stores, rigid columns, masses."""
     stores = [name for name, row in zip(model.node_names, model.tables.nodes, strict=True)
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
-    moving = [*model.column_names, *model.mass_names, *model.body_names]
-    found = [*(basin.name for basin in model.basins), *stores, *moving]
+    found = [
+        *(basin.name for basin in model.basins),
+        *stores,
+        *model.column_names,
+        *model.mass_names,
+        *model.body_names,
+    ]
     return found[0] if len(found) == 1 else f"one of {listing(found)}"

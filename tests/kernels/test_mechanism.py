@@ -98,3 +98,9 @@ def test_power_of_a_tree_is_that_of_its_weight():
     power = accounts.power_at(0.0, model.start.copy(), dydt, out)
     kinetic = max(abs(one) for one in power)
     assert abs(power.sum()) < 1e-12 * max(kinetic, 100.0)
+
+
+def test_a_new_mechanism_compiles_nothing():
+    one = model_of(random_tree(np.random.default_rng(1), 3, "free"))
+    other = model_of(random_tree(np.random.default_rng(2), 9, "ball"))
+    assert one.functions is other.functions

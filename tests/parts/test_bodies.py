@@ -552,8 +552,27 @@ def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
     found = [energy(case, {"numerics.step": h}) for h in (4e-3, 2e-3)]
     rest = [float(np.abs(one.remainder).max()) for one in found]
     assert rest[0] / rest[1] > 12.0 and found[1].relative < 1e-7
-    lines = {(line.what, line.place) for line in found[1].lines} if hasattr(found[1], "lines") else set()
-    assert not lines or {("supplied", "cart"), ("dissipated", "arm"), ("supplied", "load")} <= lines
+    assert {"cart", "load", "motor"} <= {*found[1].supplied} and {"arm joint", "damper", "rubber bushing"} <= {
+        *found[1].dissipated
+    }
+    assert {"cart", "arm", "lower", "spring", "rubber"} <= {*found[1].stored}
+
+
+@pytest.mark.parametrize("kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")])
+def test_what_the_ledger_of_bodies_forgets_is_what_remains(kind, place, monkeypatch):
+    from fvsolve.model import energy_ledger
+
+    honest, plain = energy(machine()), energy_ledger.Accounts.bodies
+    lost = honest.supplied[place][-1] if kind == "drive" else honest.dissipated[f"{place} {kind}"][-1]
+
+    def forgetful(self):
+        plain(self)
+        own = [one for one in self.accounts if (one.place, one.kind) == (place, kind) and one.what != "rate"]
+        self.accounts = [one for one in self.accounts if one not in own]
+
+    monkeypatch.setattr(energy_ledger.Accounts, "bodies", forgetful)
+    remains = energy(machine()).remainder[-1]
+    assert abs(lost) > 1e-3 and abs(remains) == approx(abs(lost), rel=1e-4)
 
 
 # said otherwise ---------------------------------------------------------------------------------------------

@@ -102,9 +102,9 @@ def set_free(body, y, out, here):
 
 
 @njit
-def set_joined(body, t, y, out, tables, here):
-    """Attitude, place and motion of a body from those of the one that it is joined to."""
-    work, kind, own = tables.scratch, body["joint"], here + ATTITUDE
+def hang(body, out, tables, here):
+    """Begin with what a body has of the one it is joined to: place of the joint, its axes in `scratch` from 9 on."""
+    work = tables.scratch
     if body["parent"] < 0:
         for k in range(9):
             work[9 + k] = body["attitude"][k]
@@ -112,45 +112,53 @@ def set_joined(body, t, y, out, tables, here):
             out[here + PLACE + k], out[here + ARM + k] = body["at"][k], 0.0
             out[here + SPIN + k] = out[here + STREAM + k] = 0.0
             out[here + SPIN_BIAS + k] = out[here + APPARENT + k] = 0.0
-    else:
-        up = row_of(tables, body["parent"])
-        times(out, up + ATTITUDE, body["attitude"], 0, work, 9)
-        x, y0, z = turned(out, up + ATTITUDE, body["at"], 0)
-        for k, far in ((0, x), (1, y0), (2, z)):
-            out[here + PLACE + k] = out[up + PLACE + k] + far
-            out[here + ARM + k] = out[up + ARM + k] + far
-            out[here + SPIN + k], out[here + STREAM + k] = out[up + SPIN + k], out[up + STREAM + k]
-            out[here + SPIN_BIAS + k], out[here + APPARENT + k] = out[up + SPIN_BIAS + k], out[up + APPARENT + k]
-    wx = wy = wz = vx = vy = vz = 0.0
-    if kind == REVOLUTE:
-        angle, rate, change = angle_of(body, t, y, tables)
-        turn_about(work, 0, angle, body["axis"])
-        times(work, 9, work, 0, out, own)
-        x, y0, z = turned(out, own, body["axis"], 0)
-        wx, wy, wz = x * rate, y0 * rate, z * rate
-        vx, vy, vz = cross(out, here + ARM, wx, wy, wz)
-        if change != 0.0:
-            joint_acceleration(out, here, x * change, y0 * change, z * change, 1)
-    elif kind == PRISMATIC:
-        travel, rate, change = angle_of(body, t, y, tables)
-        for k in range(9):
-            out[own + k] = work[9 + k]
-        x, y0, z = turned(out, own, body["axis"], 0)
-        for k, a in ((0, x), (1, y0), (2, z)):
-            out[here + PLACE + k] += a * travel
-            out[here + ARM + k] += a * travel
-        vx, vy, vz = x * rate, y0 * rate, z * rate
-        if change != 0.0:
-            joint_acceleration(out, here, x * change, y0 * change, z * change, 0)
-    elif kind == BALL:
-        turn_by(work, 0, *parameters(body, 0, y))
-        times(work, 9, work, 0, out, own)
-        wx, wy, wz = turned(out, own, rates(body, 0, y), 0)
-        vx, vy, vz = cross(out, here + ARM, wx, wy, wz)
-    else:
-        for k in range(9):
-            out[own + k] = work[9 + k]
         return
+    up = row_of(tables, body["parent"])
+    times(out, up + ATTITUDE, body["attitude"], 0, work, 9)
+    x, y, z = turned(out, up + ATTITUDE, body["at"], 0)
+    for k, far in ((0, x), (1, y), (2, z)):
+        out[here + PLACE + k] = out[up + PLACE + k] + far
+        out[here + ARM + k] = out[up + ARM + k] + far
+        out[here + SPIN + k], out[here + STREAM + k] = out[up + SPIN + k], out[up + STREAM + k]
+        out[here + SPIN_BIAS + k], out[here + APPARENT + k] = out[up + SPIN_BIAS + k], out[up + APPARENT + k]
+
+
+@njit
+def turn_joint(body, t, y, out, tables, here):
+    """A hinge: axes turned, S q' and, where it is driven, S q''."""
+    angle, rate, change = angle_of(body, t, y, tables)
+    turn_about(tables.scratch, 0, angle, body["axis"])
+    times(tables.scratch, 9, tables.scratch, 0, out, here + ATTITUDE)
+    a, b, c = turned(out, here + ATTITUDE, body["axis"], 0)
+    if change != 0.0:
+        joint_acceleration(out, here, a * change, b * change, c * change, 1)
+    move_by(out, here, a * rate, b * rate, c * rate, *cross(out, here + ARM, a * rate, b * rate, c * rate))
+
+
+@njit
+def slide_joint(body, t, y, out, tables, here):
+    """A slider: place moved, likewise."""
+    travel, rate, change = angle_of(body, t, y, tables)
+    keep_axes(out, tables, here)
+    a, b, c = turned(out, here + ATTITUDE, body["axis"], 0)
+    for k, x in ((0, a), (1, b), (2, c)):
+        out[here + PLACE + k] += x * travel
+        out[here + ARM + k] += x * travel
+    if change != 0.0:
+        joint_acceleration(out, here, a * change, b * change, c * change, 0)
+    move_by(out, here, 0.0, 0.0, 0.0, a * rate, b * rate, c * rate)
+
+
+@njit
+def keep_axes(out, tables, here):
+    """Axes are those of the joint."""
+    for k in range(9):
+        out[here + ATTITUDE + k] = tables.scratch[9 + k]
+
+
+@njit
+def move_by(out, here, wx, wy, wz, vx, vy, vz):
+    """Add S q' = (w, v) to a body's motion, and V x S q' to what velocities alone accelerate."""
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
         out[here + SPIN + k] += w
         out[here + STREAM + k] += v
@@ -160,6 +168,23 @@ def set_joined(body, t, y, out, tables, here):
     for k, a, b in ((0, ax, bx + dx), (1, ay, by + dy), (2, az, bz + dz)):
         out[here + SPIN_BIAS + k] += a
         out[here + APPARENT + k] += b
+
+
+@njit
+def set_joined(body, t, y, out, tables, here):
+    """Attitude, place and motion of a body from those of the one that it is joined to."""
+    hang(body, out, tables, here)
+    if body["joint"] == REVOLUTE:
+        turn_joint(body, t, y, out, tables, here)
+    elif body["joint"] == PRISMATIC:
+        slide_joint(body, t, y, out, tables, here)
+    elif body["joint"] == BALL:
+        turn_by(tables.scratch, 0, *parameters(body, 0, y))
+        times(tables.scratch, 9, tables.scratch, 0, out, here + ATTITUDE)
+        a, b, c = turned(out, here + ATTITUDE, rates(body, 0, y), 0)
+        move_by(out, here, a, b, c, *cross(out, here + ARM, a, b, c))
+    else:
+        keep_axes(out, tables, here)
 
 
 @njit
