@@ -268,8 +268,7 @@ class BasinRows:
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
             if self.scheme != SCHEMES[numerics.scheme].on(True).name:
-                wanted = "lines that stand still" if is_grid(mesh) else "a rectangle without holes"
-                text = f"basin {self.name}: {numerics.scheme} wants {wanted}; muscl is taken there"
+                text = f"basin {self.name}: {numerics.scheme} wants a rectangle without holes; muscl is taken there"
                 draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
             floats, self.integers = lower_mesh(mesh)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size

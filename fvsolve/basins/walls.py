@@ -212,10 +212,10 @@ def nearest(tables, basin, i):
 
 @njit(forceinline=True)
 def moves_of(tables, basin):
-    """Speeds of lines along x and along y, and room for the thrust on the boundary, as kernels of grids want them."""
+    """Speeds of lines along x and along y, and room for what they find on the boundary, as grids want them."""
     plane, at, (_, lines) = tables.plane, basin["lines"], across(basin)
     speeds, none = plane[at : at + lines + BESIDE], plane[:0]
-    thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * (basin["nx"] + basin["ny"])]
+    thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * basin["outer"]]
     if basin["turn"] == 1:
         return none, speeds, thrust
     return speeds, none, thrust

@@ -402,7 +402,40 @@ def test_a_liquid_that_is_turned_or_seen_from_behind_says_the_same(law, method):
         result = run(case)
         found.append(np.column_stack([result[f"b.{side}.force"], result[f"b.{side}.power"]]))
     for other in found[1:]:
-        assert other == pytest.approx(found[0], rel=1e-9, abs=1e-9 * np.abs(found[0]).max())
+        close = 1e-9 if method == "ssp-rk3" else 1e-8  # where iterations and differences for a Jacobian end
+        assert other == pytest.approx(found[0], rel=close, abs=close * np.abs(found[0]).max())
+
+
+@pytest.mark.parametrize("law", ["linear", "log", "table"])
+@pytest.mark.parametrize("ways", [("west", "east"), ("south", "north")])
+def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, law, ways):
+    one, other = ways
+    walls, found = {one: {"travel": straight(5.0)}, other: {"travel": straight(-3.0), "zone": 0.6}}, []
+    for file in (None, tmp_path):
+        shape = {"size": [2.0, 1.0], "cells": [9, 7]}
+        if file is not None:
+            shape = {"mesh": {"file": tub(file, "quads", (9, 7), reach=0.0)}}
+        patches = {side: {"side": side, **one} if file is None else one for side, one in walls.items()}
+        nodes = {"b": {"type": "basin", "physics": "liquid", "thickness": 0.1, "patches": patches,
+                       "pressure": 6e6 if law == "table" else 2e5, **shape}}  # fmt: skip
+        model = build(
+            load(scene(nodes, {}, 0.1, {"scheme": "upwind", "method": "euler", "step": 1e-6}, fluid=fluid(law)))
+        )
+        basin, y = model.basins[0], model.start.copy()
+        y[[int(row["y"]) for row in model.tables.walls]] = 0.1, -0.05
+        x, z = basin.mesh.centre.T
+        deviation = np.array([0.4 * np.cos(5 * x) * np.cos(4 * z), 2e3 * np.sin(3 * x + z), 1e3 * np.cos(4 * x * z)])
+        if law == "linear":  # what is along faces is a mean on grids and from behind the face on meshes
+            deviation[2 if one == "west" else 1] = 0.0
+        basin.own(y)[:] = basin.stretched(y) * deviation
+        basin.own(y)[0] += basin.density * (basin.stretched(y) - 1.0)
+        dydt, out = model.evaluate(0.0, y)
+        order = np.lexsort(np.round(basin.mesh.centre.T, 9))
+        walls_feel = out[int(model.layout["wall"]) :][:2]
+        found.append([*(row[order] for row in basin.own(dydt)), walls_feel])
+        assert abs(np.sum(basin.mesh.area * basin.own(dydt)[0])) < 1e-12 * np.abs(basin.own(dydt)[0]).sum()
+    for grid, mesh in zip(*found, strict=True):
+        assert grid == pytest.approx(mesh, rel=1e-10, abs=1e-11 * np.abs(mesh).max())
 
 
 # energy ---------------------------------------------------------------------------------------------------------

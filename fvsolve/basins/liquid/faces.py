@@ -26,6 +26,7 @@ from fvsolve.basins.faces import (
     put_inward,
     put_sides,
 )
+from fvsolve.basins.liquid.driven import driven
 from fvsolve.basins.liquid.grid_full import log_sum
 from fvsolve.basins.liquid.waves import invariant, state
 from fvsolve.jit import njit
@@ -60,17 +61,6 @@ def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
 
 
 @njit
-def driven(law, c0, rho, table, speed, w, u):
-    """What u is at a wall that moves at a speed, where w and u across it come from inside.
-
-    Under `linear` m = speed (rho + r), with c r + m = w + u: no mass passes.
-    """
-    if table is not None or law == LAW_LOG:
-        return speed
-    return speed * ((w + u) + rho * c0) / (c0 + speed)
-
-
-@njit
 def show(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
     """What the boundary shows of the cells inside: a mirror at 1 and -1, and the same again where waves leave, at 0."""
     for q in range(edges.size):
@@ -78,7 +68,7 @@ def show(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, sho
         r = reflect[number[q]] if reflect.size > 0 else 1.0
         out = u[i] * nx[q] + v[i] * ny[q]
         if moves is not None:
-            out -= driven(law, c0, rho, table, moves[0][edges[q]], w[i], out)
+            out -= driven(table is not None or law == LAW_LOG, c0, rho, moves[0][edges[q]], w[i] + out)
         across = (min(1.0, 1.0 - 2.0 * r) - 1.0) * out
         shown_w[q], shown_u[q], shown_v[q] = (
             min(1.0, 1.0 + 2.0 * r) * w[i],
@@ -98,7 +88,7 @@ def show_sides(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, 
         r = reflect[number[q]] if reflect.size > 0 else 1.0
         out = ul[i] * nx[q] + vl[i] * ny[q]
         if moves is not None:
-            out -= driven(law, c0, rho, table, moves[0][edges[q]], wl[i], out)
+            out -= driven(table is not None or law == LAW_LOG, c0, rho, moves[0][edges[q]], wl[i] + out)
         across = -(1.0 + r) * out
         w[i], w[_U + i], w[_V + i] = r * wl[i], ul[i] + across * nx[q], vl[i] + across * ny[q]
 

@@ -6,6 +6,8 @@ Godunov's flux; the system is linear, so that one direction at a time has the fu
 is read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
 """
 
+from fvsolve.basins.liquid import driven
+from fvsolve.basins.liquid.driven import BEYOND, drive_row, feel, mirror_driven, send_driven, sweep
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.ends import entering_cells, leaving_cells
 from fvsolve.kernels.limiters import by_limiter, slope
@@ -14,7 +16,6 @@ from fvsolve.kernels.records import LINEAR, MUSCL, UPWIND, WENO5
 
 WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
 RING = 8  # rows of waves that are kept: six that a row of faces looks at, and room for all three beyond a side
-BEYOND = 3  # cells beyond a side
 EDGE = 5  # cells that a side looks at
 NEAR = BEYOND + EDGE
 SPARE = 2 * NEAR + 2 * EDGE + BEYOND  # floats that a side works in
@@ -195,7 +196,20 @@ def work_size(nx, ny):
 
 
 @njit
-def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y):
+def turn_row(c, ny, j, up, down, along, moves):
+    """Waves at a row of faces that move become fluxes; walls feel them."""
+    nx, many = up.size, moves[2].size // 2
+    if j == 0 or j == ny:
+        at, speed = 2 * ny + (nx if j > 0 else 0), moves[1][j]
+        beside = along[(ny - 1) * nx if j > 0 else 0 :]
+        feel(c, speed if j > 0 else -speed, up, down, beside, nx, moves[2][at:], moves[2][many + at :])
+    sweep(c, moves[3], moves[1][j:], 0, up, down)
+
+
+@njit
+def grid_rates(
+    c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y, moves
+):
     """Rates of all cells; returns the greatest c (kx + ky) [1/s].
 
     c : wave speed [m/s]; small : a flow density too small to mean anything, squared [kg2/(m4 s2)]
@@ -203,6 +217,8 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, th
     reflect : float64[2 (nx + ny)]  share of a wave that a side sends back: west, east, south, north; empty: walls
     through : float64[2 (nx + ny)]  what comes in through faces of the boundary [kg/(m s)], in that order, or empty
     work : float64[work_size(nx, ny)]
+    moves : None, or speeds of lines along x and along y [m/s], float64[nx + 1] and float64[ny + 1], empty where they
+    stand still; what they find on faces of the boundary, as `faces.liquid_rates` has it; density at rest [kg/m3]
     """
     wide, f = nx + 2 * BEYOND, nx + 1
     up, down, work = work[: RING * nx], work[RING * nx : 2 * RING * nx], work[2 * RING * nx :]
@@ -218,7 +234,10 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, th
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             put_waves(half, r[a:z], my[a:z], up[at : at + nx], down[at : at + nx])
             put_waves(half, r[a:z], mx[a:z], east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
-            mirror(nx, east, west)
+            if moves is None or moves[0].size == 0:
+                mirror(nx, east, west)
+            else:
+                mirror_driven(False, c, moves[3], nx, moves[0][0], moves[0][nx], east, west)
             if to_w != WALLS:
                 close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
             if to_e != WALLS:
@@ -226,13 +245,28 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, th
                 close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
             faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
             faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
+            if moves is not None and moves[0].size > 0:
+                send_driven(False, c, moves[3], -moves[0][0], fw, fe, 1)
+                send_driven(False, c, moves[3], moves[0][nx], fe[nx:], fw[nx:], 1)
             if to_w != WALLS:
                 fe[0] = reflect[rows] * fw[0]
             if to_e != WALLS:
                 fw[nx] = reflect[ny + rows] * fe[nx]
             if through.size > 0:
                 through[rows], through[ny + rows] = (fe[0] - fw[0]) / ky[rows], (fw[nx] - fe[nx]) / ky[rows]
-            settle_row(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            if moves is None or moves[0].size == 0:
+                settle_row(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            else:
+                speeds, many = moves[0], moves[2].size // 2
+                feel(c, -speeds[0], fe, fw, my[a:], 1, moves[2][rows:], moves[2][many + rows :])
+                feel(
+                    c, speeds[nx], fe[nx:], fw[nx:], my[z - 1 :], 1, moves[2][ny + rows :], moves[2][many + ny + rows :]
+                )
+                sweep(c, moves[3], speeds, 1, fe, fw)
+                fe[0], fe[nx] = 0.0 if to_w == WALLS else fe[0], 0.0 if to_e == WALLS else fe[nx]
+                if through.size > 0:
+                    through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
+                driven.settle_row(kx, speeds, fe, fw, my[a:z], rate_r[a:z], rate_x[a:z], rate_y[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
             if (side == 0 and j > 0) or (side == 1 and j != max(ny - BEYOND + 1, 0)):
@@ -242,6 +276,11 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, th
                 a, at = fold(row, ny) * nx, (row % RING) * nx
                 one, other = (down, up) if image(row, ny) else (up, down)
                 put_waves(half, r[a : a + nx], my[a : a + nx], one[at : at + nx], other[at : at + nx])
+                if moves is not None and moves[1].size > 0 and image(row, ny):
+                    out = -moves[1][0] if side == 0 else moves[1][ny]
+                    drive_row(
+                        False, c, moves[3], out, (down if side == 1 else up)[at:], (up if side == 1 else down)[at:], nx
+                    )
             if side == 0 and to_s != WALLS:
                 close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
             if side == 1 and to_n != WALLS:
@@ -252,6 +291,11 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, th
         e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
         faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], fu)
         faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], fd)
+        if moves is not None and moves[1].size > 0:
+            if j == 0:
+                send_driven(False, c, moves[3], -moves[1][0], fd, fu, nx)
+            if j == ny:
+                send_driven(False, c, moves[3], moves[1][ny], fu, fd, nx)
         if j == 0 and to_s != WALLS:
             send_back(south, fd, fu)
         if j == ny and to_n != WALLS:
@@ -260,7 +304,22 @@ def grid_rates(c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, th
             put_inward(kx, fu, fd, through[2 * ny : 2 * ny + nx])
         if through.size > 0 and j == ny:
             put_inward(kx, fd, fu, through[2 * ny + nx :])
-        if j > 0:
-            a, z = (j - 1) * nx, j * nx
+        a, z = (j - 1) * nx, j * nx
+        if moves is not None and moves[1].size > 0:
+            turn_row(c, ny, j, fu, fd, mx, moves)
+            if (j == 0 and to_s == WALLS) or (j == ny and to_n == WALLS):
+                for i in range(nx):
+                    fu[i] = 0.0
+                if through.size > 0:
+                    at = 2 * ny + (nx if j > 0 else 0)
+                    for i in range(nx):
+                        through[at + i] = 0.0
+            if j > 0:
+                driven.settle_column(
+                    ky[j - 1], moves[1][j - 1], moves[1][j], between[before:], between[before + nx :], fu, fd,
+                    mx[max(j - 2, 0) * nx :], mx[a:], mx[min(j, ny - 1) * nx :],
+                    rate_r[a:z], rate_y[a:z], rate_x[a:z],
+                )  # fmt: skip
+        elif j > 0:
             settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])
     return c * steepest(kx, ky)

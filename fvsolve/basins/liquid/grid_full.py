@@ -13,8 +13,8 @@ compiled, so that neither law compiles or runs anything of the other's.
 
 from math import sqrt
 
+from fvsolve.basins.liquid.driven import BEYOND, drive_row, feel_full, mirror_driven, send_driven
 from fvsolve.basins.liquid.grid import (
-    BEYOND,
     EDGE,
     RING,
     SPARE,
@@ -106,21 +106,31 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
 
 
 @inner
-def fluxes(c0, rho, table, forward, backward, along):
-    """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them."""
+def fluxes(c0, rho, table, forward, backward, along, speeds, step):
+    """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them.
+
+    speeds : None, or every `step`-th is that of a face, which sweeps what it passes
+    """
     if table is not None:
         for i in range(forward.size):
             r, p = state(table, forward[i] + backward[i])
             u = forward[i] - backward[i]
-            mass = (rho + r) * u
+            mass = (rho + r) * (u if speeds is None else u - speeds[step * i])
             forward[i], backward[i], along[i] = mass, mass * u + p, mass * along[i]
         return
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(forward.size):
         y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]  # c = c0 (1 + y)
-        mass = rho * u / ((1.0 + y) * (1.0 + y))
+        mass = rho * (u if speeds is None else u - speeds[step * i]) / ((1.0 + y) * (1.0 + y))
         forward[i], backward[i] = mass, mass * u - 2.0 * bulk * log_sum(y)
         along[i] = mass * along[i]
+
+
+@inner
+def follow(speeds, step, forward, seen):
+    """Forward waves as faces that move see them: less what is as quick as these, none is carried through."""
+    for i in range(seen.size):
+        seen[i] = forward[i] - speeds[step * i]
 
 
 @inner
@@ -150,13 +160,14 @@ def work_size(nx, ny):
 
 @njit
 def grid_rates(
-    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y
-):
+    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
+    moves,
+):  # fmt: skip
     """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
     table : of `waves`, or None for law `log`; small : a velocity too small to mean anything, squared
-    The others are those of `liquid.grid_rates`; work : float64[work_size(nx, ny)]
+    The others are those of `liquid.grid_rates`; work : float64[work_size(nx, ny)], where lines move nx + 1 more
     """
     wide, f, size = nx + 2 * BEYOND, nx + 1, RING * nx
     up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]
@@ -177,7 +188,10 @@ def grid_rates(
             put_primitives(c0, rho, table, kx, ky[rows], r[a:z], mx[a:z], my[a:z], w, u, v, top)
             put_waves(0.5, w, v, up[at : at + nx], down[at : at + nx])
             put_waves(0.5, w, u, east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
-            mirror(nx, east, west)
+            if moves is None or moves[0].size == 0:
+                mirror(nx, east, west)
+            else:
+                mirror_driven(True, c0, rho, nx, moves[0][0], moves[0][nx], east, west)
             mirror(nx, over, over)
             if to_w != WALLS:
                 close_side(to_w, along, limiter, small, reflect[rows], nx, east, west, BEYOND, 1, spare)
@@ -186,12 +200,27 @@ def grid_rates(
                 close_side(to_e, along, limiter, small, reflect[ny + rows], nx, west, east, last, -1, spare)
             faces(along, limiter, small, east, east[1:], east[2:], east[3:], east[4:], fe)
             faces(along, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], fw)
+            if moves is not None and moves[0].size > 0:
+                send_driven(True, c0, rho, -moves[0][0], fw, fe, 1)
+                send_driven(True, c0, rho, moves[0][nx], fe[nx:], fw[nx:], 1)
             if to_w != WALLS:
                 fe[0] = reflect[rows] * fw[0]
             if to_e != WALLS:
                 fw[nx] = reflect[ny + rows] * fe[nx]
-            faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
-            fluxes(c0, rho, table, fe, fw, ft)
+            if moves is None or moves[0].size == 0:
+                faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
+                fluxes(c0, rho, table, fe, fw, ft, None, 0)
+            else:
+                seen = spare[SPARE : SPARE + f]
+                follow(moves[0], 1, fe, seen)
+                faces_carried(
+                    along, limiter, small, seen, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft
+                )
+                fluxes(c0, rho, table, fe, fw, ft, moves[0], 1)
+                if to_w == WALLS:
+                    feel_full(fw, 1, moves[2][rows:], fe, ft)
+                if to_e == WALLS:
+                    feel_full(fw[nx:], 1, moves[2][ny + rows :], fe[nx:], ft[nx:])
             if through.size > 0:
                 through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
             settle_row(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
@@ -206,6 +235,11 @@ def grid_rates(
                 one, other = (down, up) if image(row, ny) else (up, down)
                 put_primitives(c0, rho, table, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
                 put_waves(0.5, w, v, one[at : at + nx], other[at : at + nx])
+                if moves is not None and moves[1].size > 0 and image(row, ny):
+                    out = -moves[1][0] if side == 0 else moves[1][ny]
+                    drive_row(
+                        True, c0, rho, out, (down if side == 1 else up)[at:], (up if side == 1 else down)[at:], nx
+                    )
             if side == 0 and to_s != WALLS:
                 close_row(to_s, across, limiter, small, south, ny, up, down, 0, 1, spare)
             if side == 1 and to_n != WALLS:
@@ -216,14 +250,29 @@ def grid_rates(
         e, g, h = (j % RING) * nx, ((j + 1) % RING) * nx, ((j + 2) % RING) * nx
         faces(across, limiter, small, up[a:], up[b:], up[d:], up[e:], up[g:], gu)
         faces(across, limiter, small, down[h:], down[g:], down[e:], down[d:], down[b:], gd)
+        if moves is not None and moves[1].size > 0:
+            if j == 0:
+                send_driven(True, c0, rho, -moves[1][0], gd, gu, nx)
+            if j == ny:
+                send_driven(True, c0, rho, moves[1][ny], gu, gd, nx)
         if j == 0 and to_s != WALLS:
             send_back(south, gd, gu)
         if j == ny and to_n != WALLS:
             send_back(north, gu, gd)
-        faces_carried(
-            across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
-        )
-        fluxes(c0, rho, table, gu, gd, gt)
+        if moves is None or moves[1].size == 0:
+            faces_carried(
+                across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
+            )
+            fluxes(c0, rho, table, gu, gd, gt, None, 0)
+        else:
+            seen = spare[SPARE : SPARE + nx]
+            follow(moves[1][j:], 0, gu, seen)
+            faces_carried(
+                across, limiter, small, seen, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
+            )
+            fluxes(c0, rho, table, gu, gd, gt, moves[1][j:], 0)
+            if (j == 0 and to_s == WALLS) or (j == ny and to_n == WALLS):
+                feel_full(gd, nx, moves[2][2 * ny + (nx if j > 0 else 0) :], gu, gt)
         if through.size > 0 and j == 0:
             put_inward(1.0, kx, gu, through[2 * ny : 2 * ny + nx])
         if through.size > 0 and j == ny:

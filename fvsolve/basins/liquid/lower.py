@@ -34,7 +34,6 @@ class LiquidRows(BasinRows):
         super().__init__(case, name)
         fluid = case.properties
         self.linear, self.waves = case.law.linear, None
-        self.is_grid = self.is_grid and not self.moves  # rows of a grid are for lines that stand still
         if case.law.tabulated:
             from fvsolve.basins.liquid.lower_waves import Waves
 
@@ -46,13 +45,7 @@ class LiquidRows(BasinRows):
         self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
 
     def pieces(self, valves: bool) -> Iterator[Pieces]:
-        module = "table" if self.waves is not None else "rates"
-        on_grid = "waves_on_grids" if self.linear else "rates_on_grids"
-        if self.moves:
-            rates = "rates_on_moving_meshes" if self.waves is None else "rates_by_table"
-            yield Pieces(home=HOME, rates=f"moving: {rates}")
-        else:
-            yield Pieces(home=HOME, rates=f"{module}: {on_grid if self.is_grid else 'rates_on_meshes'}")
+        yield Pieces(home=HOME, rates=self.rates())
         yield LIQUID
         if self.moves:
             yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
@@ -60,9 +53,18 @@ class LiquidRows(BasinRows):
         if self.waves is not None:
             yield Pieces(home=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
 
+    def rates(self) -> str:
+        """The piece that finds rates of its cells."""
+        kind = "grids" if self.is_grid else "meshes"
+        if self.moves:
+            what = "table" if self.waves is not None else "waves" if self.linear and self.is_grid else "rates"
+            return f"moving: {what}_on_moving_{kind}"
+        what = "waves" if self.linear and self.is_grid else "rates"
+        return f"{'table' if self.waves is not None else 'rates'}: {what}_on_{kind}"
+
     @property
     def even_paced(self) -> bool:
-        return self.linear
+        return self.linear and not self.moves
 
     def scales(self) -> list[float]:
         return [SCALE / self.speed**2, SCALE / self.speed, SCALE / self.speed]
@@ -81,8 +83,9 @@ class LiquidRows(BasinRows):
         if self.waves is not None:
             self.lower_waves(draft, row)
         if self.is_grid:
-            size = (grid if self.linear else grid_full).work_size(self.mesh.grid.nx, self.mesh.grid.ny)
-            row["work"] = draft.to_work(size)
+            nx, ny = self.mesh.grid.nx, self.mesh.grid.ny
+            more = nx + 1 if self.moves else 0
+            row["work"] = draft.to_work((grid if self.linear else grid_full).work_size(nx, ny) + more)
         else:
             row["work"] = draft.to_work(faces.work_size(self.integers))
 

@@ -1,8 +1,8 @@
 """A liquid between walls that move: rates of cells, and its energy as areas change. Knows the tables; knows no flux."""
 
+from fvsolve.basins import moving_meshes, walls
 from fvsolve.basins.energy import at_rest, row_of
-from fvsolve.basins.liquid.rates import MINE, any_mesh
-from fvsolve.basins.moving_meshes import moves_of
+from fvsolve.basins.liquid.rates import MINE, any_mesh, full_grid, linear_grid
 from fvsolve.basins.walls import speed_of, widening
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -14,23 +14,70 @@ def is_moving(basin):
     return basin["kind"] == MINE and basin["walls"] > 0
 
 
+@njit(forceinline=True)
+def on_grid(basin):
+    """Whether it is one in a rectangle."""
+    return is_moving(basin) and basin["nx"] > 0
+
+
+@njit(forceinline=True)
+def on_mesh(basin):
+    """Whether it is one on any other mesh."""
+    return is_moving(basin) and basin["nx"] == 0
+
+
+@njit(forceinline=True)
+def lines_of(tables, basin):
+    """What lines of a grid do, as kernels of liquids want it."""
+    along, across, thrust = walls.moves_of(tables, basin)
+    return along, across, thrust, basin["density"]
+
+
 @njit
-def rates_on_moving_meshes(t, y, dydt, out, handle):
-    """Rates under laws linear and log; rectangles are meshes here."""
+def waves_on_moving_grids(t, y, dydt, out, handle):
+    """Rates under law linear on grids."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
-        if is_moving(tables.basins[b]):
-            any_mesh(tables, b, None, y, dydt, out, moves_of(tables, tables.basins[b]))
+        if on_grid(tables.basins[b]):
+            linear_grid(tables, b, y, dydt, out, lines_of(tables, tables.basins[b]))
 
 
 @njit
-def rates_by_table(t, y, dydt, out, handle):
+def rates_on_moving_grids(t, y, dydt, out, handle):
+    """Rates under law log on grids."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if on_grid(tables.basins[b]):
+            full_grid(tables, b, None, y, dydt, out, lines_of(tables, tables.basins[b]))
+
+
+@njit
+def table_on_moving_grids(t, y, dydt, out, handle):
     """The same under law table."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
-        if is_moving(tables.basins[b]):
+        if on_grid(tables.basins[b]):
             table = tables.plane[tables.basins[b]["table"] :]
-            any_mesh(tables, b, table, y, dydt, out, moves_of(tables, tables.basins[b]))
+            full_grid(tables, b, table, y, dydt, out, lines_of(tables, tables.basins[b]))
+
+
+@njit
+def rates_on_moving_meshes(t, y, dydt, out, handle):
+    """Rates under laws linear and log on meshes."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if on_mesh(tables.basins[b]):
+            any_mesh(tables, b, None, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]))
+
+
+@njit
+def table_on_moving_meshes(t, y, dydt, out, handle):
+    """The same under law table."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if on_mesh(tables.basins[b]):
+            table = tables.plane[tables.basins[b]["table"] :]
+            any_mesh(tables, b, table, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]))
 
 
 @njit

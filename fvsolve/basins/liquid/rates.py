@@ -12,8 +12,8 @@ MINE = kind_of(__package__)
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """Whether it is a rectangle of liquid."""
-    return basin["kind"] == MINE and basin["nx"] > 0
+    """Whether it is a rectangle of liquid that stands still."""
+    return basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0
 
 
 @njit(forceinline=True)
@@ -23,31 +23,35 @@ def on_mesh(basin):
 
 
 @njit
-def waves_on_grids(t, y, dydt, out, handle):
-    """Rates under law linear on grids."""
-    tables = open_tables(handle)
-    plane, work = tables.plane, tables.work
-    for b in range(tables.basins.size):
-        basin = tables.basins[b]
-        if not on_grid(basin) or not wanted(basin, dydt):
-            continue
-        n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
-        through = basin["through"]
-        to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
-        rates = to[first : first + 3 * n]
-        rate = grid.grid_rates(
-            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
-            plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-            y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-            work[through : through + basin["outer_given"]], work[basin["work"] :],
-            rates[:n], rates[n : 2 * n], rates[2 * n :],
-        )  # fmt: skip
-        book_open(tables, b, basin["thickness"], out)
-        out[RATE] = max(out[RATE], rate)
+def linear_grid(tables, b, y, dydt, out, moves):
+    """Rates under law linear on a grid; moves : as in `grid.grid_rates`."""
+    plane, work, basin = tables.plane, tables.work, tables.basins[b]
+    n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
+    through = basin["through"]
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+    rates = to[first : first + 3 * n]
+    rate = grid.grid_rates(
+        basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
+        plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
+        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
+        work[through : through + basin["outer_given"]], work[basin["work"] :],
+        rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
+    )  # fmt: skip
+    book_open(tables, b, basin["thickness"], out)
+    out[RATE] = max(out[RATE], rate)
 
 
 @njit
-def full_grid(tables, b, table, y, dydt, out):
+def waves_on_grids(t, y, dydt, out, handle):
+    """Rates under law linear on grids."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if on_grid(tables.basins[b]) and wanted(tables.basins[b], dydt):
+            linear_grid(tables, b, y, dydt, out, None)
+
+
+@njit
+def full_grid(tables, b, table, y, dydt, out, moves):
     """Rates with the full momentum flux on a grid, of its waves or, with no table, under law log."""
     plane, work, basin = tables.plane, tables.work, tables.basins[b]
     n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
@@ -60,7 +64,7 @@ def full_grid(tables, b, table, y, dydt, out):
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
         y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
         work[through : through + basin["outer_given"]], work[basin["work"] :],
-        rates[:n], rates[n : 2 * n], rates[2 * n :],
+        rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
     )  # fmt: skip
     book_open(tables, b, basin["thickness"], out)
     out[RATE] = max(out[RATE], rate)
@@ -72,7 +76,7 @@ def rates_on_grids(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and wanted(tables.basins[b], dydt):
-            full_grid(tables, b, None, y, dydt, out)
+            full_grid(tables, b, None, y, dydt, out, None)
 
 
 @njit

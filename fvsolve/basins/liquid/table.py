@@ -21,7 +21,7 @@ def rates_on_grids(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if on_grid(basin) and wanted(basin, dydt):
-            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out)
+            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out, None)
 
 
 @njit

@@ -1,0 +1,87 @@
+"""Waves of a liquid where walls move, and what passes faces that do. Knows rows of waves and faces; knows no patch.
+
+A wall that moves outward at `speed` sends back what makes the velocity there its own; under law `linear` what makes the
+mass flow m = speed (rho + r), so that no mass passes. Waves are c r and m, or w and u where `full`, see `grid`.
+"""
+
+from fvsolve.jit import inner, njit
+
+BEYOND = 3  # cells beyond a side
+
+
+@njit(forceinline=True)
+def driven(full, c, rho, speed, arriving):
+    """m, or u where full, at a wall; arriving : c r + m, or w + u, across it from inside."""
+    return speed if full else speed * (arriving + rho * c) / (c + speed)
+
+
+@njit
+def mirror_driven(full, c, rho, n, first, last, forward, backward):
+    """Fill three values beyond either end of [3 : n + 3] of two waves; first, last : speeds of walls there."""
+    for k in range(BEYOND):
+        low, high = 2 - k, n + 3 + k
+        a, b = backward[3 + k], forward[3 + k]
+        m = driven(full, c, rho, -first, 2.0 * a)
+        forward[low], backward[low] = a - m, b + m
+        a, b = forward[n + 2 - k], backward[n + 2 - k]
+        m = driven(full, c, rho, last, 2.0 * a)
+        backward[high], forward[high] = a - m, b + m
+
+
+@njit
+def drive_row(full, c, rho, speed, entering, leaving, n):
+    """Let a mirrored row beyond a side be seen in a wall that moves outward."""
+    for i in range(n):
+        m = driven(full, c, rho, speed, 2.0 * entering[i])
+        entering[i], leaving[i] = entering[i] - m, leaving[i] + m
+
+
+@njit
+def send_driven(full, c, rho, speed, leaving, entering, n):
+    """What enters at faces of a wall, of what leaves there."""
+    for i in range(n):
+        entering[i] = leaving[i] - driven(full, c, rho, speed, 2.0 * leaving[i])
+
+
+@njit
+def feel(c, speed, forward, backward, along, n, thrust, loss):
+    """Pressure on faces of a wall under law `linear`, and what is lost beside it; see `faces`."""
+    for i in range(n):
+        x, m = forward[i] + backward[i], forward[i] - backward[i]
+        thrust[i], loss[i] = c * x, speed * (x * x - m * m - along[i] * along[i])
+
+
+@njit
+def feel_full(push, n, thrust, mass, along):
+    """The same with the full momentum flux, which is the pressure where nothing passes."""
+    for i in range(n):
+        thrust[i], mass[i], along[i] = push[i], 0.0, 0.0
+
+
+@inner
+def sweep(c, rho, speeds, step, forward, backward):
+    """Waves at faces become fluxes of mass and momentum less what faces sweep; speeds : every `step`-th of a face."""
+    for i in range(forward.size):
+        m, x, speed = forward[i] - backward[i], forward[i] + backward[i], speeds[step * i]
+        forward[i], backward[i] = m - speed * (rho + x / c), c * x - speed * m
+
+
+@inner
+def settle_row(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
+    """Rates of a row of cells from faces i and i + 1; what is along faces stays while these pass."""
+    m, p, v = mass[1:], push[1:], speeds[1:]
+    last = rate_r.size - 1
+    for i in range(rate_r.size):
+        before, after = along[max(i - 1, 0)] + along[i], along[i] + along[min(i + 1, last)]
+        rate_r[i] = k[i] * (mass[i] - m[i])
+        rate_m[i] = k[i] * (push[i] - p[i])
+        rate_t[i] = 0.5 * k[i] * (v[i] * after - speeds[i] * before)
+
+
+@inner
+def settle_column(k, s0, s1, m0, p0, m1, p1, before, here, after, rate_r, rate_m, rate_t):
+    """The same, added, of a row of cells between two rows of faces; before, here, after : what is along these."""
+    for i in range(rate_r.size):
+        rate_r[i] += k * (m0[i] - m1[i])
+        rate_m[i] += k * (p0[i] - p1[i])
+        rate_t[i] += 0.5 * k * (s1 * (here[i] + after[i]) - s0 * (before[i] + here[i]))
