@@ -85,7 +85,8 @@ PINT_SI = {
     "kg/s": "kilogram/second",
     "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "1/s": "1/second", "rad": "radian",
     "Pa s/m": "pascal*second/meter",
-    "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2", "N m s": "newton*meter*second", "N s": "newton*second",
+    "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2",
+    "N m s": "newton*meter*second", "N s": "newton*second",
     "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",
 }  # fmt: skip
 
