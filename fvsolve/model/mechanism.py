@@ -13,6 +13,7 @@ from fvsolve.model.slate import wiped
 from fvsolve.parts.body.part import Body
 
 WATER = ("frames: set_frames", "frames: turn_water")  # what loads bodies beside pushes, at rest
+NETWORKS = ("rides: set_rides", "rides: press_tanks", "recoil: load_networks")
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
 BETWEEN = (-1, -1, -1, rec.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
@@ -199,6 +200,8 @@ class Statics:
         self.y, self.tables, rides = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
         rubber = ("bushings: push_bushings",) if len(draft.bushing_table) else ()
         self.pushes = ("joints: kinematics", "lines: push_bodies", *rubber, *(WATER if rides else ()))
+        if len(draft.ride_table) and draft.case.law.linear:
+            self.pushes += NETWORKS
         if rides:
             self.y, self.tables = (
                 at_start(draft.basins, draft.size),
@@ -357,7 +360,12 @@ def start_bodies(draft, start) -> list[str]:
         size += held
     freedoms["balance"] = np.where(np.abs(left) <= SNAP * size, left, 0.0)
     at.run(*at.pushes, accelerate)
-    return moves(draft, at.accelerations())
+    found = at.accelerations()
+    if len(draft.ride_table) and not np.isfinite(found).all():
+        text = "fluid in tall tanks, whose own flow has no inertia here, outweighs what carries it"
+        draft.fault("nodes", f"{text}; wanted wider tanks, a heavier body, or a driven joint")
+        draft.check()
+    return moves(draft, found)
 
 
 def pin_rows(draft, at: Statics) -> np.ndarray:
