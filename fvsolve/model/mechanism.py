@@ -325,7 +325,12 @@ def refuse_weightless(draft, at: Statics) -> None:
         own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
         least = ALIKE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
         for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
-            if not at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** 2 > least:
+            left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** 2
+            if np.isnan(left) and len(draft.ride_table):
+                text = "fluid in tall tanks, whose own flow has no inertia here, outweighs what carries it"
+                wanted = "wanted wider tanks, a heavier body, or a driven joint"
+                return draft.fault(f"nodes.{name}.mass", f"{text}; {wanted}")
+            if not left > least:
                 text = "nothing resists the motion that its joint leaves it: its inertia there is 0"
                 return draft.fault(f"nodes.{name}.inertia", f"{text}; give it some, about the axis of the joint")
 
@@ -360,12 +365,7 @@ def start_bodies(draft, start) -> list[str]:
         size += held
     freedoms["balance"] = np.where(np.abs(left) <= SNAP * size, left, 0.0)
     at.run(*at.pushes, accelerate)
-    found = at.accelerations()
-    if len(draft.ride_table) and not np.isfinite(found).all():
-        text = "fluid in tall tanks, whose own flow has no inertia here, outweighs what carries it"
-        draft.fault("nodes", f"{text}; wanted wider tanks, a heavier body, or a driven joint")
-        draft.check()
-    return moves(draft, found)
+    return moves(draft, at.accelerations())
 
 
 def pin_rows(draft, at: Statics) -> np.ndarray:
