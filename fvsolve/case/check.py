@@ -95,7 +95,7 @@ def parts(
                 yield (ROOT, *keys), text
 
     yield from bodies.misfits(nodes)
-    yield from riding_networks.misfits(nodes, links)
+    yield from riding_networks.misfits(nodes, links, fluid)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))

@@ -12,6 +12,7 @@ from fvsolve.parts.basin.part import Basin
 from fvsolve.parts.node import Node, Rider
 
 Found = Iterator[tuple[tuple, str]]
+FELT = "rigid columns between tanks alone"
 CLOSE = 1e-6  # of a length: places are typed with a few digits
 
 
@@ -23,20 +24,39 @@ def standing(node: Node, poses: dict[str, Any]) -> Node:
     return node.model_copy(update={"elevation": float(pose.at(node.place)[2])})
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
+def misfits(nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
     """Faults of places of a network that ride on bodies, and of links that join them."""
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, Rider):
             continue
         yield from place_faults(name, node, nodes)
         if node.on is not None and (free := next(free_joints(node.on, nodes), None)) is not None:
-            text = f"{free} moves freely, and does not feel its network yet; wanted a driven joint"
-            yield ("nodes", name, "on"), text
+            if fluid is not None and fluid.law != "linear":
+                yield ("fluid", "law"), f'{free} moves freely and carries {name}; wanted "linear", or a driven joint'
+            yield from ((("nodes", name, *key), f"{free} moves freely, and {text}") for key, text in unfelt(node))
         if node.on is not None and getattr(node, "head", None) is not None:
             yield ("nodes", name, "head"), f"it rides on {node.on}, and a head counts from the ground; wanted pressure"
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes))
+        on = next((body for place in ends if (body := getattr(nodes.get(place), "on", None))), None)
+        if on and link.kind != "rigid-column" and (free := next(free_joints(on, nodes), None)) is not None:
+            yield (
+                ("links", name),
+                f"{free} moves freely, and feels {FELT} yet; wanted a rigid-column, or a driven joint",
+            )
+
+
+def unfelt(node: Rider) -> Found:
+    """What a body that moves freely does not feel of a place."""
+    if node.kind != "tank":
+        yield (), f"feels {FELT} yet; wanted a tank, or a driven joint"
+        return
+    for key in ("connection", "height"):
+        if getattr(node, key) is not None:
+            yield (key,), "does not feel what passes here yet; leave it out, or drive the joint"
+    if hasattr(node.area, "area"):
+        yield ("area",), "feels tanks of one area alone yet; wanted a number, or a driven joint"
 
 
 def link_faults(link: Any, ends: list[str], nodes: dict[str, Any]) -> Found:

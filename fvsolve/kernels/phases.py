@@ -107,7 +107,8 @@ MEMBERS = {
     "lines": Pieces(move="mechanism.lines: push_bodies"),
     "rides": Pieces(
         prepare="mechanism.rides: set_rides", store="mechanism.rides: press_tanks",
-        rates="mechanism.rides: push_cells",
+        rates="mechanism.rides: push_cells", enter="mechanism.recoil: load_networks",
+        follow="mechanism.recoil: follow_networks",
     ),
     "rides, barotropic": Pieces(
         prepare="mechanism.rides: set_rides", store="mechanism.rides_barotropic: press_tanks_barotropic",

@@ -189,7 +189,8 @@ COLUMN = np.dtype(
         ("drag", "f8"),
         ("offset", "f8"),  # driving pressure of the profile that friction does not balance [Pa]
         ("base", "f8"),  # laws log and table: driving pressure of the profile [Pa]
-        ("ride", "i8"),  # in `rides`; -1 where it stands still
+        ("ride", "i8"),  # of its first stretch in `rides`; -1 where it stands still
+        ("rides", "i8"),  # how many these are
     ],
     align=True,
 )

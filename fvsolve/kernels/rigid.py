@@ -60,7 +60,10 @@ def column_drag(column, flow):
 @njit(forceinline=True)
 def body_drive(tables, out, column):
     """What the motion of its body drives a column by since the start [J/kg]; 0 where it stands still."""
-    return out[tables.layout[0]["ride"] + column["ride"]] if column["ride"] >= 0 else 0.0
+    total, at = 0.0, tables.layout[0]["ride"] + column["ride"]
+    for k in range(column["rides"]):
+        total += out[at + k]
+    return total
 
 
 @njit(forceinline=True)

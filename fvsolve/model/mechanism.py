@@ -13,6 +13,7 @@ from fvsolve.model.slate import wiped
 from fvsolve.parts.body.part import Body
 
 WATER = ("frames: set_frames", "frames: turn_water")  # what loads bodies beside pushes, at rest
+NETWORKS = ("rides: set_rides", "rides: press_tanks", "recoil: load_networks")
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
 BETWEEN = (-1, -1, -1, rec.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
@@ -199,6 +200,8 @@ class Statics:
         self.y, self.tables, rides = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
         rubber = ("bushings: push_bushings",) if len(draft.bushing_table) else ()
         self.pushes = ("joints: kinematics", "lines: push_bodies", *rubber, *(WATER if rides else ()))
+        if len(draft.ride_table) and draft.case.law.linear:
+            self.pushes += NETWORKS
         if rides:
             self.y, self.tables = (
                 at_start(draft.basins, draft.size),
@@ -322,7 +325,12 @@ def refuse_weightless(draft, at: Statics) -> None:
         own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
         least = ALIKE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
         for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
-            if not at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** 2 > least:
+            left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** 2
+            if np.isnan(left) and len(draft.ride_table):
+                text = "fluid in tall tanks, whose own flow has no inertia here, outweighs what carries it"
+                wanted = "wanted wider tanks, a heavier body, or a driven joint"
+                return draft.fault(f"nodes.{name}.mass", f"{text}; {wanted}")
+            if not left > least:
                 text = "nothing resists the motion that its joint leaves it: its inertia there is 0"
                 return draft.fault(f"nodes.{name}.inertia", f"{text}; give it some, about the axis of the joint")
 

@@ -26,7 +26,9 @@ def lower_rides(draft) -> None:
             points = ends[0] + shares * (ends[1] - ends[0])
             found += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
         else:
-            found.append(stretch(draft, first.on, np.array([ends[0], *link.route, ends[1]])))
+            points = np.array([ends[0], *link.route, ends[1]])
+            row["rides"] = len(points) - 1
+            found += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
     for node, row in zip(places.values(), draft.node_table, strict=True):
         if row["kind"] == rec.TANK and node.on is not None:
             row["ride"] = len(found)
@@ -39,10 +41,9 @@ def lower_rides(draft) -> None:
 
 
 def stretch(draft, on: str, points: np.ndarray) -> tuple:
-    """A row of `rides`: along straight lines between points in axes of a body [m]."""
-    swept = np.cross(points[:-1], points[1:]).sum(axis=0)
-    rise = (draft.case.poses[on].attitude @ (points[-1] - points[0]))[2]
-    return draft.body_names.index(on), points[0], points[-1], swept, -draft.case.gravity * rise
+    """A row of `rides`: straight between two points in axes of a body [m]."""
+    rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
+    return draft.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise
 
 
 def refuse_joints(draft) -> None:
@@ -73,7 +74,7 @@ def driven_at_start(draft, start) -> list[str]:
                                ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
         for name, row in zip(names, table, strict=True):
             if row["ride"] >= 0:
-                many = int(row["cells"]) if "cells" in row.dtype.names else 1
+                many = int(row["cells" if "cells" in row.dtype.names else "rides"])
                 push = float(drives[row["ride"] : row["ride"] + many].sum())
                 if abs(push) > SMALL:
                     found.append(f"{kind} {name}: its body drives it with {rho * push:.4g} Pa")

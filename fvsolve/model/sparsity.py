@@ -45,6 +45,7 @@ class Couplings:
         self.masses, self.pistons = tables.masses["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
         self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
+        self.rides = tables.rides
         self.bushings = tables.bushings
         joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
@@ -255,6 +256,10 @@ class Couplings:
         for basin in self.basins:
             if basin.row["body"] >= 0:
                 trees.setdefault(self.tied(self.bodies[basin.row["body"]]["root"]), []).append(pattern.all_of(basin))
+        for column in self.columns if len(self.rides) else ():
+            if column["ride"] >= 0:
+                found = trees.setdefault(self.tied(self.bodies[self.rides[column["ride"]]["body"]]["root"]), [])
+                found += [states(column["y"]), self.own(column["from_node"]), self.own(column["to_node"])]
         for root, cells in trees.items():
             own = [self.of_tree(root, what) for what in (0, 1)]
             if own[0].size == 0:

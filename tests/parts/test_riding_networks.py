@@ -328,12 +328,6 @@ def test_a_route_of_a_column_that_stands_still_is_told():
     assert "its ends ride on none" in said(case)["links.way.route"]
 
 
-def test_a_body_that_moves_freely_is_refused_by_name():
-    case = u_tube()
-    case["nodes"]["hull"]["joint"] = {"kind": "revolute", "axis": [1, 0, 0], "angle": 0.1}
-    assert "hull moves freely" in said(case)["nodes.port.on"]
-
-
 def test_what_is_not_booked_yet_is_refused():
     with pytest.raises(FvsolveError, match="networks that ride"):
         energy(fv.load(u_tube()))

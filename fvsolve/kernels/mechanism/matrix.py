@@ -13,6 +13,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import held_by
 from fvsolve.kernels.mechanism.joints import at_origin, parameters, rates
+from fvsolve.kernels.mechanism.laden import add_networks
 from fvsolve.kernels.mechanism.room import (
     ACCELERATION,
     APPARENT,
@@ -169,6 +170,7 @@ def fill(y, out, tables):
             for k in range(LOAD):
                 work[over + k] += work[load + k]
     add_tanks(out, tables)
+    add_networks(y, out, tables)
 
 
 @njit
