@@ -22,7 +22,7 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
-        if "sloshing" in basin.model_fields_set:
+        if basin.sloshing == "frozen":
             yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
         return
     if not basin.own.rides:

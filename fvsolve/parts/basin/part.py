@@ -21,6 +21,7 @@ from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.table import Inside, Named, Table
 from fvsolve.parts.value import (
     SHAPE,
+    VALUE,
     Choice,
     Quantity,
     Rows,
@@ -73,7 +74,7 @@ class Patch(Table):
         float | None,
         Quantity(
             "length", positive, "behind a wall that moves, in which lines go with it [m]; all of the basin if left out",
-            changes=SHAPE,
+            changes=VALUE,
         ),
     ] = None  # fmt: skip
     scalars: Annotated[dict[str, Any], Carried("of scalars that the given velocity brings in")] = {}
