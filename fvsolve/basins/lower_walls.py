@@ -22,7 +22,10 @@ def lower_walls(draft) -> None:
         row["basin"], row["outward"] = draft.basins.index(basin), side
         row["node"] = draft.node_index[f"{basin.name}.{patch}"]
         row["y"] = draft.states([f"{basin.name}.{patch}.travel"], SCALE)
-        row["mass"] = draft.mass_index[one.body] if one.body is not None else -1
+        row["mass"] = draft.mass_index.get(one.body, -1) if one.body is not None else -1
+        row["body"] = draft.body_names.index(one.body) if one.body in draft.body_names else -1
+        if row["body"] >= 0:
+            row["toward"] = np.sign(case.direction(draft.case.nodes[one.body])[axis])
         row["schedule"] = draft.schedules.add(one.travel) if one.travel is not None else -1
         with_it = case.weights(basin.part, basin.mesh, patch, basin.mesh.points[:, axis])
         goes, per = with_it, case.widened(basin.mesh, axis, with_it)

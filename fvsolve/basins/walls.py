@@ -14,6 +14,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.accounts import OF_WALL, wall_rows
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
+from fvsolve.kernels.mechanism.room import FORCE
+from fvsolve.kernels.mechanism.room import row_of as row_of_body
 from fvsolve.kernels.records import NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.schedules import schedule_slopes
 
@@ -169,6 +171,11 @@ def speed_of(t, tables, wall, y):
     """Speed of a wall along its axis [m/s]."""
     if wall["mass"] >= 0:
         return motion(tables.masses[wall["mass"]], y)[1]
+    if wall["body"] >= 0:
+        body = tables.bodies[wall["body"]]
+        if body["schedule"] >= 0:
+            return wall["toward"] * schedule_slopes(tables, body["schedule"], t)[0]
+        return wall["toward"] * (body["speed"][0] + y[body["rate"]])
     return schedule_slopes(tables, wall["schedule"], t)[0]
 
 
@@ -232,6 +239,22 @@ def impedance(tables, basin, i, y):
 
 
 @njit
+def press(out, tables, wall, force):
+    """Add a force on a wall, outward, to those of its body, through that body's origin."""
+    row, along, push = row_of_body(tables, wall["body"]), tables.basins[wall["basin"]]["turn"], wall["outward"] * force
+    out[row + FORCE + along] += push
+
+
+@njit
+def press_at_rest(t, y, dydt, out, handle):
+    """What the profile puts on walls, to the bodies that they go with."""
+    tables = open_tables(handle)
+    for k in range(tables.walls.size):
+        if tables.walls[k]["body"] >= 0:
+            press(out, tables, tables.walls[k], tables.walls[k]["rest"])
+
+
+@njit
 def push_bodies(t, y, dydt, out, handle):
     """Forces on walls, outward, less those of the profile; bodies feel them, as steps do."""
     tables = open_tables(handle)
@@ -245,6 +268,10 @@ def push_bodies(t, y, dydt, out, handle):
             waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], y)
         total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
         out[layout["wall"] + k] = total
+        if wall["body"] >= 0:
+            body = tables.bodies[wall["body"]]
+            out[RATE] = max(out[RATE], waves / body["mass"])
+            press(out, tables, wall, wall["rest"] + total)
         if wall["mass"] < 0:
             continue
         mass = masses[wall["mass"]]

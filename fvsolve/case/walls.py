@@ -91,7 +91,7 @@ def wall_faults(
     if one.span is not None:
         yield ("span",), "a wall that moves is all of a side; leave span out"
     if one.body is not None and (one.body in nodes or one.body not in named):  # else at fault itself
-        yield from ((("body",), text) for text in body_faults(one.body, nodes))
+        yield from ((("body",), text) for text in body_faults(one.body, nodes, outward(mesh, patch)[0]))
     normals = mesh.normal[mesh.patch(patch)]
     if np.ptp(normals, axis=0).max() > 1e-9 or np.abs(normals[0]).max() < 1.0 - 1e-9:
         yield (), "is not straight across x or y; wanted a wall that is, to move along that axis"
@@ -113,15 +113,31 @@ def wall_faults(
     yield from outline_faults(basin, mesh, patch)
 
 
-def body_faults(name: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Faults of the body that a wall names."""
-    masses = [one for one, node in nodes.items() if getattr(node, "kind", "") == "mass"]
+def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
+    """Faults of the body that a wall names, which moves along an axis."""
+    known = [one for one, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")]
     node = nodes.get(name)
     if node is None:
-        yield f"no mass named {show(name)}; masses are {listing(masses) or 'none'}{did_you_mean(name, masses)}"
+        yield f"no mass or body named {show(name)}; there are {listing(known) or 'none'}{did_you_mean(name, known)}"
+    elif node.kind == "body":
+        yield from slider_faults(name, node, nodes, axis)
     elif node.kind != "mass":
         still = "a frame, which stands still" if node.kind == "frame" else f"a {node.kind}"
-        yield f"{name} is {still}; wanted a mass, or travel in its place"
+        yield f"{name} is {still}; wanted a mass, a body on a prismatic joint, or travel in its place"
+
+
+def slider_faults(name: str, node: Any, nodes: dict[str, Any], axis: int) -> Iterator[str]:
+    """Faults of a body that is to take a wall along."""
+    up = nodes.get((node.joint.on or "").partition(".")[0])
+    if node.joint.kind != "prismatic" or getattr(up, "kind", "frame") != "frame":
+        yield f"{name} does not slide on the world; wanted a prismatic joint on it, or travel in its place"
+    elif abs(direction(node)[axis]) < 1.0 - 1e-9:
+        yield f"{name} does not slide along {'xy'[axis]}, as the wall does; turn its axis"
+
+
+def direction(body: Any) -> np.ndarray:
+    """Along what a body on a prismatic joint slides, in the world : float64[3]."""
+    return body.joint.attitude.rotation @ body.joint.unit_axis
 
 
 def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any, per: np.ndarray) -> Iterator[str]:

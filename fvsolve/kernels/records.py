@@ -523,6 +523,8 @@ WALL = np.dtype(
         ("node", "i8"),  # its patch as a place
         ("y", "i8"),  # offset of its travel since the start [m]
         ("mass", "i8"),  # that it goes with, or
+        ("body", "i8"),  # whose prismatic joint takes it along, or
+        ("toward", "f8"),  # 1 where that travels as the wall does, -1 where the other way
         ("schedule", "i8"),  # of its travel; -1 for none
         ("weights", "i8"),  # in `plane`: how far lines go with it, then by how much cells stretch per travel [1/m]
         ("faces", "i8"),  # in `integers`: its faces' numbers, as the boundary has them

@@ -155,7 +155,7 @@ class Accounts:
         names = [f"{basin.name}.{patch}" for basin in self.model.basins for patch in basin.walls]
         for name, row in zip(names, self.model.tables.walls, strict=True):
             at = self.take(2)
-            if row["mass"] < 0:
+            if row["mass"] < 0 and row["body"] < 0:
                 self.add("supplied", name, "wall", at)
             self.add("law", name, "wall", at + 1)
 

@@ -13,6 +13,7 @@ from fvsolve.model.slate import wiped
 from fvsolve.parts.body.part import Body
 
 WATER = ("frames: set_frames", "frames: turn_water")  # what loads bodies beside pushes, at rest
+WALLS = ("walls: press_at_rest",)
 NETWORKS = ("rides: set_rides", "rides: press_tanks", "recoil: load_networks")
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
 SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
@@ -172,7 +173,7 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
 
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
-        home = "fvsolve.basins" if piece in WATER else "fvsolve.kernels.mechanism"
+        home = "fvsolve.basins" if piece in (*WATER, *WALLS) else "fvsolve.kernels.mechanism"
         addresses[calls.RHS, k] = calls.addressed(found(home, piece), calls.RATES)
     calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
     handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
@@ -200,6 +201,7 @@ class Statics:
         self.y, self.tables, rides = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
         rubber = ("bushings: push_bushings",) if len(draft.bushing_table) else ()
         self.pushes = ("joints: kinematics", "lines: push_bodies", *rubber, *(WATER if rides else ()))
+        self.pushes += WALLS if (draft.wall_table["body"] >= 0).any() else ()
         if len(draft.ride_table) and draft.case.law.linear:
             self.pushes += NETWORKS
         if rides:

@@ -244,6 +244,8 @@ class Couplings:
         for wall in self.walls:
             basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
             speed = states(mass + 1) if mass >= 0 else states()
+            if wall["body"] >= 0:
+                speed = self.of_joint(self.bodies[wall["body"]], 1)
             yield every(pattern.all_of(basin), states(wall["y"], speed))
             yield every(states(wall["y"]), speed)
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]

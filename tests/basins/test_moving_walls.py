@@ -319,3 +319,46 @@ def test_the_ledger_of_energy_has_the_work_of_the_wall_and_its_step_part_falls_w
         parts.append(abs(found.step[-1]) / passed)
     assert parts[1] < parts[0] / 5.0
     assert parts[1] < 1e-3
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("toward", [1.0, -1.0])
+def test_a_body_on_a_prismatic_joint_takes_a_wall_along_as_a_mass_does(side, toward):
+    """The same piston on a spring, once a mass on its axis and once a body that slides either way along it."""
+    axis = [0.0, 0.0, 0.0]
+    axis[0 if side in ("west", "east") else 1] = toward
+    out = 1.0 if side in ("east", "north") else -1.0
+    rest, stiff = 0.5 * RHO * GRAVITY, 9e3
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "step": 0.004}
+    wall = {"lid": {"side": side, "body": "lid"}}
+    one = {"b": flume(wall, 20, 1, side=side), "lid": {"type": "mass", "mass": 500.0, "initial_velocity": 0.2},
+           "ground": {"type": "frame"}}  # fmt: skip
+    spring = {"type": "spring", "from": "lid", "to": "ground", "stiffness": stiff, "preload": out * rest}
+    mass = run(scene(one, {"spring": spring}, 1.0, numerics, ["b.lid.force", "b.lid.power", "b.lid.travel"]))
+    slides = {"kind": "prismatic", "axis": axis, "rate": 0.2 * toward}
+    far = [0.0, 0.0, 0.0]
+    far[0 if side in ("west", "east") else 1] = 4.0 * out
+    other = {"b": flume(wall, 20, 1, side=side), "world": {"type": "frame", "points": {"far": far}},
+             "lid": {"type": "body", "mass": 500.0, "inertia": [1.0, 1.0, 1.0], "joint": slides}}  # fmt: skip
+    stay = {"type": "spring", "from": "lid", "to": "world.far", "stiffness": stiff, "preload": rest}
+    body = run(scene(other, {"stay": stay}, 1.0, numerics, ["b.lid.force", "b.lid.power", "b.lid.travel"]))
+    for probe in ("b.lid.travel", "b.lid.force", "b.lid.power"):
+        assert body[probe] == pytest.approx(mass[probe], rel=1e-9, abs=1e-9)
+    assert np.ptp(mass["b.lid.travel"]) > 0.02
+
+
+def test_a_driven_body_takes_a_wall_along_as_its_travel_would():
+    swing = {"mean": 0.0, "amplitude": 0.1, "period": 1.5}
+    board = {"type": "body", "mass": 5.0, "inertia": [1.0, 1.0, 1.0],
+             "joint": {"kind": "prismatic", "axis": [1, 0, 0], "travel": swing}}  # fmt: skip
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "step": 0.005}
+    probes = ["b.lid.force", "b.lid.power", "b.lid.travel"]
+    one = run(scene({"b": flume({"lid": {"side": "west", "travel": swing}}, 20, 1)}, {}, 1.0, numerics, probes))
+    two = scene({"b": flume({"lid": {"side": "west", "body": "board"}}, 20, 1), "board": board}, {}, 1.0, numerics,
+                [*probes, "board.joint_fx"])  # fmt: skip
+    found = run(two)
+    for probe in probes:
+        assert np.array_equal(found[probe], one[probe])
+    w = 2.0 * math.pi / 1.5
+    asked = 5.0 * -0.1 * w * w * np.sin(w * found.t) + found["b.lid.force"]  # m a, and what the water presses back
+    assert np.abs(found["board.joint_fx"]) == pytest.approx(np.abs(asked), rel=1e-6, abs=1.0)

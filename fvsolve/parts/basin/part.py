@@ -64,9 +64,9 @@ class Patch(Table):
             "impedance", nonnegative, "pressure over velocity of waves, in place of boundary, of a liquid [Pa s/m]"
         ),
     ] = None
-    body: Annotated[str | None, Text("a mass that it moves with, a wall then, along x or y as that along its axis")] = (
-        None
-    )
+    body: Annotated[
+        str | None, Text("a mass, or a body on a prismatic joint, that it moves with, a wall then, along x or y")
+    ] = None
     travel: Annotated[
         Schedule | None, Scheduled("position", about="how far it moves along x or y, in place of body [m]")
     ] = None
