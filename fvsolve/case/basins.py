@@ -17,6 +17,7 @@ from fvsolve.case.cells import means, samples
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
+from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
 from fvsolve.parts.basin.part import MovingWall, Place, StartOfFields
 from fvsolve.parts.value import Misfit, Setting
@@ -153,10 +154,12 @@ def _patches(basin: Basin, known: tuple[str, ...], wanted: str) -> str:
     return f"{name} names no groups of lines; Gmsh does by Physical Curve({show(wanted)}) = {{1, 2}};"
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, named: Any) -> Found:
+def misfits(
+    nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, all_nodes: Any
+) -> Found:
     """Faults of patches, and of what basins do not go with; times : of start and end [s].
 
-    named : names of all nodes, also of those at fault themselves
+    all_nodes : names of all, also of those at fault themselves
     """
     found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     joined = {place for link in links.values() for place in link.ports.values()}
@@ -166,11 +169,11 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: A
         if fluid is not None and not own.goes(fluid.law):
             wanted = named(lambda law, own=own: own.goes(law.name))
             yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.described}; wanted {wanted}"
-        yield from riding.misfits(name, basin, nodes, joined, named)
+        yield from riding.misfits(name, basin, nodes, joined, all_nodes)
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
-        yield from walls.misfits(name, basin, meshes[name], nodes, joined, times, named)
+        yield from walls.misfits(name, basin, meshes[name], nodes, joined, times, all_nodes)
         for patch, one in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"

@@ -68,7 +68,7 @@ def test_faults_of_torques():
     held = {"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": step(0.5, 0.0, 1.0)["time"][1]}
     assert "is held by its motor until it trips" in faults(motor, **held)
     wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
-    assert "a hydraulic place, and this port of a torque a rotational one" in faults(wet, curve=ONE)
+    assert "a hydraulic place, and this port of a torque a rotational or spatial one" in faults(wet, curve=ONE)
 
 
 def rounded(by: float) -> dict:

@@ -15,7 +15,10 @@ from restated.parts import LINKS, NODES
 from restated.telling import told
 
 pytestmark = pytest.mark.filterwarnings("error")  # of numbers that are none
-ELSEWHERE = {"basin", "mass", "frame", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque"}
+ELSEWHERE = {
+    "basin", "mass", "frame", "body", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque",
+    "pin", "bushing",
+}  # fmt: skip
 HEAD = 20.0
 NEIGHBOURS = [
     junction(),
