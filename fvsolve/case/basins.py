@@ -67,6 +67,11 @@ class Pool:
         return MeshPoints(self.mesh)
 
 
+def lumped_fields(basin: Basin) -> dict[str, str]:
+    """What can be read at points of water without cells: its depth where it swings."""
+    return {"depth": basin.own.fields["depth"]} if basin.sloshing == "modes" and basin.own.rides else {}
+
+
 def mesh_of(basin: Basin, setting: Setting) -> Mesh:
     """The mesh of a basin; Misfit with all that is wrong with it."""
     from fvsolve.mesh import read, rectangle

@@ -54,7 +54,7 @@ class Case(Shown):
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
     folder: Path | None = field(repr=False)
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
-    frozen: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is one with its body
+    lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is masses on its body
 
     picture = "fvsolve.draw.objects:case_figure"
 
@@ -116,10 +116,12 @@ class Case(Shown):
 
     @cached_property
     def loaded(self) -> dict[str, Node]:
-        """Nodes, bodies with the mass of the frozen water that rides on them."""
+        """Nodes, bodies with the mass of the water without cells that rides on them, and its modes as bodies."""
         from fvsolve.case.riding import loaded
 
-        return loaded(self.nodes, self.frozen, self.properties.density) if self.frozen else self.nodes
+        if not self.lumped:
+            return self.nodes
+        return loaded(self.nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
 
     def ahead(self, first: str, second: str) -> float:
         """How far place `second` lies ahead of `first` at the start [m]; of points their distance."""

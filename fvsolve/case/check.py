@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import bodies, riding_networks
+from fvsolve.case import bodies, riding_networks, sloshing
 from fvsolve.case.bodies import WORLD
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
@@ -84,6 +84,7 @@ def parts(
     fluid: Any,
     raw: Raw,
     start: float,
+    lumped: dict[str, Any],
 ) -> Found:
     """Faults of elevations, and what each part finds wrong beside the others."""
     poses = bodies.poses(nodes, start)
@@ -98,6 +99,7 @@ def parts(
     yield from riding_networks.misfits(nodes, links, fluid)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
+    yield from sloshing.misfits(nodes, lumped, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():

@@ -101,7 +101,7 @@ class _Reader:
         self.raw = raw
         self.faults: list[Fault] = override(raw, settings, _alternatives())
         self.setting = Setting(folder=raw.folder)
-        self.frozen: dict[str, Any] = {}  # meshes of basins that are but mass of a body
+        self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
 
     def case(self) -> Case:
         top = self.top()
@@ -121,8 +121,8 @@ class _Reader:
                 kinds["nodes"][name] = bodies.Riding(node)
             kinds["nodes"] |= {f"{name}.{point}": BodyPoint for point in getattr(node, "points", {})}
         for name, kind in [*kinds["nodes"].items()]:
-            if name in self.frozen:
-                kinds["nodes"][name] = basins.Pool({}, self.frozen[name])
+            if name in self.lumped:
+                kinds["nodes"][name] = basins.Pool(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
             elif kind is Basin and name not in meshes:
                 kinds["nodes"][name] = None  # at fault itself
             if name in meshes:
@@ -135,7 +135,8 @@ class _Reader:
         expect, compare = self.expect(kinds), self.compare(kinds)
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
-        self.add(check.parts(*parts.values(), *about, numerics.start if numerics is not None else 0.0))
+        start = numerics.start if numerics is not None else 0.0
+        self.add(check.parts(*parts.values(), *about, start, self.lumped))
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))
@@ -170,7 +171,7 @@ class _Reader:
             raw=self.raw.table,
             folder=self.raw.folder,
             meshes=meshes,
-            frozen=self.frozen,
+            lumped=self.lumped,
             **top,
         )
         return made if named is None else self.exact(made)
@@ -316,10 +317,10 @@ class _Reader:
         for name, node in nodes.items():
             try:
                 if isinstance(node, Basin):
-                    (self.frozen if node.frozen else made)[name] = basins.mesh_of(node, self.setting)
+                    (self.lumped if node.lumped else made)[name] = basins.mesh_of(node, self.setting)
             except Misfit as error:
                 self.misfit(("nodes", name), error)
-        if len(made) + len(self.frozen) < sum(isinstance(node, Basin) for node in nodes.values()):
+        if len(made) + len(self.lumped) < sum(isinstance(node, Basin) for node in nodes.values()):
             self.stop()
         return made
 

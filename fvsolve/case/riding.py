@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.bodies import hangs_on
+from fvsolve.case import sloshing
+from fvsolve.case.bodies import hangs_on, poses
 from fvsolve.case.cells import means, samples
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.body.part import Body
@@ -22,7 +23,7 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
-        if basin.sloshing == "frozen":
+        if basin.sloshing != "cells":
             yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
         return
     if not basin.own.rides:
@@ -31,7 +32,7 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
         yield (*key, "on"), "its walls move, and its axes too; wanted one of both"
     free = next(free_joints(basin.on, nodes), None)
     for patch, one in basin.patches.items():
-        if one.boundary == "open" and free is not None:
+        if one.boundary == "open" and free is not None and not basin.lumped:
             text = f"{free} moves freely, and would have to feel what leaves here; wanted a wall, or a driven joint"
             yield (*key, "patches", patch, "boundary"), text
         if f"{name}.{patch}" in joined:
@@ -73,19 +74,27 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
         on = hangs_on(nodes[on])[0]
 
 
-def loaded(nodes: dict[str, Any], frozen: dict[str, Any], density: float) -> dict[str, Any]:
-    """Nodes, bodies with the mass, centre and inertia of the water that rides on them and is one with them."""
+def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float) -> dict[str, Any]:
+    """Nodes, bodies with the mass, centre and inertia of the water that rides on them as one, and its modes as bodies.
+
+    lumped : meshes of basins that have no cells; t : of the start [s]
+    """
     found = dict(nodes)
-    for name, mesh in frozen.items():
+    for name, mesh in lumped.items():
         basin, body = nodes[name], found[nodes[name].on]
-        mass, centre, inertia = as_mass(basin, mesh, density)
-        turn = np.eye(3) if basin.attitude is None else basin.attitude.rotation
+        weigh = as_mass if basin.sloshing == "frozen" else sloshing.ice
+        mass, centre, inertia = weigh(basin, mesh, density)
+        turn = sloshing.turn_of(basin)
         centre = np.array(basin.at or (0.0, 0.0, 0.0)) + turn @ centre
         both, own = body.mass + mass, np.array(body.centre_of_mass)
         middle = (body.mass * own + mass * centre) / both
         total = body.moment() + apart(body.mass, own - middle) + turn @ inertia @ turn.T + apart(mass, centre - middle)
         change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
         found[nodes[name].on] = body.model_copy(update=change)
+    swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}
+    stand = poses(found, t) if swinging else {}
+    for name, mesh in swinging.items():
+        found |= sloshing.sliders(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
     return found
 
 

@@ -212,6 +212,7 @@ BODY = np.dtype(  # axes of its own, its origin at its joint
         ("centre", "f8", (3,)),  # of mass [m]
         ("inertia", "f8", (9,)),  # about it [kg m2]
         ("damping", "f8"),  # of its joint [N m s] or [N s/m]
+        ("stiffness", "f8"),  # and [N m/rad] or [N/m]
         ("start", "f8", (7,)),  # coordinates at the start
         ("speed", "f8", (6,)),  # velocities at the start
         ("height", "f8"),  # of its centre of mass at the start [m], and
@@ -431,12 +432,8 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
 GIVEN_FLOW = 18  # of a patch that a given velocity passes
 WALL_VALUE = 19  # of a wall that moves
-BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = (
-    20,
-    21,
-    22,
-    23,
-)  # `side` says which, as `kernels.mechanism.observe` numbers them
+BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # `side` says which, see `mechanism.observe`
+SURFACE_VALUE = 24  # of water in modes
 
 BASIN = np.dtype(
     [

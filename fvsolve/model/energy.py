@@ -81,12 +81,11 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
 
     A wave of r [kg/s] stores r^2 dx / (rho A), a flow that unsteady friction remembers (`kernels.unsteady`)
     g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a mass m v^2 / 2,
-    bodies v' M v / 2, a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of a cylinder
-    dp/dm (e - x A e0 / V)^2 / (2 rho) with e0
-    its excess at y. Exact under `linear` about a profile at rest. Devices store what their `squares` say, cells of
-    basins what `basins.lower_energy` says. A scalar stores nothing; a deviation of its amount, over the greatest value
-    that there can be, counts as 1e-6 of what so much mass would store, for nothing else hangs on it. Positions that
-    nothing holds, one by one or together, store nothing: idle.
+    bodies v' M v / 2, the spring of a joint k s^2 / 2, a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of
+    a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0 its excess at y. Exact under `linear` about a profile at rest.
+    Devices store what their `squares` say, cells of basins what `basins.lower_energy` says. A scalar stores nothing; a
+    deviation of its amount, over the greatest value that there can be, counts as 1e-6 of what so much mass would store,
+    for nothing else hangs on it. Positions that nothing holds, one by one or together, store nothing: idle.
     """
     from scipy.sparse import csr_array
 
@@ -96,7 +95,8 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
     grows = Lengthening(model, y)
     stored |= {e: (names[e], row) for e, row in swept(model, y, grows)}
-    found = [*stored.values(), *stretched(model, y, grows), *of_devices(model, y), *kinetic(model, y)]
+    found = [*stored.values(), *stretched(model, y, grows), *of_devices(model, y)]
+    found += [*kinetic(model, y), *sprung(model)]
     entries = [(k, i, value) for k, (_, row) in enumerate(found) for i, value in row.items()]
     row, column, value = (np.array(one) for one in zip(*entries, strict=True))
     matrix = csr_array((value, (row, column)), shape=(len(found), model.y_size))
@@ -290,6 +290,13 @@ def kinetic(model, y: np.ndarray):
         path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
         entries = np.sqrt(0.5) * factor[row["row"] : row["row"] + row["depth"] + 1]
         yield name, {rate[j]: float(entry) for j, entry in zip(path, entries, strict=True)}
+
+
+def sprung(model):
+    """(name, row of L) of springs of joints."""
+    for name, body in zip(model.body_names, model.tables.bodies, strict=True):
+        if body["stiffness"] > 0.0:
+            yield name, {int(body["y"]): float(np.sqrt(0.5 * body["stiffness"]))}
 
 
 def stiffness(model, row) -> float:

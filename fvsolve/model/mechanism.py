@@ -68,7 +68,8 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
     row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
     row["at"], row["attitude"] = bodies.joint_place(draft.case.nodes, body), joint.attitude.rotation.ravel()
-    row["damping"], pose = joint.damping or 0.0, draft.case.poses[name]
+    row["damping"], row["stiffness"] = joint.damping or 0.0, joint.stiffness or 0.0
+    pose = draft.case.poses[name]
     row["height"] = pose.at(body.centre_of_mass)[2]
     speed, spin = pose.moves(body.centre_of_mass), pose.attitude.T @ pose.spin
     row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.moment() @ spin)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.case import sloshing
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import lowering_of
 from fvsolve.model.mechanism import point_row
@@ -47,6 +48,8 @@ def lower_point_of_body(draft, row, probe) -> None:
 
 def lower_point(draft, row, probe) -> None:
     """The cells of a basin that a probe reads, and their weights."""
+    if probe.name in draft.case.lumped:
+        return lower_surface(draft, row, probe)
     k = list(draft.case.meshes).index(probe.name)
     basin = draft.basins[k]
     cells, weights = basin.points.reading(*probe.point)
@@ -59,6 +62,19 @@ def lower_point(draft, row, probe) -> None:
     else:
         row["kind"] = rec.CELL_FIELD
         basin.lower_probe(row, probe.quantity, cells, weights)
+
+
+def lower_surface(draft, row, probe) -> None:
+    """Depth at a point of water that swings in modes."""
+    case, basin = draft.case, draft.case.nodes[probe.name]
+    about = basin, case.lumped[probe.name]
+    every, shares = sloshing.reading(*about, *probe.point, case.properties.density, case.gravity)
+    turn, depth = sloshing.turn_of(basin), sloshing.depth_of(basin)
+    top = np.array(basin.at or (0.0, 0.0, 0.0)) + turn @ (*sloshing.outline_of(about[1]).middle, basin.level)
+    row["kind"], row["index"], row["offset"] = rec.SURFACE_VALUE, draft.body_names.index(basin.on), depth
+    row["cell"], row["count"], row["weights"] = len(draft.integers), len(every), len(draft.floats)
+    draft.integers += [draft.body_names.index(sloshing.slider(probe.name, one)) for one in every]
+    draft.floats += [*top, *turn[:, 0], *turn[:, 1], *shares]
 
 
 def probe_offsets(draft, start) -> None:

@@ -23,7 +23,7 @@ class Skeleton:
         self.model, names = model, model.body_names
         owner, place, lines, whose = [], [], [], []
         for i, name in enumerate(names):
-            body, first = model.case.nodes[name], len(owner)
+            body, first = model.case.loaded[name], len(owner)
             ends = [(0.0, 0.0, 0.0), *dict.fromkeys([tuple(body.centre_of_mass), *map(tuple, body.points.values())])]
             ends = list(dict.fromkeys(ends))
             owner += [i] * len(ends)

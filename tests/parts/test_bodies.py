@@ -210,6 +210,27 @@ def test_joint_forces_of_a_pendulum_are_those_of_its_motion():
     assert result["arm.joint_ty"] == approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
+def test_the_spring_of_a_joint_pulls_its_angle_or_travel_back_to_0(method):
+    k, c = 25.0, 0.4
+    arm = pendulum(1.0)
+    arm["joint"] |= {"stiffness": k, "damping": c}
+    sled = {"type": "body", "mass": 3.0, "inertia": [1, 1, 1],
+            "joint": {"kind": "prismatic", "axis": [0, 2, 0], "travel": 0.2, "stiffness": "12 N/cm"}}  # fmt: skip
+    case = bodies({"arm": arm, "sled": sled}, 1.5, ["arm.angle", "sled.travel"], method=method, step=1e-3)
+    result, inertia = run(case), 2.0 * 0.7**2
+
+    def rates(t, y):
+        return [y[1], -(k * y[0] + c * y[1] + 2.0 * GRAVITY * 0.7 * math.sin(y[0])) / inertia]
+
+    truth = solve_ivp(rates, (0.0, 1.5), [1.0, 0.0], rtol=1e-11, atol=1e-12, t_eval=result.t).y[0]
+    assert result["arm.angle"] == approx(truth, abs=1e-6)
+    assert result["sled.travel"] == approx(0.2 * np.cos(20.0 * result.t), abs=1e-7)
+    ledger = energy(case)
+    assert ledger.stored["sled"] == approx(0.0, abs=1e-6)  # swings between its two forms
+    assert abs(ledger.step[-1]) < 1e-6 and abs(ledger.remainder[-1]) < 1e-6
+
+
 # pushes -----------------------------------------------------------------------------------------------------
 
 

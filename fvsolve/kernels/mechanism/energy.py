@@ -1,7 +1,8 @@
 """Power and stored energy of bodies and of their joints. Knows the tables; adds nothing up over time.
 
 Rows of `power` [W] a body, before those of devices and basins: rate of what it stores, what its joint dissipates, what
-drives its joint; of `stored` [J] its kinetic energy and m g z of its centre, since the start.
+drives its joint; of `stored` [J] its kinetic energy, m g z of its centre and k s^2 / 2 of its
+joint, since the start.
 """
 
 from fvsolve.jit import njit
@@ -21,6 +22,16 @@ def gained(body, out, here, gravity):
     s = here + TURNING
     turn = spread_inertia(body["inertia"], out, here + ATTITUDE, out[s], out[s + 1], out[s + 2])
     return body["mass"] * (u * a + v * b + w * (c + gravity)) + dot(out, here + SPIN, turn[0], turn[1], turn[2])
+
+
+@njit
+def sprung(body, y):
+    """(what the spring of its joint stores since the start [J], d/dt of that [W])."""
+    s, far = body["start"][0], y[body["y"]]
+    return (
+        body["stiffness"] * far * (s + 0.5 * far),
+        body["stiffness"] * (s + far) * (body["speed"][0] + y[body["rate"]]),
+    )
 
 
 @njit
@@ -53,6 +64,8 @@ def power_bodies(t, y, dydt, out, handle, power):
     at = body_rows(tables, power)
     for i in range(bodies.size):
         power[at] = gained(bodies[i], out, row_of(tables, i), gravity)
+        if bodies[i]["stiffness"] > 0.0:
+            power[at] += sprung(bodies[i], y)[1]
         power[at + 1] = rubbed(bodies[i], y) if bodies[i]["damping"] > 0.0 else 0.0
         power[at + 2] = driven(t, y, out, tables, i) if bodies[i]["schedule"] >= 0 else 0.0
         at += OF_BODY
@@ -68,3 +81,5 @@ def stored_bodies(t, y, dydt, out, handle, stored):
         body, here = bodies[i], row_of(tables, i)
         z = out[here + PLACE + 2] + centre_of(body, out, here)[2]
         stored[at + i] = kinetic(body, out, here) - body["energy"] + body["mass"] * gravity * (z - body["height"])
+        if body["stiffness"] > 0.0:
+            stored[at + i] += sprung(body, y)[0]

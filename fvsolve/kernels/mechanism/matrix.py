@@ -155,6 +155,8 @@ def fill(y, out, tables):
             if body["damping"] > 0.0:
                 k = body["rate"] + (j - body["freedom"])
                 found -= body["damping"] * (body["speed"][j - body["freedom"]] + y[k])
+            if body["stiffness"] > 0.0:
+                found -= body["stiffness"] * (body["start"][0] + y[body["y"]])
             work[6 * n + j] = found - freedoms[j]["balance"]  # last, so that what is balanced leaves no bit
             tx, ty, tz, fx, fy, fz = momentum(
                 work, inertia, work[s], work[s + 1], work[s + 2], work[s + 3], work[s + 4], work[s + 5]
@@ -314,11 +316,13 @@ def quickest_body(out, tables):
     for i in range(tables.bodies.size):
         w = row_of(tables, i) + SPIN
         rate = max(rate, sqrt(out[w] * out[w] + out[w + 1] * out[w + 1] + out[w + 2] * out[w + 2]))
-        if tables.bodies[i]["damping"] > 0.0:
+        if tables.bodies[i]["damping"] > 0.0 or tables.bodies[i]["stiffness"] > 0.0:
             for j in range(tables.bodies[i]["freedom"], tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"]):
                 for m in range(n):
                     work[at + m] = 1.0 if m == j else 0.0
-                damping += tables.bodies[i]["damping"] * ease(tables, at)
+                easy = ease(tables, at)
+                damping += tables.bodies[i]["damping"] * easy
+                stiffness += tables.bodies[i]["stiffness"] * easy
     for k in range(lines.size):
         line, u = lines[k], tables.layout[0]["along"] + 3 * k
         spring, brake = held_by(out, tables, line["push"])

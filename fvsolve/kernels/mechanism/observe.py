@@ -23,7 +23,7 @@ from fvsolve.kernels.mechanism.room import (
     row_of,
     turned,
 )
-from fvsolve.kernels.records import BODY_VALUE, FREE, POINT_VALUE, PRISMATIC
+from fvsolve.kernels.records import BODY_VALUE, FREE, POINT_VALUE, PRISMATIC, SURFACE_VALUE
 
 BODY_QUANTITIES = (
     "x", "y", "z", "roll", "pitch", "yaw", "eta", "eps_x", "eps_y", "eps_z", "vx", "vy", "vz", "wx", "wy", "wz",
@@ -218,6 +218,23 @@ def point_value(out, tables, k, which):
 
 
 @njit
+def surface_value(y, out, tables, probe):
+    """Depth of water in modes: at rest, by what each mode raises it, and others that follow what pushes them."""
+    floats, bodies, at = tables.floats, tables.bodies, probe["weights"]
+    here, gravity = row_of(tables, probe["index"]), tables.settings[0]["gravity"]
+    x, y0, z = turned(out, here + ATTITUDE, floats, at)
+    a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y0, z)
+    found = probe["offset"]
+    for k in range(2):
+        u, v, w = turned(out, here + ATTITUDE, floats, at + 3 + 3 * k)
+        found -= floats[at + 9 + k] * (a * u + b * v + (c + gravity) * w) / gravity
+    for k in range(probe["count"]):
+        body = bodies[tables.integers[probe["cell"] + k]]
+        found += floats[at + 11 + k] * (body["start"][0] + y[body["y"]])
+    return found
+
+
+@njit
 def observe_bodies(t, y, out, handle, values):
     """Values of the probes that read bodies and their points."""
     tables = open_tables(handle)
@@ -227,3 +244,5 @@ def observe_bodies(t, y, out, handle, values):
             values[k] = body_value(t, y, out, tables, probes[k]["index"], probes[k]["side"])
         elif probes[k]["kind"] == POINT_VALUE:
             values[k] = point_value(out, tables, probes[k]["index"], probes[k]["side"])
+        elif probes[k]["kind"] == SURFACE_VALUE:
+            values[k] = surface_value(y, out, tables, probes[k])

@@ -35,7 +35,7 @@ from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
 OUTLINE = ("size", "cells", "grading", "holes")  # of rectangles
-SLOSHING = ("frozen", "cells")
+SLOSHING = ("frozen", "modes", "cells")
 MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of what has velocities
 
 
@@ -281,9 +281,9 @@ class Basin(Rider, kind="basin"):
     ] = None
 
     attitude: Annotated[Attitude | None, Inside(Attitude, "of its axes in those of that body")] = None
-    sloshing: Annotated[str, Choice("sloshing", SLOSHING, "of water that rides: as one with its body, or by cells")] = (
-        "cells"
-    )
+    sloshing: Annotated[
+        str, Choice("sloshing", SLOSHING, "of water that rides: as one with its body, by linear modes, or by cells")
+    ] = "cells"
     scalars: Annotated[dict[str, Any], Carried("of scalars at the start, formulas of x and y", Shaped("number"))] = {}
 
     @property
@@ -314,9 +314,9 @@ class Basin(Rider, kind="basin"):
         return tuple(patches) if isinstance(patches, dict) else ()
 
     @property
-    def frozen(self) -> bool:
-        """Whether it is but mass of the body that it rides on."""
-        return self.on is not None and self.sloshing == "frozen"
+    def lumped(self) -> bool:
+        """Whether its water is but masses on the body that it rides on, without cells."""
+        return self.on is not None and self.sloshing != "cells"
 
     def inner(self, name: str) -> tuple[dict[str, Node], dict[str, Any]]:
         return {}, {}

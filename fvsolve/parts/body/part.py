@@ -28,16 +28,18 @@ from fvsolve.parts.value import (
 from fvsolve.units import show
 
 JOINTS = {  # kind -> keys that go with it, beside `on`, `at` and `attitude`
-    "revolute": ("axis", "angle", "rate", "damping"),
-    "prismatic": ("axis", "travel", "rate", "damping"),
+    "revolute": ("axis", "angle", "rate", "damping", "stiffness"),
+    "prismatic": ("axis", "travel", "rate", "damping", "stiffness"),
     "ball": ("rate", "damping"),
     "free": ("velocity", "rate"),
     "fixed": (),
 }
 OFTEN = {"hinge": "revolute", "pin": "revolute", "slider": "prismatic", "spherical": "ball", "weld": "fixed",
          "floating": "free", "driven": "revolute or prismatic with a schedule as its angle or travel"}  # fmt: skip
-TURNING, SLIDING = ("angular_velocity", "rotational_damping"), ("velocity", "damping")
-WIDE = {"angular_velocity": "rad/s, of a prismatic joint m/s", "damping": "N m s, of a prismatic joint N s/m"}
+TURNING = ("angular_velocity", "rotational_damping", "torque")
+SLIDING = ("velocity", "damping", "stiffness")
+WIDE = {"angular_velocity": "rad/s, of a prismatic joint m/s", "damping": "N m s, of a prismatic joint N s/m",
+        "stiffness": "N m, of a prismatic joint N/m"}  # fmt: skip
 ROTATION = {"x": "position", "y": "position", "z": "position", "roll": "angle", "pitch": "angle", "yaw": "angle",
             "eta": "number", "eps_x": "number", "eps_y": "number", "eps_z": "number"}  # fmt: skip
 
@@ -97,6 +99,9 @@ class Joint(Table):
         Rows("velocity", length=3, about="of a free body's centre of mass at the start [m/s]; 0 if left out"),
     ] = None
     damping: Annotated[Any, OfJoint("damping", "torque or force against its rate; 0 if left out")] = None
+    stiffness: Annotated[
+        Any, OfJoint("stiffness", "of a spring that pulls its angle or travel back to 0; none if left out")
+    ] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -120,11 +125,12 @@ class Joint(Table):
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-        """The same, rate and damping read in the units of its kind."""
+        """The same; rate, damping and stiffness read in the units of its kind."""
         kind, found, faults = given.get("kind", "free"), dict(given), []
-        rate, damping = SLIDING if kind == "prismatic" else TURNING
+        rate, damping, stiffness = SLIDING if kind == "prismatic" else TURNING
         three = kind in ("ball", "free")
-        values = {"rate": Rows(rate, length=3) if three else Quantity(rate), "damping": Quantity(damping, nonnegative)}
+        values = {"rate": Rows(rate, length=3) if three else Quantity(rate), "damping": Quantity(damping, nonnegative),
+                  "stiffness": Quantity(stiffness, nonnegative)}  # fmt: skip
         for key, value in values.items():
             try:
                 if key in given:
@@ -134,7 +140,7 @@ class Joint(Table):
             except ValueError as error:
                 faults.append(((key,), str(error)))
         driven = [key for key in ("angle", "travel") if isinstance(given.get(key), dict)]
-        for key in ("rate", "damping") if driven else ():
+        for key in ("rate", "damping", "stiffness") if driven else ():
             if key in given:
                 faults.append(((key,), f"its {driven[0]} is driven, so its {key} decides nothing; leave it out"))
         if faults:
@@ -176,7 +182,8 @@ class Body(Node, kind="body"):
     """A rigid body, F = m a_c and T = J alpha + w x J w about its centre of mass (68), moved by its joint's freedoms.
 
     Ports: its origin, and its points, `NAME.POINT`; velocity and force. Stored energy: m v_c^2 / 2 + w J w / 2 +
-    m g z_c [J]. Dissipated power: damping times rate^2 of its joint [W]; a driven joint brings its torque times rate.
+    m g z_c + k s^2 / 2 of its joint [J]. Dissipated power: damping times rate^2 of its joint [W]; a driven joint brings
+    its torque times rate.
     """
 
     domain: ClassVar[str] = "spatial"

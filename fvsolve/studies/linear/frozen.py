@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
-from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels.schedules import POLYNOMIAL, piece_at, piece_slopes, value_until
 from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.studies.outcome import outcome, prepared
 
@@ -77,13 +77,20 @@ def _arrive(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | fl
 
 
 def stopped(model, t: float, before: bool = False):
-    """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit."""
+    """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit.
+
+    Schedules that drive joints and walls go on at the rate that they have there.
+    """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
     values = [value_until(tables.schedules, tables.pieces, k, t, limit) for k in range(len(schedules))]
     for k in range(len(schedules)):
         schedules[k] = (k, 1)
-    rows = [[-np.inf, 0.0, 0.0, value, 0.0, 0.0, 0.0] for value in values]
+    rows = [[-np.inf, POLYNOMIAL, t, value, 0.0, 0.0, 0.0] for value in values]
+    for k in {int(row["schedule"]) for table in (tables.bodies, tables.walls) for row in table} - {-1}:
+        record = tables.schedules[k]
+        piece = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
+        rows[k][4] = piece_slopes(tables.pieces, piece, t)[0]
     tables = tables._replace(schedules=schedules, pieces=np.array(rows).reshape(-1, 7))
     tables = with_held_velocities(model, tables, t)
     if not has_limiter(model):

@@ -1,0 +1,253 @@
+"""Water in a tank as its linear modes: masses on springs beside water that keeps a flat surface. Knows no network.
+
+Potential theory of a flat bed and upright walls, small motions, any depth h (Dodge, The New Dynamic Behavior of Liquids
+in Moving Containers, 2000, chapter 3). Odd mode n of a box along a side L, k = n pi / L, and of an upright cylinder of
+radius a, k = x / a with J1'(x) = 0, along x and along y alike, with w^2 = g k tanh(k h):
+
+    box       m = M 8 tanh(k h) / (k h (k L)^2)         surface -4 tanh(k h) / (k L) cos(k x) per travel, x from a wall
+    cylinder  m = M 2 tanh(k h) / (k h (x^2 - 1))       surface 2 x tanh(k h) / (x^2 - 1) J1(k r) / J1(x) cos(angle)
+
+each at h - (2 / k) tanh(k h / 2) above the bed. With its surface held flat the water has the inertia of an ideal fluid
+under a lid (Joukowski, 1885), not that of ice. Modes that are left out count as held: they follow what pushes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fvsolve.case.cells import means, samples
+from fvsolve.parts.body.part import Body, Joint
+from fvsolve.parts.schedule import constant
+
+MANY = 3  # modes along x, and along y
+ROUND = 1e-3  # of the radius, by which corners of a circle's outline may lie off it
+UPRIGHT = 0.9  # least cosine between the normal of the bed and the vertical: modes are of nearly level tanks
+TERMS = 2000  # of series
+Found = Iterator[tuple[tuple, str]]
+
+
+class Outline(NamedTuple):
+    """Of a box its sides, of a cylinder its diameter twice [m]; its middle [m]; whether it is round."""
+
+    sides: tuple[float, float]
+    middle: np.ndarray
+    is_round: bool
+
+
+class Mode(NamedTuple):
+    """One that swings along x (0) or y (1): number, k [1/m], mass [kg], height above the bed [m], w^2 [1/s2].
+
+    rise : of the surface at the wall ahead, per travel of the mass [-]
+    """
+
+    along: int
+    number: int
+    k: float
+    mass: float
+    height: float
+    square: float
+    rise: float
+
+
+def outline_of(mesh: Any) -> Outline | None:
+    """The box or the circle that a mesh fills; None of others."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    area, sides = float(mesh.area.sum()), high - low
+    if abs(area / float(np.prod(sides)) - 1.0) < 1e-9:
+        return Outline(tuple(sides.tolist()), 0.5 * (low + high), False)
+    middle = mesh.area @ mesh.centre / area
+    far = np.linalg.norm(mesh.points[np.unique(mesh.ends[mesh.inner :])] - middle, axis=1)
+    if np.ptp(far) < ROUND * far.mean():
+        return Outline((2.0 * float(np.sqrt(area / np.pi)),) * 2, middle, True)
+    return None
+
+
+def depth_of(basin: Any) -> float:
+    """Of water at rest over a flat bed [m]."""
+    return basin.level - bed_of(basin)
+
+
+def bed_of(basin: Any) -> float:
+    """Height of a flat bed above its origin [m]."""
+    return 0.0 if basin.bed is None else float(basin.bed.at(np.zeros(1), np.zeros(1))[0])
+
+
+def modes(outline: Outline, depth: float, density: float, gravity: float, many: int = MANY) -> list[Mode]:
+    """The first modes of water in a tank, along x and y in turn."""
+    from scipy.special import jnp_zeros
+
+    found = []
+    for number, root in enumerate(jnp_zeros(1, many), 1):
+        for along, side in enumerate(outline.sides):
+            k = 2.0 * root / side if outline.is_round else (2 * number - 1) * np.pi / side
+            steep = float(np.tanh(k * depth))
+            if outline.is_round:
+                share, rise = 2.0 * steep / (k * depth * (root**2 - 1.0)), 2.0 * root * steep / (root**2 - 1.0)
+            else:
+                share, rise = 8.0 * steep / (k * depth * (k * side) ** 2), 4.0 * steep / (k * side)
+            height = depth - 2.0 / k * float(np.tanh(0.5 * k * depth))
+            mass = density * area_of(outline) * depth * share
+            found.append(Mode(along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)))
+    return found
+
+
+def area_of(outline: Outline) -> float:
+    """Of its bed [m2]."""
+    a, b = outline.sides
+    return 0.25 * np.pi * a * a if outline.is_round else a * b
+
+
+def surface(outline: Outline, mode: Mode, x: float, y: float) -> float:
+    """Rise of the surface at a point per travel of a mode's mass [-]."""
+    from scipy.special import j1, jnp_zeros
+
+    dx, dy = np.array([x, y]) - outline.middle
+    if not outline.is_round:
+        far = (dx, dy)[mode.along] + 0.5 * outline.sides[mode.along]
+        return float(-mode.rise * np.cos(mode.k * far))
+    r = float(np.hypot(dx, dy))
+    part = (dx, dy)[mode.along] / r if r > 0.0 else 0.0
+    return float(mode.rise * j1(mode.k * r) / j1(jnp_zeros(1, mode.number)[-1]) * part)
+
+
+def under_a_lid(outline: Outline, depth: float, density: float) -> np.ndarray:
+    """Inertia about its centre of an ideal fluid that fills a closed box or cylinder : float64[3, 3] [kg m2]."""
+    a, b = outline.sides
+    if outline.is_round:
+        across = density * turned_cylinder(0.5 * a, depth)
+        return np.diag([across, across, 0.0])
+    return density * np.diag([
+        a * turned_rectangle(b, depth), b * turned_rectangle(a, depth), depth * turned_rectangle(a, b)
+    ])  # fmt: skip
+
+
+def turned_rectangle(a: float, b: float) -> float:
+    """Polar moment of a rectangle less its torsion constant [m4]: what a fluid in it has when it turns."""
+    long, short = max(a, b), min(a, b)
+    odd = np.arange(1, 2 * TERMS, 2)
+    series = float(np.sum(np.tanh(0.5 * np.pi * odd * long / short) / odd**5))
+    torsion = long * short**3 * (1.0 / 3.0 - 64.0 / np.pi**5 * short / long * series)
+    return a * b * (a * a + b * b) / 12.0 - torsion
+
+
+def turned_cylinder(a: float, h: float) -> float:
+    """What ideal fluid in a closed cylinder has about a diameter through its middle, over its density [m5].
+
+    phi = (-r z + sum b I1(c r) sin(c z)) cos(angle), c = (2 j - 1) pi / h, has the velocity of all walls.
+    """
+    from scipy.special import ive
+
+    j = np.arange(1, TERMS + 1)
+    c, sign = (2 * j - 1) * np.pi / h, np.where(j % 2, 1.0, -1.0)
+    part = 4.0 * sign / (h * c * c)  # of z in sin(c z)
+    slope = 0.5 * (ive(0, c * a) + ive(2, c * a))  # I1', as ive scales it
+    wall = np.pi * a * (-a * h**3 / 12.0 + np.sum(2.0 * part**2 * ive(1, c * a) / (c * slope)) * h / 2.0)
+    lids = 2.0 * np.pi * (h * a**4 / 8.0 - np.sum(2.0 * part * sign * a * a * ive(2, c * a) / (c * c * slope)))
+    return float(wall + lids)
+
+
+def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Found:
+    """Faults of basins whose water is to be modes."""
+    for name, mesh in lumped.items():
+        basin, key = nodes[name], ("nodes", name)
+        if basin.sloshing != "modes" or not basin.own.rides:
+            continue
+        if outline_of(mesh) is None:
+            text = 'modes are known of boxes and of upright cylinders (a mesh of a circle); wanted "cells" or "frozen"'
+            yield (*key, "sloshing"), text
+        elif np.ptp(bed := means(samples(basin.bed, mesh))) > 1e-9 * abs(basin.level - bed.min()):
+            yield (*key, "bed"), 'modes are known over a flat bed; wanted one height, or sloshing = "cells"'
+        elif not basin.level > bed[0]:
+            yield (*key, "level"), f"no water is above the bed, at {bed[0]:g} m"
+        yield from left_out(key, basin)
+        if (pose := poses.get(basin.on)) is not None:
+            upright = float((pose.attitude @ turn_of(basin))[2, 2])
+            if upright < UPRIGHT:
+                text = f"its bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes say "
+                yield (*key, "sloshing"), text + 'nothing; wanted "cells" or "frozen"'
+
+
+def left_out(key: tuple, basin: Any) -> Found:
+    """Faults of keys that modes have no place for."""
+    for what in sorted(basin.start.model_fields_set) if basin.start is not None else ():
+        yield (*key, "start", what), "modes start from level water at rest; leave it out"
+    for patch, one in basin.patches.items():
+        if one.boundary == "open":
+            yield (*key, "patches", patch, "boundary"), "modes are of closed tanks; wanted a wall"
+    for what in ("manning", "factor"):
+        if getattr(basin, what) is not None:
+            yield (*key, what), "modes have no friction; leave it out, or give their bodies damping"
+
+
+def turn_of(basin: Any) -> np.ndarray:
+    """How it stands in the axes of its body : float64[3, 3]."""
+    return np.eye(3) if basin.attitude is None else basin.attitude.rotation
+
+
+def ice(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
+    """(mass [kg], centre [m], inertia about it [kg m2]) of water whose surface is held, in axes of its basin."""
+    outline, depth = outline_of(mesh), depth_of(basin)
+    centre = np.array([*outline.middle, bed_of(basin) + 0.5 * depth])
+    return density * area_of(outline) * depth, centre, under_a_lid(outline, depth, density)
+
+
+def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
+    """Bodies that slide on springs where modes do, and one that takes their masses off the water that is held.
+
+    Of a cylinder the two of one number are one mass, which slides along x on what slides along y.
+    """
+    outline, turn = outline_of(mesh), turn_of(basin)
+    at = np.array(basin.at or (0.0, 0.0, 0.0))
+    places = [at + turn @ (*outline.middle, bed_of(basin) + one.height) for one in made(basin, mesh, density, gravity)]
+    every, found = made(basin, mesh, density, gravity), {}
+    masses = np.array([one.mass for one in every]) * (0.5 if outline.is_round else 1.0)
+    held = masses @ np.array(places) / masses.sum()
+    spread = sum(m * (np.dot(r - held, r - held) * np.eye(3) - np.outer(r - held, r - held))
+                 for m, r in zip(masses, places, strict=True))  # fmt: skip
+    found[f"{name} held"] = body(-float(masses.sum()), -spread, Joint.model_construct(kind="fixed", on=basin.on), held)
+    down = (pose.attitude @ turn).T @ np.array([0.0, 0.0, -gravity])
+    for mode, place in zip(every, places, strict=True):
+        on, first = basin.on, f"{name} x{mode.number}"
+        if outline.is_round and mode.along == 1:
+            on, place = first, np.zeros(3)
+        carried = 0.0 if outline.is_round and mode.along == 0 else mode.mass
+        joint = Joint.model_construct(
+            kind="prismatic", on=on, at=tuple(place.tolist()), axis=tuple(turn[:, mode.along].tolist()),
+            travel=constant(float(down[mode.along] / mode.square)), stiffness=mode.mass * mode.square,
+        )  # fmt: skip
+        found[slider(name, mode)] = body(carried, np.zeros((3, 3)), joint, np.zeros(3))
+    return found
+
+
+def reading(basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float) -> tuple[list[Mode], list]:
+    """The modes, and what the surface at a point is of their travels, and of all others per slope of what pushes them.
+
+    Others are where they would rest: (x, y) from the middle less what the modes that are followed have of it there.
+    """
+    outline, every = outline_of(mesh), made(basin, mesh, density, gravity)
+    rises = [surface(outline, one, x, y) for one in every]
+    rest = (np.array([x, y]) - outline.middle).tolist()
+    for one, rise in zip(every, rises, strict=True):
+        rest[one.along] -= gravity * rise / one.square
+    return every, [*rest, *rises]
+
+
+def slider(name: str, mode: Mode) -> str:
+    """Name of the body of a mode."""
+    return f"{name} {'xy'[mode.along]}{mode.number}"
+
+
+def made(basin: Any, mesh: Any, density: float, gravity: float) -> list[Mode]:
+    """The modes of a basin."""
+    return modes(outline_of(mesh), depth_of(basin), density, gravity)
+
+
+def body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
+    """A body that no file says, which may have less than no mass."""
+    return Body.model_construct(
+        mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
+        centre_of_mass=tuple(np.asarray(centre).tolist()),
+    )  # fmt: skip
