@@ -25,6 +25,7 @@ from fvsolve.parts.schedule import constant
 MANY = 3  # modes along x, and along y
 ROUND = 1e-3  # of the radius, by which corners of a circle's outline may lie off it
 UPRIGHT = 0.9  # least cosine between the normal of the bed and the vertical: modes are of nearly level tanks
+FLAT = 1e-9  # share of the depth by which a flat bed may rise
 TERMS = 2000  # of series
 Found = Iterator[tuple[tuple, str]]
 
@@ -50,6 +51,22 @@ class Mode(NamedTuple):
     height: float
     square: float
     rise: float
+
+
+class Slowest(NamedTuple):
+    """Of the slowest mode of a tank: k h, and by how much shallow water has it too fast [%]."""
+
+    deep: float
+    fast: float
+
+
+def slowest(basin: Any, mesh: Any) -> Slowest | None:
+    """The slowest mode of a tank with a flat bed; None of tanks whose modes are not known."""
+    bed, outline = means(samples(basin.bed, mesh)), outline_of(mesh)
+    if outline is None or np.ptp(bed) > FLAT * abs(basin.level - bed.min()) or not basin.level > bed[0]:
+        return None
+    deep = modes(outline, basin.level - bed[0], 1.0, 1.0, 1)[int(np.argmax(outline.sides))].k * (basin.level - bed[0])
+    return Slowest(deep, 100.0 * float(np.sqrt(deep / np.tanh(deep)) - 1.0))
 
 
 def outline_of(mesh: Any) -> Outline | None:
@@ -158,7 +175,7 @@ def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]
         if outline_of(mesh) is None:
             text = 'modes are known of boxes and of upright cylinders (a mesh of a circle); wanted "cells" or "frozen"'
             yield (*key, "sloshing"), text
-        elif np.ptp(bed := means(samples(basin.bed, mesh))) > 1e-9 * abs(basin.level - bed.min()):
+        elif np.ptp(bed := means(samples(basin.bed, mesh))) > FLAT * abs(basin.level - bed.min()):
             yield (*key, "bed"), 'modes are known over a flat bed; wanted one height, or sloshing = "cells"'
         elif not basin.level > bed[0]:
             yield (*key, "level"), f"no water is above the bed, at {bed[0]:g} m"

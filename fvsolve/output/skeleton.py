@@ -1,4 +1,5 @@
-"""Bodies as lines between what is known of them: origins, centres of mass, points, and what pushes between points.
+"""Bodies as lines between what is known of them: origins, centres of mass, points, and what pushes between points;
+water in modes as lines from where its masses rest to where they are.
 
 Knows the tables of a model; knows no file.
 """
@@ -8,9 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE, SPIN, VELOCITY
-from fvsolve.kernels.records import BODY_OUT
+from fvsolve.kernels.records import BODY_OUT, PRISMATIC
 
 UNITS = {"body": "-", "speed": "m/s"}
+
+
+def ends_of(body) -> list[tuple[float, ...]]:
+    """What is known of a body in its axes, its origin first [m]."""
+    return list(dict.fromkeys([(0.0, 0.0, 0.0), tuple(body.centre_of_mass), *map(tuple, body.points.values())]))
 
 
 class Skeleton:
@@ -22,14 +28,19 @@ class Skeleton:
     def __init__(self, model) -> None:
         self.model, names = model, model.body_names
         owner, place, lines, whose = [], [], [], []
-        for i, name in enumerate(names):
-            body, first = model.case.loaded[name], len(owner)
-            ends = [(0.0, 0.0, 0.0), *dict.fromkeys([tuple(body.centre_of_mass), *map(tuple, body.points.values())])]
-            ends = list(dict.fromkeys(ends))
-            owner += [i] * len(ends)
-            place += ends
-            lines += [(first, first + k) for k in range(1, len(ends))] or [(first, first)]
-            whose += [i] * max(len(ends) - 1, 1)
+        drawn = [ends_of(model.case.nodes[name]) if name in model.case.nodes else [] for name in names]
+        dots = max(map(len, drawn)) < 2  # else a body that is but an origin is no more than a joint of others
+        for i, ends in enumerate(drawn):
+            first = len(owner)
+            if not ends and (row := model.tables.bodies[i])["joint"] == PRISMATIC:  # a mode of water in a tank
+                owner += [int(row["parent"]), i]
+                place += [tuple(row["at"]), (0.0, 0.0, 0.0)]
+            elif len(ends) > 1 or (ends and dots):
+                owner += [i] * len(ends)
+                place += ends
+            if len(owner) > first:
+                lines += [(first, first + k) for k in range(1, len(owner) - first)] or [(first, first)]
+                whose += [i] * max(len(owner) - first - 1, 1)
         for row in model.tables.lines:
             if min(row["from_point"], row["to_point"]) >= 0:
                 for end in ("from_point", "to_point"):

@@ -88,7 +88,7 @@ class Run:
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         self.watches = [one for basin in model.basins if (one := basin.watch(basin.of(model.start)))]
         self.soundness = Soundness(self.slate)
-        if self.soundness.predicted:
+        if self.soundness.close:
             self.budget = FEW
         self.processor = 0.0  # seconds of CPU time of the steps of this process
         self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
@@ -113,6 +113,7 @@ class Run:
         own += [x for one in self.watches for x in one.kept]
         own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
         views = (view.ravel() for view in self.loop.stepper.memories())
+        own += self.soundness.swings.kept.ravel().tolist()
         return np.concatenate([own, *views, *kept, self.soundness.halves.kept])
 
     def remember(self, memory: np.ndarray) -> None:
@@ -132,6 +133,8 @@ class Run:
             one.kept[:], memory = memory[: one.kept.size], memory[one.kept.size :]
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
+        risen = self.soundness.swings.kept.ravel()
+        risen[:], memory = memory[: risen.size], memory[risen.size :]
         seen = self.soundness.halves.kept
         known = [getattr(self.slate, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
         if memory.size != sum(array.size for array in known):
@@ -282,7 +285,7 @@ class Run:
     def pause(self, spent: float) -> None:
         """Between chunks: report, save, and aim at a tenth of a second for the next."""
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
-        most = FEW if self.soundness.predicted else 1e9
+        most = FEW if self.soundness.close else 1e9
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
         if self.progress is not None:
             self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[slots.STEPS]))

@@ -127,8 +127,12 @@ def _once(model, y, run) -> Outcome:
 Progress = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
 
 
-def without_basins(case, study: str) -> None:
-    """Raises FvsolveError where a case has basins, whose cells a study does not refine or replace yet."""
-    names = [name for name, node in case.nodes.items() if node.kind == "basin"]
+def without_basins(case, study: str, riding: bool = False) -> None:
+    """Raises FvsolveError where a case has basins, whose cells a study does not refine or replace yet.
+
+    riding : whether those that ride on bodies will do
+    """
+    basins = {name: node for name, node in case.nodes.items() if node.kind == "basin"}
+    names = [name for name, node in basins.items() if not (riding and node.on)]
     if names:
         raise FvsolveError(f"{study} does not know basins yet; the case has {listing(names)}")

@@ -47,7 +47,7 @@ def hull(joint, mass=900.0, inertia=(400.0, 500.0, 600.0), **more):
 
 
 def case_of(body, basin, end=1.0, numerics=None, probes=(), links=None, **more):
-    numerics = {"method": "rk4", "step": 0.01, **(numerics or {})}
+    numerics = numerics if numerics and "courant" in numerics else {"method": "rk4", "step": 0.01, **(numerics or {})}
     return scene({"hull": body, "b": basin}, links or {}, end, numerics, probes, **more)
 
 
@@ -208,6 +208,22 @@ def test_modes_lie_on_cells_where_water_is_shallow_and_waves_small():
     assert np.abs(found[probes[0]] - fine[probes[0]]).max() < 0.06 * rise
     force = np.abs(fine[probes[1]]).max()
     assert np.abs(found[probes[1]] - fine[probes[1]]).max() < 0.03 * force
+
+
+def test_check_says_when_shallow_water_is_not_the_rung_and_a_run_when_modes_are_not():
+    deep, shallow = (build(load(case_of(hull({"kind": "fixed"}), tank(level=level, sloshing="cells"),
+                                        numerics={"method": "ssp-rk3", "courant": 0.5} )))
+                     for level in (DEPTH, 0.05))  # fmt: skip
+    (said,) = [one for one in deep.warnings if one.kind == "dispersion"]
+    kh = math.pi * DEPTH / SIDE
+    assert said.value == pytest.approx(math.sqrt(kh / math.tanh(kh)) - 1.0) and "22 % too fast" in said.text
+    assert not [one for one in shallow.warnings if one.kind == "dispersion"]
+    for tilt, many in ((0.02, 0), (0.3, 1)):
+        body = hull({"kind": "revolute", "axis": [0, 1, 0], "stiffness": 8e4, "angle": tilt})
+        told = [one for one in run(case_of(body, tank(at=[-1.0, -0.5, 0.0]), 2.0)).warnings
+                if one.kind == "sloshing"]  # fmt: skip
+        assert len(told) == many
+    assert told[0].place == "nodes.b" and told[0].value > 0.2 and told[0].text.startswith("b: at ")
 
 
 # bad input ----------

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.basins.free_surface import faces, grid
-from fvsolve.basins.free_surface.lower_dispersion import Watch, notices
+from fvsolve.basins.free_surface.lower_dispersion import Watch, deep, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
@@ -164,10 +164,10 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        return notices(self, y)
+        return [*notices(self, y), *deep(self)]
 
     def watch(self, y: np.ndarray) -> Watch | None:
-        return None if self.notices(y) else Watch(self)
+        return None if notices(self, y) else Watch(self)
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

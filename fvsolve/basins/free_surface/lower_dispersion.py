@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
 
 WRONG = 0.01  # share of the speed from which a word is due
@@ -100,6 +101,18 @@ def notices(basin, y: np.ndarray) -> list[Notice]:
     """That waves of a basin are too short at deviations y, where they are."""
     found = waves(basin, y)
     return [notice(basin, found)] if found is not None and found.wrong > WRONG else []
+
+
+def deep(basin) -> list[Notice]:
+    """That water which rides on a body is too deep for shallow water, and which rung knows better."""
+    found = slowest(basin.part, basin.mesh) if basin.part.on else None
+    if found is None or found.fast <= 100.0 * WRONG:
+        return []
+    text = (
+        f"{basin.name}: shallow water has its slowest wave {found.fast:.2g} % too fast (k h = {found.deep:.2g}); "
+        'sloshing = "modes" has it right while waves are small'
+    )
+    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * found.fast, WRONG)]
 
 
 class Watch:

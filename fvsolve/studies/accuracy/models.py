@@ -6,18 +6,19 @@ Knows rungs and laws; leaves the runs to `outcome`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from fvsolve.case.sloshing import slowest
 from fvsolve.doors import CALL, NUMBER, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
 from fvsolve.kernels.schedules import value_until
 from fvsolve.model.checks import velocities
-from fvsolve.studies.accuracy.rungs import Unsayable, finer, restated, structures
+from fvsolve.studies.accuracy.rungs import Unsayable, finer, restated, structures, tanks
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
 from fvsolve.studies.distance import Gap, moving
 from fvsolve.studies.outcome import Outcome, outcome, without_basins
@@ -80,6 +81,7 @@ class Ladder:
     """All rungs, poorest first, and what chooses among them.
 
     richest : the one that the others are measured against, refined until what it errs itself is within the target
+    deep : of water in tanks that ride, how deep it is beside its longest waves, in words
     own : about what the richest errs by its cells [-], None where it has none or no finer one was run
     cheapest : the quickest rung whose error is within the target; travel_time : of a wave along the longest pipe [s]
     change_time : of the quickest schedule, its range over its steepest slope [s]
@@ -96,11 +98,12 @@ class Ladder:
     strain: float
     apart: Apart | None
     own: float | None
+    deep: tuple[str, ...] = ()
 
     @property
     def worth(self) -> str:
         """What the errors mean, by the richest rung's own one; nothing where it has no cells."""
-        if self.travel_time == 0.0:
+        if self.richest.name == "as it is":
             return ""
         if self.own is None:
             return f"what {self.richest.name} errs itself is not known: twice its cells could not be run"
@@ -112,7 +115,7 @@ class Ladder:
     @property
     def thumb(self) -> list[str]:
         """The rules of thumb that the choice follows."""
-        found = [] if self.apart is None else [self._of_laws(self.apart)]
+        found = list(self.deep) + ([] if self.apart is None else [self._of_laws(self.apart)])
         if self.travel_time > 0.0 and math.isfinite(self.change_time):
             ratio = self.change_time / self.travel_time
             kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
@@ -157,6 +160,8 @@ def ladder(
 ) -> Ladder:
     """Run a case as rigid columns, lumped volumes, few cells, many cells, under every law it can have.
 
+    One with water that rides on bodies is run with it frozen, in modes, and in cells, all tanks alike.
+
     A rung that does not fit the scene is skipped and says why. The richest has the case's own cells and the richest law
     that runs; errors are of the probes that a rung has too. Raises FvsolveError where the case itself does not run, and
     where none of its probes moves.
@@ -164,7 +169,7 @@ def ladder(
     from fvsolve.case import load
 
     case, tell = load(case, dict(set or {})), progress or (lambda *_: None)
-    without_basins(case, "chart --models")
+    without_basins(case, "chart --models", riding=True)
     asked = [(rung, law) for rung in structures(case) for law in laws(case)]
     runs, dear = [], {}  # dear: law -> the rung with cells that was given up under it
     for at, (rung, law) in enumerate(asked):
@@ -188,7 +193,8 @@ def ladder(
     travel, change = travel_time(richest.model), change_time(richest.model)
     plain = next((one for one, said in zip(runs, asked, strict=True) if said == (asked[at][0], "linear")), whole)
     top = rungs[-1] if more else rungs[at]
-    return Ladder(rungs, top, target, cheapest, travel, change, strain(richest), apart(plain, whole), own)
+    about = travel, change, strain(richest), apart(plain, whole), own, tuple(said_of_tanks(case, target))
+    return Ladder(rungs, top, target, cheapest, *about)
 
 
 def refined(case, law: str, whole: Outcome, target: float, tell: Callable[[str], None]) -> tuple[list, float | None]:
@@ -281,6 +287,20 @@ def apart(plain: Outcome, richest: Outcome) -> Apart | None:
 def velocity_head(model) -> float:
     """Greatest rho v^2 / 2 of a pipe at the start [Pa]; 0 without pipes."""
     return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
+
+
+def said_of_tanks(case, target: float) -> Iterator[str]:
+    """Of water in tanks that ride, by how much shallow water runs too fast in its slowest mode, where that is known."""
+    share = 100.0 * target
+    for name, basin in tanks(case).items():
+        mesh = {**case.meshes, **case.lumped}[name]
+        if (found := slowest(basin, mesh)) is not None:
+            said = (
+                f"{name}: k h = {found.deep:.2g} of its slowest wave, which shallow water has {found.fast:.2g} % fast"
+            )
+            yield (
+                f"{said}, more than the target: modes know better while waves are small" if found.fast > share else said
+            )
 
 
 def travel_time(model) -> float:

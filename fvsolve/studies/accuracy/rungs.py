@@ -1,4 +1,6 @@
-"""A scene said with less: rigid columns, lumped volumes, few cells, as keys of a case. Knows parts; runs nothing."""
+"""A scene said with less: rigid columns, lumped volumes, few cells, water in tanks as ice or as modes, as keys of a
+case. Knows parts; runs nothing.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +13,9 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
 from fvsolve.studies.outcome import prepared
 
+SLOSHING = ("frozen", "modes", "cells")
+THIN = 4  # cells across a tank up to which nothing is followed there
+WITH_CELLS = {"numerics.method": "ssp-rk3", "numerics.courant": 0.7}
 WITHOUT_CELLS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
 
 
@@ -21,6 +26,8 @@ class Unsayable(Exception):
 def structures(case) -> list[str]:
     """Names of the rungs of a case, poorest first."""
     pipes = [link for link in case.links.values() if link.kind == "pipe"]
+    if tanks(case):
+        return list(SLOSHING)
     if not pipes:
         return ["as it is"]
     most = max(pipe.cells for pipe in pipes)
@@ -29,16 +36,25 @@ def structures(case) -> list[str]:
     return ["rigid column", "lumped volume", "column and volume", *cells, "full line"]
 
 
+def tanks(case) -> dict[str, Any]:
+    """Basins that ride on bodies."""
+    return {name: node for name, node in case.nodes.items() if node.kind == "basin" and node.on}
+
+
 def finer(case, doublings: int) -> list[str]:
-    """Names of rungs above the case's own, each with twice the cells of the one before; none without pipes."""
-    pipes = any(link.kind == "pipe" for link in case.links.values())
-    return [f"{2**k} times the cells" for k in range(1, doublings + 1)] if pipes else []
+    """Names of rungs above the case's own, each with twice the cells of the one before; none without any to say so."""
+    able = any(link.kind == "pipe" for link in case.links.values())
+    if riding := tanks(case):
+        able = all(basin.cells for basin in riding.values())
+    return [f"{2**k} times the cells" for k in range(1, doublings + 1)] if able else []
 
 
 def restated(case, rung: str) -> dict[str, Any]:
     """The keys that say a case by a rung; raises Unsayable where it cannot be."""
     if rung in ("full line", "as it is"):
         return {}
+    if tanks(case):
+        return sloshing(case, rung)
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
     if rung.endswith("times the cells"):
         times, step = int(rung.split()[0]), case.numerics.step
@@ -57,6 +73,26 @@ def restated(case, rung: str) -> dict[str, Any]:
     if rung != "rigid column":
         found |= volumes(case, pipes)
     return found
+
+
+def sloshing(case, rung: str) -> dict[str, Any]:
+    """Water of all tanks that ride as ice, by its modes, or by cells, those of the case or so many times as many."""
+    riding, found = tanks(case), {"expect": {}, "compare": {}}
+    if rung in ("frozen", "modes"):
+        left = {"frozen": (), "modes": ("depth",)}[rung]
+        found["output.probes"] = [
+            one.text for one in case.output.probes if one.name not in riding or one.quantity in left
+        ]
+        return found | {f"nodes.{name}.sloshing": rung for name in riding} | WITHOUT_CELLS
+    found |= {f"nodes.{name}.sloshing": "cells" for name in riding}
+    if any(basin.lumped for basin in riding.values()):
+        found |= WITH_CELLS
+    if rung == "cells":
+        return found
+    times, step = int(rung.split()[0]), case.numerics.step
+    found |= {f"nodes.{name}.cells": [times * one if one > THIN else one for one in basin.cells]
+              for name, basin in riding.items()}  # fmt: skip
+    return found if step is None else found | {"numerics.step": step / times}
 
 
 def _survives(probe, pipes: dict) -> bool:
