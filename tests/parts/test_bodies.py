@@ -785,3 +785,35 @@ def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
     assert math.radians(result["boom.angle"][-1]) == approx(y[0], abs=1e-5)
     assert math.radians(result["load.angle"][-1]) == approx(y[1], abs=1e-4)
     assert np.all(result["boom.angle"][result.t < 1.0] == result["boom.angle"][0])
+
+
+def bennett(axis: bool) -> dict:
+    """Bennett's linkage, links a and b with twists of sin(alpha) / a = sin(beta) / b: four hinges in space that move."""
+    a, b, alpha = 1.0, 1.5, math.radians(30.0)
+    beta = math.asin(b / a * math.sin(alpha))
+    one = 1.0
+    two = 2.0 * math.atan(math.sin((beta + alpha) / 2.0) / math.sin((beta - alpha) / 2.0) / math.tan(one / 2.0))
+    turns = {"one": (one, a, {}), "two": (two, b, {"on": "one.end", "attitude": {"roll": alpha}}),
+             "three": (-one, a, {"on": "two.end", "attitude": {"roll": beta}})}  # fmt: skip
+    nodes = {name: body(1.0, [0.1, 0.2, 0.2], {"kind": "revolute", "axis": [0, 0, 1], "angle": angle, **joint},
+                        centre_of_mass=[0.5 * length, 0.1, 0.05], points={"end": [length, 0, 0]})
+             for name, (angle, length, joint) in turns.items()}  # fmt: skip
+    nodes["ground"] = {"type": "frame", "points": {"hinge": [-b, 0, 0]}}
+    pin = {"type": "pin", "from": "ground.hinge", "to": "three.end"}
+    pin |= {"axis": [0, math.sin(beta), math.cos(beta)]} if axis else {}
+    probes = ["one.angle", "two.angle", "three.angle", "three.end.x", "three.end.y", "three.end.z"]
+    return bodies(nodes, 2.0, probes, {"loop": pin}, method="rk4", step=1e-3)
+
+
+def test_bennetts_linkage_moves_as_its_half_angles_have_it_and_a_ball_there_is_redundant():
+    result = run(bennett(axis=True))
+    one, two, three = (result[f"{name}.angle"] for name in ("one", "two", "three"))
+    assert np.ptp(one) > 0.5
+    assert one + three == approx(np.zeros_like(one), abs=1e-8)
+    ratio = math.tan(one[0] / 2.0) * math.tan(two[0] / 2.0)
+    sines, cosines = np.sin(one / 2.0) * np.sin(two / 2.0), np.cos(one / 2.0) * np.cos(two / 2.0)
+    assert sines == approx(ratio * cosines, abs=1e-7)
+    gap = np.array([result["three.end.x"] + 1.5, result["three.end.y"], result["three.end.z"]])
+    assert np.abs(gap).max() < 1e-8  # along its axis too, where no row holds it
+    with pytest.raises(fvsolve.errors.CaseError, match="nothing can open it, or others hold it there already"):
+        fvsolve.build(fvsolve.load(bennett(axis=False)))
