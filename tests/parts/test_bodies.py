@@ -788,7 +788,7 @@ def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
 
 
 def bennett(axis: bool) -> dict:
-    """Bennett's linkage, links a and b with twists of sin(alpha) / a = sin(beta) / b: four hinges in space that move."""
+    """Bennett's linkage, links a and b twists of sin(alpha) / a = sin(beta) / b: four hinges in space that move."""
     a, b, alpha = 1.0, 1.5, math.radians(30.0)
     beta = math.asin(b / a * math.sin(alpha))
     one = 1.0
