@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fvsolve.model.mechanism import holding_pressures
+from fvsolve.model.holding import holding_pressures
 from fvsolve.model.probes import probe_offsets
 from fvsolve.model.start import Start
 from fvsolve.model.unsteady import add_terms

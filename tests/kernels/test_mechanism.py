@@ -12,7 +12,7 @@ from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, TURNIN
 from fvsolve.kernels.records import BODY_OUT
 from fvsolve.model import Slate
 from fvsolve.model.energy_ledger import Accounts
-from fvsolve.model.mechanism import factored
+from fvsolve.model.statics import factored
 
 pytest.importorskip("pinocchio", reason="pinocchio (pin) is the peer here")
 SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]
