@@ -10,6 +10,7 @@ from fvsolve.model.statics import ACCELERATE, GAPS, HOLD, MOTION, PINNED, Static
 ALIKE = 1e-8  # share of the largest row of pins that a row has beside all others: below, it says nothing new
 LOOSE = 1e-6  # rate at which a pin may open at the start [m/s]
 SNAP = 1e-12  # share of what makes up a joint's force below which their sum is rounding
+CLOSE = 1e-9  # likewise at a place that was found: by so much stiff springs turn the rounding of a length into force
 
 
 def refuse_weightless(draft, at: Statics) -> None:
@@ -45,22 +46,20 @@ def start_bodies(draft, start) -> list[str]:
             rows[line["push"]]["speed"] = at.out[travel + 2 * line["push"] + 1]
     refuse_weightless(draft, at)
     draft.check()
-    size = np.abs(at.shares(pushes)).sum(axis=0)
     at.out[first : first + pushes.size] = pushes
-    at.run(*at.pushes[:2])
-    dry = at.forces()
     at.run(*at.pushes)
-    left = at.forces()
-    size += np.abs(left - dry)
-    freedoms = draft.freedom_table
-    accelerate = ACCELERATE
+    left, accelerate = at.forces(), ACCELERATE
     if len(draft.pin_table):
-        accelerate = PINNED
-        left, held = start_pins(draft, at)
-        size += held
-    freedoms["balance"] = np.where(np.abs(left) <= SNAP * size, left, 0.0)
+        left, accelerate = start_pins(draft, at), PINNED
+    size = at.sizes(pushes)
+    draft.freedom_table["balance"] = np.where(np.abs(left) <= rounding(draft) * size, left, 0.0)
     at.run(*at.pushes, accelerate)
     return moves(draft, at.accelerations())
+
+
+def rounding(draft) -> float:
+    """Share of forces below which their sum is rounding."""
+    return CLOSE if draft.case.numerics.initial == "equilibrium" else SNAP
 
 
 def pin_rows(draft, at: Statics) -> np.ndarray:
@@ -72,8 +71,8 @@ def pin_rows(draft, at: Statics) -> np.ndarray:
     return at.written.scratch[first : first + many * n].reshape(many, n).copy()
 
 
-def start_pins(draft, at: Statics) -> tuple[np.ndarray, np.ndarray]:
-    """Gaps and forces of pins at the start: (what is left of forces of freedoms with these, their size). Faults."""
+def start_pins(draft, at: Statics) -> np.ndarray:
+    """Gaps and forces of pins at the start: what is left of forces of freedoms with these. Faults."""
     at.run(*at.pushes, GAPS)
     first = int(at.layout["pin"])
     for k, row in enumerate(draft.pin_table):
@@ -91,10 +90,8 @@ def start_pins(draft, at: Statics) -> tuple[np.ndarray, np.ndarray]:
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)
     for row, force in zip(draft.pin_table, forces, strict=True):
         row["force"][: row["rows"]] = force[: row["rows"]]
-    sizes = np.concatenate([np.abs(row["force"][: row["rows"]]) for row in draft.pin_table])
-    size = np.abs(rows.T) @ sizes
     at.run(*at.pushes, HOLD)
-    return at.forces(), size
+    return at.forces()
 
 
 def redundant(rows: np.ndarray, names: list[str]) -> list[str]:

@@ -16,10 +16,7 @@ def holding_pressures(draft, start) -> dict[int, float]:
     Forces of their pistons by least squares, so that forces of joints vanish; of two such chambers of one cylinder the
     one that need not push is at ambient pressure. None of a chamber that would have to pull.
     """
-    pistons = {}
-    for k, row in enumerate(draft.piston_table):
-        free = [side for side in "ab" if row["line"] >= 0 and is_shut(draft, start, int(row[side]))]
-        pistons |= {k: free} if free else {}
+    pistons = draft.locked
     if not pistons:
         return {}
     ambient, at = draft.case.ambient_pressure, Statics(draft, start.t)
@@ -50,6 +47,15 @@ def holding_pressures(draft, start) -> dict[int, float]:
         found |= dict.fromkeys([int(row[one]) for one in free], ambient)
         found[int(row[side])] = float(pressure)
     return {i: p for i, p in found.items() if p > draft.case.law.cavity_pressure}
+
+
+def find_shut(draft, start) -> None:
+    """Note which chambers hold what stands on them, and behind which pistons fluid is shut in."""
+    for k, row in enumerate(draft.piston_table):
+        free = [side for side in "ab" if row["line"] >= 0 and is_shut(draft, start, int(row[side]))]
+        alone = [side for side in "ab" if start.reaches(int(row[side])) == [row[side]]]
+        draft.locked |= {k: free} if free else {}
+        draft.shut |= {k: alone} if alone else {}
 
 
 def is_shut(draft, start, i: int) -> bool:

@@ -114,8 +114,8 @@ def point_row(draft, place: str) -> int:
 
 
 def pose_of(draft, place: str) -> bodies.Pose:
-    """How the body of a point stands at the start; the world's of a frame."""
-    return draft.case.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
+    """How the body of a point stands by what is stated; the world's of a frame."""
+    return draft.case.stated.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
 
 
 def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:

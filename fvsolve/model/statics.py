@@ -98,23 +98,68 @@ class Statics:
         self.run(*self.pushes[1:])
         return self.forces()
 
-    def shares(self, pushes: np.ndarray) -> np.ndarray:
-        """Forces of freedoms by each body's weight, then by each line's push : float64[bodies + lines, freedoms]."""
-        weights, found = self.loads().copy(), []
-        bias = self.by(np.zeros_like(weights))
-        for i in range(len(weights)):
-            alone = np.zeros_like(weights)
-            alone[i] = weights[i]
-            found.append(self.by(alone) - bias)
-        at = int(self.layout["push"])
-        for row in self.draft.line_table:
-            self.loads()[:] = 0.0
-            self.out[at : at + pushes.size] = 0.0
-            self.out[at + row["push"]] = pushes[row["push"]]
-            self.run(LINES)
-            found.append(self.forces() - bias)
-        self.loads()[:] = weights
-        return np.array(found).reshape(len(found), len(self.draft.freedom_table))
+    def sizes(self, pushes: np.ndarray) -> np.ndarray:
+        """What all that acts on bodies can be to each freedom at most : float64[freedoms].
+
+        Forces times the distance from the joint that turns them there, whichever way they point: what points at right
+        angles to where a freedom leads does so but for rounding.
+        """
+        draft, first = self.draft, int(self.layout["push"])
+        self.run(MOTION)
+        acts = [(i, row["centre"], np.linalg.norm(load[:3]), 0.0)
+                for i, (row, load) in enumerate(zip(draft.body_table, self.loads(), strict=True))]  # fmt: skip
+        self.out[first : first + pushes.size] = pushes
+        self.run(LINES)
+        dry = self.loads().copy()
+        self.run(*self.pushes[2:])
+        acts += [
+            (i, np.zeros(3), *np.linalg.norm(load.reshape(2, 3), axis=1)) for i, load in enumerate(self.loads() - dry)
+        ]
+        for row in draft.line_table:
+            size, turns = abs(pushes[row["push"]]), row["acts"] == rec.ABOUT
+            acts += self.at_ends(row, 0.0 if turns else size, size if turns else 0.0)
+        for row in draft.bushing_table:
+            here, there = (self.place_of(row[end]) for end in ("from_point", "to_point"))
+            acts += self.at_ends(row, float(row["stiffness"] * np.linalg.norm(there - here)), 0.0)
+        for row in draft.pin_table:
+            acts += self.at_ends(row, float(np.linalg.norm(row["force"][: row["rows"]])), 0.0)
+        self.forces()  # which leaves S in scratch
+        return sum((self.reach(*one) for one in acts), np.zeros(len(draft.freedom_table)))
+
+    def at_ends(self, row, force: float, torque: float) -> list[tuple]:
+        """What acts on two points, as `reach` takes it."""
+        ends = [self.tables.points[row[end]] for end in ("from_point", "to_point") if row[end] >= 0]
+        return [(int(one["body"]), one["place"], force, torque) for one in ends if one["body"] >= 0]
+
+    def row_of(self, i: int) -> np.ndarray:
+        """What `out` has of body i (`kernels.mechanism.room`)."""
+        return self.out[int(self.layout["body"]) + rec.BODY_OUT * i :][: rec.BODY_OUT]
+
+    def place_of(self, point: int) -> np.ndarray:
+        """Where a point is now [m]."""
+        from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE
+
+        i, place = int(self.tables.points[point]["body"]), self.tables.points[point]["place"]
+        if i < 0:
+            return place
+        own = self.row_of(i)
+        return own[PLACE : PLACE + 3] + own[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+
+    def reach(self, i: int, place: np.ndarray, force: float, torque: float) -> np.ndarray:
+        """What a force on body i at a place in its axes, and a torque, can be to each freedom, by S in scratch."""
+        from fvsolve.kernels.mechanism.room import ARM, ATTITUDE
+
+        bodies, found = self.draft.body_table, np.zeros(len(self.draft.freedom_table))
+        columns = self.written.scratch[: 6 * len(found)].reshape(-1, 6)
+        at = self.row_of(i)[ARM : ARM + 3] + self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+        while i >= 0:
+            row, joint = bodies[i], self.row_of(i)[ARM : ARM + 3]
+            for j in range(row["freedom"], row["freedom"] + row["freedoms"]):
+                turns = np.linalg.norm(columns[j, :3])
+                slides = np.linalg.norm(columns[j, 3:]) if turns == 0.0 else 0.0
+                found[j] = force * (slides + turns * np.linalg.norm(at - joint)) + torque * turns
+            i = int(row["parent"])
+        return found
 
     def by(self, loads: np.ndarray) -> np.ndarray:
         """Forces of freedoms under these forces and torques of bodies."""
