@@ -34,9 +34,14 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
     calls.rhs_in_turn(t, y, np.zeros(0), out, handle)
 
 
+def plain(shapes: rec.Written) -> rec.Written:
+    """What runs write, where pieces see a state as it is given: none of these reads cells that contents are kept of."""
+    return wiped(shapes)._replace(seen=np.zeros(0))
+
+
 def factored(model, y: np.ndarray) -> np.ndarray:
     """What `accelerate` leaves in `scratch` at a state: the factor of the mass matrix from 8 freedoms on."""
-    written, t = wiped(model.shapes), model.case.numerics.start
+    written, t = plain(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
     call_pieces((*model.tables, *written), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
     return written.scratch
@@ -47,7 +52,7 @@ class Statics:
 
     def __init__(self, draft, t: float) -> None:
         self.draft, self.t = draft, t
-        self.written = wiped(draft.shapes)
+        self.written = plain(draft.shapes)
         self.written.clock["limit"] = t
         self.layout = draft.tables.layout[0]
         self.out = np.zeros(int(self.layout["size"]))
