@@ -132,11 +132,22 @@ def lower_lines(draft) -> None:
     for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
         link = draft.case.links[name]
         row["energy"] = 0.5 * row["stiffness"] * apart(draft, (link.from_, link.to), BETWEEN)[0] ** 2
+        if draft.case.found:
+            row["energy"] += 2.0 * row["turn_stiffness"] * turned_since(draft, (link.from_, link.to))
     draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
     rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
     for k, row in enumerate(rows):
         if row["line"] >= 0:
             draft.line_table[row["line"]]["push"] = k
+
+
+def turned_since(draft, places: tuple[str, str]) -> float:
+    """eps.eps of the deviation (56) of two bodies at the start from how they are stated to stand."""
+    relative = []
+    for case in (draft.case, draft.case.stated):
+        here, there = (case.poses.get(bodies.point_of(case.nodes, place)[0], bodies.AT_REST) for place in places)
+        relative.append(here.attitude.T @ there.attitude)
+    return 0.25 * (3.0 - float(np.sum(relative[0] * relative[1])))
 
 
 def apart(draft, places: tuple[str | None, str], line) -> tuple[float, float]:

@@ -240,6 +240,26 @@ def test_a_hull_with_free_water_heels_further_and_its_water_lies_level():
     assert np.max(np.abs(rate)) < 1e-11
 
 
+def test_the_modes_of_a_tank_heel_a_hull_as_springs_do_and_nearly_as_its_cells():
+    """Each mode hangs down by m g sin / k, at its own height; three of them have all but 1 % of a free surface."""
+    cells, modes = (angles(built(balanced(hull(kind, 0.3))))[0] for kind in ("cells", "modes"))
+    frozen = angles(built(balanced(hull("frozen", 0.3))))[0]
+    assert modes < frozen and modes - frozen == approx(cells - frozen, rel=0.05)
+
+
+def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree():
+    tub = {"type": "tank", "on": "hull", "area": 6.0, "level": 2.0}
+    ship = body(4e5, [8e6, 3e7, 3e7], {"kind": "revolute", "axis": [1, 0, 0], "angle": 0.05},
+                centre_of_mass=[0, 0, -1.1])  # fmt: skip
+    nodes = {"hull": ship, "port": {**tub, "at": [0, 5, -1]}, "starboard": {**tub, "at": [0, -5, -1]}}
+    duct = {"type": "rigid-column", "from": "starboard", "to": "port", "length": 10.0, "diameter": 1.38}
+    result = fvsolve.run(balanced(nodes, {"duct": duct}, ["hull.angle", "duct.flow"]))
+    assert result["hull.angle"] == approx(0.0, abs=1e-12) and result["duct.flow"] == approx(0.0, abs=1e-9)
+    nodes["hull"]["centre_of_mass"] = [0, 0.05, -1.1]
+    with pytest.raises(CaseError, match="wants nothing to move, but rigid column duct: 4777 Pa drive it unbalanced"):
+        built(balanced(nodes, {"duct": duct}))
+
+
 # what follows ---------------------------------------------------------------------------------------------------
 
 SCENES = {
@@ -247,6 +267,7 @@ SCENES = {
     "chain": lambda: four_bar(),
     "plate": lambda: raft("bushing", load=(0.3, 0.1)),
     "hull": lambda: (hull("cells", 0.3), {}),
+    "modes": lambda: (hull("modes", 0.3), {}),
 }
 METHODS = {"dormand-prince": {"rtol": 1e-8}, "radau-iia-5": {"rtol": 1e-6}, "rodas-4": {"rtol": 1e-6}}
 
@@ -254,11 +275,11 @@ METHODS = {"dormand-prince": {"rtol": 1e-8}, "radau-iia-5": {"rtol": 1e-6}, "rod
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_stands_in_balance_stays(scene, method):
-    probe = {"arm": "hand.tip.z", "chain": "two.tip.z", "plate": "plate.z", "hull": "hull.angle"}[scene]
+    probe = {"arm": "hand.tip.z", "chain": "two.tip.z", "plate": "plate.z"}.get(scene, "hull.angle")
     case = balanced(*SCENES[scene](), [probe], 2.0, method=method, **METHODS[method])
     result = fvsolve.run(case)
     assert result.ok
-    assert np.ptp(result[probe]) <= (1e-10 if scene == "hull" else 0.0)
+    assert np.ptp(result[probe]) <= (1e-10 if scene in ("hull", "modes") else 0.0)
 
 
 def by_hand(nodes: dict, model) -> dict:
@@ -418,6 +439,12 @@ def test_bushings_and_preloads_count_from_what_is_stated():
     model = built(balanced(nodes, links, ["rope.force"]))
     assert angles(model) == approx([0.1 - (2.0 * GRAVITY - 5.0) / 400.0], rel=1e-12)
     assert model.observe(fvsolve.initial_state(model)) == approx([-2.0 * GRAVITY], rel=1e-12)
+    rubber = {"rubber": {"type": "bushing", "from": "top.a", "to": "rod", "rotational_stiffness": 30.0}}
+    rod = {"rod": body(2.0, [0.1, 0.1, 0.1], {"kind": "revolute", "axis": [0, -1, 0]}, centre_of_mass=[0.5, 0, 0])}
+    model = built(balanced({"top": nodes["top"], **rod}, rubber, ["rod.angle", "rubber.torque"]))
+    angle, torque = model.observe(fvsolve.initial_state(model))
+    assert torque == approx(GRAVITY * math.cos(angle), rel=1e-12) and angle == approx(-math.atan(GRAVITY / 30.0))
+    assert model.tables.bushings["energy"] == approx([2.0 * 30.0 * math.sin(0.5 * angle) ** 2], rel=1e-12)  # of t = 0
 
 
 def test_a_mass_on_an_axis_goes_to_where_its_spring_holds_what_pushes_it():
