@@ -34,11 +34,15 @@ def lowered_by(physics: type) -> type:
     return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 
 
-def at_start(basins: list, size: int) -> np.ndarray:
-    """States at the start: no deviation from the profile but where basins start from one."""
+def at_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
+    """States at the start: no deviation from the profile but where basins start from one.
+
+    attitudes : of bodies by name, in place of those of the start
+    """
     found = np.zeros(size)
     for basin in basins:
-        basin.own(found)[:] = basin.start()
+        on = basin.part.on if attitudes else None
+        basin.own(found)[:] = basin.start() if on is None else basin.start(attitudes[on])
         if basin.scalars:
             basin.start_scalars(found)
     return found

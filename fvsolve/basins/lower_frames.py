@@ -32,10 +32,13 @@ def lower_frame(draft, basin, row) -> None:
     row["heavy"] = joints or any(free_joints(part.on, draft.case.nodes))
 
 
-def level_at_start(basin) -> np.ndarray:
-    """Depth of water that is level in the world though its basin is not, of the volume that it has at rest [m]."""
-    pose, part = basin.case.poses[basin.part.on], basin.part
-    down = (pose.attitude @ attitude_of(part)).T @ np.array([0.0, 0.0, -1.0])
+def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
+    """Depth of water that is level in the world though its basin is not, of the volume that it has at rest [m].
+
+    attitude : R of its body, that of the start if left out
+    """
+    part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
+    down = (turn @ attitude_of(part)).T @ np.array([0.0, 0.0, -1.0])
     ground = basin.bed - part.level + (down[0] * basin.x + down[1] * basin.y) / down[2]
     area, volume = basin.mesh.area, float(np.sum(basin.mesh.area * basin.depth))
     if not np.ptp(ground - (basin.bed - part.level)) > 0.0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,7 @@ class Case(Shown):
     folder: Path | None = field(repr=False)
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is masses on its body
+    found: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses where their forces balance
 
     picture = "fvsolve.draw.objects:case_figure"
 
@@ -116,16 +117,23 @@ class Case(Shown):
 
     @cached_property
     def loaded(self) -> dict[str, Node]:
-        """Nodes, bodies with the mass of the water without cells that rides on them, and its modes as bodies."""
+        """Nodes where they start, bodies with the mass of the water without cells that rides on them, and its modes as
+        bodies."""
         from fvsolve.case.riding import loaded
 
+        nodes = {**self.nodes, **self.found} if self.found else self.nodes
         if not self.lumped:
-            return self.nodes
-        return loaded(self.nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
+            return nodes
+        return loaded(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
+
+    @cached_property
+    def stated(self) -> Case:
+        """The same with bodies and masses where the file has them, from which bushings and preloads count."""
+        return replace(self, found={}) if self.found else self
 
     def ahead(self, first: str, second: str) -> float:
         """How far place `second` lies ahead of `first` at the start [m]; of points their distance."""
-        return bodies.ahead(self.nodes, self.poses, first, second)
+        return bodies.ahead(self.loaded, self.poses, first, second)
 
     @cached_property
     def conduits(self) -> dict[str, Link]:

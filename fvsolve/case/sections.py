@@ -121,7 +121,8 @@ class Numerics(Table):
         Choice(
             "start",
             STARTS,
-            "stated levels, pressures and flows are held and the rest in equilibrium, nothing may move, or no flow",
+            "stated levels, pressures and flows are held and the rest in equilibrium; nothing may move, and bodies and "
+            "masses stand where their forces balance; or no flow",
             changes=PROFILE,
         ),
     ] = "steady"

@@ -46,7 +46,9 @@ def solution(case, start: ExactStart) -> Solution:
             force += sign * link.force.first
     decay, v0, t0 = damping / (2.0 * mass.mass), mass.initial_velocity, case.numerics.start
     kappa = cmath.sqrt(decay**2 - stiffness / mass.mass)
-    end = force / stiffness
+    end, place = force / stiffness, mass.initial_position
+    if case.numerics.initial == "equilibrium":  # where it then starts
+        place, end, force = place + end, 0.0, 0.0
 
     def parts(t):
         """(exp(-decay t) cosh(kappa t), exp(-decay t) sinh(kappa t) / kappa) after the start."""
@@ -58,7 +60,7 @@ def solution(case, start: ExactStart) -> Solution:
 
     def position(t):
         c, s = parts(t)
-        return mass.initial_position + end * (1.0 - c - decay * s) + v0 * s
+        return place + end * (1.0 - c - decay * s) + v0 * s
 
     def velocity(t):
         c, s = parts(t)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from fvsolve.model.ranges import flow_notices
 from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
+from fvsolve.model.settling import settled, wanted
 
 
 def build(case) -> Model:
@@ -35,6 +37,17 @@ def build(case) -> Model:
     """
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; wanted what load() gives")
+    told = []
+    if wanted(case):  # of equilibrium
+        steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
+        case, told = settled(case, drafted(steady))
+    draft = drafted(case)
+    draft.warnings += told
+    return model_of(draft)
+
+
+def drafted(case: Case) -> Draft:
+    """The tables of a case and its profile."""
     draft = Draft(case)
     fill_places(draft)
     fill_links(draft)
@@ -46,7 +59,7 @@ def build(case) -> Model:
     draft.steady = start_profile(draft)
     settle_scalars(draft)
     draft.check()
-    return model_of(draft)
+    return draft
 
 
 def fill_places(draft: Draft) -> None:

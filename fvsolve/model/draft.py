@@ -98,6 +98,8 @@ class Draft:
     probe_table: np.ndarray = rows(rec.PROBE)
 
     # of the start
+    locked: dict[int, list[str]] = field(default_factory=dict)  # piston -> sides at which shut chambers may hold
+    shut: dict[int, list[str]] = field(default_factory=dict)  # and those that no open link joins to anything
     tables: Any = None  # all of them, as kernels read them
     shapes: Any = None  # of what runs write
     profiles: dict[int, np.ndarray] = field(default_factory=dict)  # pipe -> pressure of the profile at centres [Pa]

@@ -11,8 +11,8 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import rows_in
-from fvsolve.model.mechanism import factored
 from fvsolve.model.scalars import bounds
+from fvsolve.model.statics import factored
 from fvsolve.model.unsteady import memory_shares
 
 RANK = 1e-12  # of the greatest singular value of what hangs together: below, a motion stores no energy

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.bodies_start import rounding
 from fvsolve.model.lowering import Lowering, rows_in
 from fvsolve.model.mechanism import add_line, apart
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
 SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses that no chamber holds, of masses that nothing holds
-SNAP = 1e-12  # share of the forces on a mass below which their sum is rounding
 
 
 class Push(Lowering):
@@ -40,7 +40,7 @@ def lower_masses(draft) -> None:
     draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
     draft.mass_index |= {None: len(draft.mass_names)}
     for name, row in zip(draft.mass_names, draft.mass_table, strict=False):
-        node = case.nodes[name]
+        node = case.loaded[name]
         row["position"] = node.initial_position
         if (mass := getattr(node, "mass", None)) is not None:  # a frame stands still
             row["velocity"], row["lightness"] = node.initial_velocity, 1.0 / mass
@@ -125,7 +125,7 @@ def start_masses(draft, start) -> list[str]:
         if row["mass"] >= 0:
             total[row["mass"]] += row["outward"] * row["rest"]
             size[row["mass"]] += abs(row["rest"])
-    masses["force"] = np.where(np.abs(total) > SNAP * size, total, 0.0)
+    masses["force"] = np.where(np.abs(total) > rounding(draft) * size, total, 0.0)
     moving = []
     for name, row in zip(draft.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fvsolve.model.mechanism import holding_pressures
+from fvsolve.model.holding import find_shut, holding_pressures
 from fvsolve.model.probes import probe_offsets
 from fvsolve.model.start import Start
 from fvsolve.model.unsteady import add_terms
@@ -19,6 +19,7 @@ def start_profile(draft) -> dict[str, Any]:
 
         start = BarotropicStart(draft)
     start.solve()
+    find_shut(draft, start)
     if start.hold_loads(holding_pressures(draft, start)):
         start.solve()
     start.report_split()

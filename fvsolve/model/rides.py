@@ -63,10 +63,10 @@ def driven_at_start(draft, start) -> list[str]:
     """What a body that moves drives at the start, in words."""
     if not len(draft.ride_table):
         return []
-    from fvsolve.model.mechanism import Statics
+    from fvsolve.model.statics import DRIVES, MOTION, Statics
 
     at = Statics(draft, start.t)
-    at.run("joints: kinematics", "rides: set_rides")
+    at.run(MOTION, DRIVES)
     first, rho = int(at.layout["ride"]), draft.fluid.density
     drives = at.out[first : first + len(draft.ride_table)]
     found = []

@@ -16,9 +16,9 @@ from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
 from fvsolve.kernels.handle import make_handle
 from fvsolve.kernels.schedules import value_until
 from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
+from fvsolve.model.bodies_start import start_bodies
 from fvsolve.model.lowering import lowering_of
 from fvsolve.model.masses import start_masses
-from fvsolve.model.mechanism import start_bodies
 from fvsolve.model.rides import driven_at_start
 from fvsolve.model.slate import wiped
 from fvsolve.steady import Edge, solve_steady, union

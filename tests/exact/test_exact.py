@@ -273,6 +273,10 @@ def test_a_mass_on_springs_is_that_of_scipy(damping):
     assert found.probe(probe(case, "body.velocity"), t) == approx(truth[1], abs=1e-8)
     run = outcome(case)
     assert run.rows[:, 1] == approx(found.probe(probe(case, "body.position"), run.rows[:, 0]), abs=1e-7)
+    case, found = solved(load(case, {"numerics.initial": "equilibrium", "nodes.body.initial_velocity": 0}))
+    rests = 1.0 + (600.0 * -0.1 - 12.0 + 25.0) / 900.0
+    assert outcome(case).rows[:, 1] == approx(rests, abs=1e-14)
+    assert found.probe(probe(case, "body.position"), t) == approx(rests, abs=1e-14)
 
 
 # what they share --------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, TURNIN
 from fvsolve.kernels.records import BODY_OUT
 from fvsolve.model import Slate
 from fvsolve.model.energy_ledger import Accounts
-from fvsolve.model.mechanism import factored
+from fvsolve.model.statics import factored
 
 pytest.importorskip("pinocchio", reason="pinocchio (pin) is the peer here")
 SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]
@@ -55,6 +55,26 @@ def branch(tree: dict, on: str | None = None) -> dict:
     return found
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_random_trees_on_springs_balance_where_pinocchio_has_their_gravity(seed):
+    """g(q) + k q = 0, the spring of each joint at k times what it is at."""
+    rng = np.random.default_rng([9, seed])
+    bodies = branch(random_tree(rng, 8, "revolute", ("revolute", "prismatic")))
+    for one in bodies.values():
+        joint = one["joint"]
+        del joint["rate"]
+        joint["stiffness"] = float(rng.uniform(100.0, 400.0))
+    model = model_of(bodies, initial="equilibrium")
+    pin, peer, data, _, _, rows = pinocchio_of(bodies, GRAVITY)
+    q = np.zeros(peer.nq)
+    for name, row in zip(model.body_names, model.tables.bodies, strict=True):
+        q[rows[name]] = row["start"][0]
+    stiff = np.array([bodies[name]["joint"]["stiffness"] for name in bodies])
+    left = pin.computeGeneralizedGravity(peer, data, q) + stiff * q
+    assert np.max(np.abs(left)) < 1e-10 * np.max(stiff * np.abs(q))
+    assert len(model.case.found) == 8 and model.steady["moving"] == []
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
     """M = L'L with L from the kernels, entries between freedoms of which neither hangs on the other zero."""
@@ -71,6 +91,22 @@ def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
     table = dict(zip(model.body_names, model.tables.bodies, strict=True))
     own = [int(table[name]["freedom"]) + k for name in rows for k in range(table[name]["freedoms"])]
     assert (factor.T @ factor)[np.ix_(own, own)] == pytest.approx(truth, abs=1e-13 * np.abs(truth).max())
+
+
+def test_a_wall_beside_a_tree_leaves_its_mass_matrix_at_the_state_that_is_asked_for():
+    """A slider that takes a wall along, and a pendulum on it: M_12 = -m l cos(a)."""
+    slider = {"type": "body", "mass": 5.0, "inertia": [1, 1, 1], "joint": {"kind": "prismatic", "axis": [1, 0, 0]}}
+    hinge = {"kind": "revolute", "axis": [0, 1, 0], "on": "slider"}
+    bob = {"type": "body", "mass": 2.0, "inertia": [0, 0, 0], "centre_of_mass": [0, 0, -0.7], "joint": hinge}
+    flume = {"type": "basin", "size": [2.0, 1.0], "cells": [8, 1], "level": 0.5,
+             "patches": {"lid": {"side": "west", "body": "slider"}}}  # fmt: skip
+    model = model_of({"flume": flume, "slider": slider, "bob": bob})
+    y = model.start.copy()
+    y[model.state_names.index("bob.angle")] = 1.1
+    factor = np.zeros((2, 2))
+    factor[np.tril_indices(2)] = factored(model, y)[16:19]
+    wanted = [[7.0, -1.4 * np.cos(1.1)], [-1.4 * np.cos(1.1), 2.0 * 0.49]]
+    assert factor.T @ factor == pytest.approx(np.array(wanted), rel=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -101,13 +101,13 @@ class FreeSurfaceRows(BasinRows):
         row["unsplit"] = UNSPLIT
         row["work"] = draft.to_work(faces.work_size(self.integers))
 
-    def start(self) -> np.ndarray:
+    def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
         depth = self.depth
         if self.part.on is not None:
             from fvsolve.basins.lower_frames import level_at_start
 
-            depth = level_at_start(self)
+            depth = level_at_start(self, attitude)
             found[0] = depth - self.depth
         if given is not None and given.level is not None:
             depth = depth_at_start(samples(given.level, self.mesh), samples(self.part.bed, self.mesh))

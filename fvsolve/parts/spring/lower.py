@@ -16,3 +16,5 @@ class SpringRows(Push, kind="spring"):
         x, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["stiffness"] = -1, link.stiffness
         row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
+        if link.preload is not None and draft.case.found:
+            row["force"] -= link.stiffness * (x - draft.case.stated.ahead(link.from_, link.to))
