@@ -12,7 +12,7 @@ from fvsolve.model.schedules import break_times
 from fvsolve.model.slate import wiped
 from fvsolve.parts.body.part import Body
 
-WATER = ("frames: set_frames", "frames: turn_water")  # what loads bodies beside pushes, at rest
+WATER = ("frames: set_frames", "frames_flow: turn_fluid")  # what loads bodies beside pushes, at rest
 WALLS = ("walls: press_at_rest",)
 NETWORKS = ("rides: set_rides", "rides: press_tanks", "recoil: load_networks")
 SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
