@@ -11,7 +11,7 @@ accelerations and centrifugal forces are a bed that moves. In a liquid phi joins
 origin, and vertical momentum: both of the order of angle times depth over wave length.
 """
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, cross, row_of, turned
 from fvsolve.kernels.records import NO_WEIGHT, STATUS, WHERE
@@ -97,10 +97,15 @@ def lift(plane, basin, per, values, lifted):
         return
     for j in range(basin["ny"]):
         y = plane[places + nx + j]
-        row, even, slope = j * nx, y * (fy + yy * y), fx + xy * y
-        for i in range(nx):
-            x = plane[places + i]
-            lifted[row + i] = values[row + i] + (x * (slope + xx * x) + even)
+        a, z = j * nx, (j + 1) * nx
+        lift_row(plane[places : places + nx], values[a:z], fx + xy * y, xx, y * (fy + yy * y), lifted[a:z])
+
+
+@inner
+def lift_row(x, values, slope, xx, even, lifted):
+    """`lift` of a row of cells of a grid."""
+    for i in range(lifted.size):
+        lifted[i] = values[i] + (x[i] * (slope + xx * x[i]) + even)
 
 
 @njit(forceinline=True)

@@ -32,6 +32,25 @@ def mass_per(tables, basin):
     return tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"]
 
 
+@njit(fastmath={"reassoc"})
+def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, dy):
+    """Of cells of one y: mass, its rate (1, x, xx), flow along x and y (1, x), rates of flow, weight times height.
+
+    The order of sums is left to the compiler, which makes whole vectors of them.
+    """
+    r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
+    for i in range(h.size):
+        depth, per = max(rest[i] + h[i], 0.0), per_area * area[i]
+        mass, more, v, dv = per * depth, per * dh[i], per * qy[i], per * dy[i]
+        r0, r1, r2 = r0 + mass, r1 + mass * x[i], r2 + mass * x[i] * x[i]
+        d0, d1, d2 = d0 + more, d1 + more * x[i], d2 + more * x[i] * x[i]
+        p0, v0, v1 = p0 + per * qx[i], v0 + v, v1 + v * x[i]
+        p1, f0, f1 = p1 + per * dx[i], f0 + dv, f1 + dv * x[i]
+        if deep:
+            g0 += mass * (surface[i] - rest[i] + level + 0.5 * depth)
+    return r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0
+
+
 @njit
 def moments(tables, basin, y, rates, first):
     """Sums over cells, in axes of the basin: moments 1, x, y, xx, xy, yy of mass [kg ..] and of its weight along the
@@ -45,20 +64,13 @@ def moments(tables, basin, y, rates, first):
     level, deep = plane[basin["frame"] + LEVEL], basin["deep"] == 1
     surface, rows, wide = int(plane[basin["frame"] + SURFACE]), basin["ny"] if nx > 0 else n, nx if nx > 0 else 1
     for row in range(rows):
-        z = plane[places + (nx if nx > 0 else n) + row]
-        r0 = r1 = r2 = d0 = d1 = d2 = p0 = p1 = v0 = v1 = f0 = f1 = g0 = 0.0  # of a row: its cells have one y
-        for k in range(wide):
-            i = row * wide + k
-            x, per = plane[places + (k if nx > 0 else row)], per_area * plane[basin["area"] + i]
-            depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
-            mass, more = per * depth, per * rates[first + i]
-            v, dv = per * y[o + 2 * n + i], per * rates[first + 2 * n + i]
-            r0, r1, r2 = r0 + mass, r1 + mass * x, r2 + mass * x * x
-            d0, d1, d2 = d0 + more, d1 + more * x, d2 + more * x * x
-            p0, v0, v1 = p0 + per * y[o + n + i], v0 + v, v1 + v * x
-            p1, f0, f1 = p1 + per * rates[first + n + i], f0 + dv, f1 + dv * x
-            if deep:
-                g0 += mass * (plane[surface + i] - plane[basin["plan"] + i] + level + 0.5 * depth)
+        z, at = plane[places + (nx if nx > 0 else n) + row], row * wide
+        a, b, x = o + at, first + at, places + (0 if nx > 0 else row)
+        r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0 = row_sums(
+            deep, per_area, level, plane[x : x + wide], plane[basin["area"] + at :], plane[basin["plan"] + at :],
+            plane[surface + at :], y[a : a + wide], y[a + n :], y[a + 2 * n :], rates[b:], rates[b + n :],
+            rates[b + 2 * n :],
+        )  # fmt: skip
         m, sx, sy, lever = m + r0, sx + r1, sy + r0 * z, lever + g0
         xx, xy, yy = xx + r2, xy + r1 * z, yy + r0 * z * z
         dx, dy, dxx, dxy, dyy = dx + d1, dy + d0 * z, dxx + d2, dxy + d1 * z, dyy + d0 * z * z
