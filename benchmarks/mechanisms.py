@@ -1,7 +1,13 @@
-"""Rates of chains of bodies beside pinocchio's forward dynamics, and what the room of mechanisms compiles.
+"""Bodies beside pinocchio, MuJoCo and exudyn, and what the room of mechanisms compiles.
 
-python benchmarks/mechanisms.py            microseconds a call and their ratio, best of several
-python benchmarks/mechanisms.py --compile  seconds that a first pendulum compiles, in an empty cache
+python benchmarks/mechanisms.py            the three tables below
+python benchmarks/mechanisms.py rates      accelerations of chains beside `pin.aba`, called from Python both [us]
+python benchmarks/mechanisms.py chain      a chain by rk4 beside MuJoCo's: error and CPU time of the steps
+python benchmarks/mechanisms.py arm        an arm on a cylinder beside exudyn's: CPU time at an error of 1e-5 rad
+python benchmarks/mechanisms.py compile    seconds that a first pendulum compiles, in an empty cache
+
+Best of several, the peers in turn with us. Errors of chain and arm are each solver's to its own finest run. Peers come
+by `python -m pip install pin mujoco exudyn`; where one is missing, its table is a sentence.
 """
 
 from __future__ import annotations
@@ -10,13 +16,17 @@ import os
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
+import peers_bodies
+from measure import machine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 SIZES, CALLS, ROUNDS = (1, 3, 6, 12, 30), 2000, 15
+FINEST, CLOSE = 64000, 1e-5  # steps of a chain; [rad]
 WHOLE = "import fvsolve; m = fvsolve.build(fvsolve.load({case!r})); m.rhs(0.0, m.start)"
 
 
@@ -30,15 +40,19 @@ def chain(many: int) -> dict:
     return found
 
 
-def best(call) -> float:
-    """Least CPU time of a call [us]."""
-    found = []
-    for _ in range(ROUNDS):
-        began = process_time()
-        for _ in range(CALLS):
-            call()
-        found.append((process_time() - began) / CALLS * 1e6)
-    return min(found)
+def taken(call) -> float:
+    """CPU time of a call [us]."""
+    began = process_time()
+    call()
+    return (process_time() - began) * 1e6
+
+
+def calls(call) -> float:
+    """CPU time of one of CALLS from Python [us]."""
+    began = process_time()
+    for _ in range(CALLS):
+        call()
+    return (process_time() - began) / CALLS * 1e6
 
 
 def rates(bodies: dict):
@@ -62,23 +76,86 @@ def rates(bodies: dict):
     return slate, lambda: rhs(0.0, y, dydt, out, handle), lambda calls: many(calls, y, dydt, out, handle)
 
 
+def beside(call, peer) -> tuple[float, float]:
+    """The least of both, called in turn."""
+    found = [(call(), peer()) for _ in range(ROUNDS)]
+    return min(one for one, _ in found), min(other for _, other in found)
+
+
 def speed() -> None:
+    """Accelerations of chains."""
     from truth.trees import pinocchio_of
 
-    print(f"{'bodies':>6} {'rates in a loop':>16} {'from Python':>12} {'pin.aba from Python':>20} {'ratio':>6}  [us]")
+    print(f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}")
     for many in SIZES:
         bodies = chain(many)
         slate, call, loop = rates(bodies)
         pin, peer, data, q, v, _ = pinocchio_of(bodies, 9.80665)
         tau = np.zeros(peer.nv)
         loop(10)
-        inside = []
-        for _ in range(ROUNDS):
-            began = process_time()
-            loop(CALLS)
-            inside.append((process_time() - began) / CALLS * 1e6)
-        own, peers = min(inside), best(lambda: pin.aba(peer, data, q, v, tau))  # noqa: B023
-        print(f"{many:6d} {own:16.2f} {best(call):12.2f} {peers:20.2f} {own / peers:6.2f}")
+        inside = min(taken(lambda: loop(CALLS)) for _ in range(ROUNDS)) / CALLS  # noqa: B023
+        own, peers = beside(lambda: calls(call), lambda: calls(lambda: pin.aba(peer, data, q, v, tau)))  # noqa: B023
+        print(f"{many:6d} {inside:10.2f} {own:12.2f} {peers:20.2f} {inside / peers:13.2f} {own / peers:6.2f}")
+
+
+def solved(case: dict, probes: list[str]) -> tuple[np.ndarray, float]:
+    """Rows of probes of a run, and CPU time of its stepping [s]."""
+    import fvsolve
+
+    wall, busy = perf_counter(), process_time()
+    result = fvsolve.run(case)
+    share = min(1.0, (process_time() - busy) / (perf_counter() - wall))  # less what others took of this core
+    return np.array([result[probe] for probe in probes]), result.summary["seconds"] * share
+
+
+def chains() -> None:
+    """Errors and times of a chain, at the same steps of the same method."""
+    probes = [f"b{k}.angle" for k in range(len(peers_bodies.CHAIN))]
+
+    def own(steps):
+        rows, busy = solved(peers_bodies.chain_case(steps), probes)
+        return rows[:, -1], busy
+
+    print(
+        f"{'steps':>6} {'error':>9} {'us a step':>10} {'MuJoCo error':>13} {'us a step':>10} {'ratio (goal 0.6)':>17}"
+    )
+    ours, theirs = own(FINEST)[0], peers_bodies.chain_in_mujoco(FINEST)[0]
+    for steps in (1000, 4000, 16000):
+        mine, other = own(steps)[0], peers_bodies.chain_in_mujoco(steps)[0]
+        a, b = beside(lambda: own(steps)[1], lambda: peers_bodies.chain_in_mujoco(steps)[1])  # noqa: B023
+        wrong, peers = np.abs(mine - ours).max(), np.abs(other - theirs).max()
+        print(f"{steps:6d} {wrong:9.1e} {1e6 * a / steps:10.2f} {peers:13.1e} {1e6 * b / steps:10.2f} {a / b:17.2f}")
+    print(f"both at their finest, {FINEST} steps: angles {np.abs(ours - theirs).max():.0e} rad apart")
+
+
+def arms() -> None:
+    """CPU time of an arm on a cylinder at an error, log-log between runs."""
+
+    def own(rtol):
+        rows, busy = solved(peers_bodies.arm_case(rtol), ["arm.angle"])
+        return rows[0], busy
+
+    times = [
+        at_error(name, solve, settings, finest)
+        for name, solve, settings, finest in (
+            ("fvsolve, rtol", own, (1e-3, 1e-4, 1e-5, 1e-6, 1e-8), 1e-12),
+            ("exudyn, steps", peers_bodies.arm_in_exudyn, (1000, 2000, 4000, 8000), 32000),
+        )
+    ]
+    print(
+        f"at {CLOSE:g} rad {1e3 * times[0]:.2f} and {1e3 * times[1]:.2f} ms, ratio {times[0] / times[1]:.2f} (goal 0.2)"
+    )
+
+
+def at_error(name: str, solve, settings, finest) -> float:
+    """CPU time of a solver at an error of CLOSE [s], with a row a setting."""
+    true, errors, least = solve(finest)[0], [], []
+    for setting in settings:
+        errors.append(np.abs(solve(setting)[0] - true).max())
+        least.append(min(solve(setting)[1] for _ in range(ROUNDS)))
+        print(f"{name} {setting:<8g} error {errors[-1]:.1e} rad {1e3 * least[-1]:7.2f} ms")
+    good = np.argsort(errors)
+    return float(np.exp(np.interp(np.log(CLOSE), np.log(np.array(errors)[good]), np.log(np.array(least)[good]))))
 
 
 def compiling() -> None:
@@ -96,5 +173,25 @@ def compiling() -> None:
             print(f"{name}: {perf_counter() - began:.1f} s from an empty cache to the first rates")
 
 
+TABLES = {
+    "rates": (speed, "pinocchio", "pin"),
+    "chain": (chains, "mujoco", "mujoco"),
+    "arm": (arms, "exudyn", "exudyn"),
+}
+
+
+def main(wanted: list[str]) -> None:
+    """Print the tables that are asked for, all but `compile` where none is."""
+    if "compile" in wanted:
+        compiling()
+    for name, (table, module, wheel) in TABLES.items():
+        if not wanted or name in wanted:
+            print(f"\n{name}: {machine('numba', wheel)}")
+            if find_spec(module) is None:
+                print(f"skipped, since {wheel} is not installed: python -m pip install {wheel}")
+            else:
+                table()
+
+
 if __name__ == "__main__":
-    compiling() if "--compile" in sys.argv else speed()
+    main(sys.argv[1:])

@@ -8,6 +8,7 @@ from math import cos, pi
 from fvsolve.basins.advection import THIN
 from fvsolve.basins.behind import counted, is_given, weight
 from fvsolve.basins.diffusion import add_decay
+from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mixing import lose
@@ -39,13 +40,14 @@ def patch_values(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
+        seen = seen_of(basin, tables.seen, y)
         for q in range(tables.scalars.size):
             deep, total, held = basin["deep"] == 1, 0.0, 0.0
             for m in range(patch["count"]):
                 i = tables.integers[patch["first"] + m]
                 part = tables.plane[basin["area"] + i]
-                part *= max(weight(tables.plane, basin, True, i, y), LEAST) if deep else 1.0
-                total, held = total + part, held + part * cell_value(tables, basin, q, y, i)
+                part *= max(weight(tables.plane, basin, True, i, seen), LEAST) if deep else 1.0
+                total, held = total + part, held + part * cell_value(tables, basin, q, seen, i)
             out[value + q * nodes + patch["node"]] = held / total
 
 
@@ -78,9 +80,9 @@ def put_outside(t, tables, patch, basin, q):
 def made_ready(t, tables, b, y):
     """Depths and values beyond the boundary of a basin, for its scalars."""
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
-    n, o, at = basin["n"], basin["y"], basin["plan"]
+    n, o, at, seen = basin["n"], basin["y"], basin["plan"], seen_of(basin, tables.seen, y)
     if basin["deep"] == 1:
-        depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], y[o : o + n]
+        depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], seen[o : o + n]
         for i in range(n):
             depth[i] = max(rest[i] + change[i], 0.0)
     for p in range(patches.size):
@@ -107,14 +109,15 @@ def settle_amounts(t, y, dydt, out, handle):
     work = tables.work
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
+        seen = seen_of(basin, tables.seen, y)
         n, depth = basin["n"], work[basin["toil"] : basin["toil"] + deep(basin)]
         per = tables.settings[0]["rho"]
         if basin["deep"] == 0:
             per = basin["density"] * basin["thickness"]
         for q in range(tables.scalars.size if basin["carried"] >= 0 else 0):
             at, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
-            outside, s, rate = work[ring : ring + basin["outer"]], y[at : at + n], dydt[at : at + n]
-            settle(tables, b, basin, q, turned(t, basin), per, depth, outside, y, s, rate, out)
+            outside, s, rate = work[ring : ring + basin["outer"]], seen[at : at + n], dydt[at : at + n]
+            settle(tables, b, basin, q, turned(t, basin), per, depth, outside, seen, s, rate, out)
 
 
 @njit

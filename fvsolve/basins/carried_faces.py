@@ -3,6 +3,7 @@
 from fvsolve.basins.advection_faces import advection_rates
 from fvsolve.basins.behind import is_given
 from fvsolve.basins.carried import deep, made_ready, turned
+from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
@@ -20,6 +21,7 @@ def carry_on_meshes(t, y, dydt, out, handle):
         n, flows = basin["n"], plane if is_given(basin) else work
         flow = flows[basin["flows"] : basin["flows"] + basin["faces"]]
         made_ready(t, tables, b, y)
+        seen = seen_of(basin, tables.seen, y)
         factor, depth = turned(t, basin), work[basin["toil"] : basin["toil"] + deep(basin)]
         for q in range(scalars.size):
             o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
@@ -27,7 +29,7 @@ def carry_on_meshes(t, y, dydt, out, handle):
                 basin["scheme"], basin["wide"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
                 integers[basin["links"] :],
                 flow, depth, work[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
-                y[o : o + n], work[basin["toil"] + n :], dydt[o : o + n],
+                seen[o : o + n], work[basin["toil"] + n :], dydt[o : o + n],
             )  # fmt: skip
             still = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]  # which will be at full speed
             out[RATE] = max(out[RATE], quickest + still + scalars[q]["decay"])

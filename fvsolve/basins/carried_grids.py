@@ -4,6 +4,7 @@ from fvsolve.basins.advection import add_fifth_order, grid_advection, grid_faste
 from fvsolve.basins.behind import is_given
 from fvsolve.basins.carried import deep, made_ready, turned
 from fvsolve.basins.diffusion import grid_diffusion
+from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
@@ -38,6 +39,7 @@ def carry_on_grids(t, y, dydt, out, handle):
             continue
         made_ready(t, tables, b, y)
         kx, ky, flow_x, flow_y, depth, work = parts(tables, basin)
+        seen = seen_of(basin, tables.seen, y)
         quick = basin["unsplit"] * basin["fastest"]  # at full speed: while it turns back it gets quicker in a step
         for q in range(tables.scalars.size):
             out[RATE] = max(out[RATE], quick + tables.scalars[q]["decay"])
@@ -45,7 +47,7 @@ def carry_on_grids(t, y, dydt, out, handle):
             at = basin["carried"] + q * n
             grid_advection(
                 basin["scheme"], basin["limiter"], kx.size, ky.size, kx, ky, turned(t, basin), flow_x, flow_y, depth,
-                tables.work[ring : ring + basin["outer"]], y[at : at + n], work, dydt[at : at + n],
+                tables.work[ring : ring + basin["outer"]], seen[at : at + n], work, dydt[at : at + n],
             )  # fmt: skip
 
 
@@ -58,6 +60,7 @@ def add_on_grids(t, y, dydt, out, handle):
         if not on_grid(basin):
             continue
         kx, ky, flow_x, flow_y, depth, work = parts(tables, basin)
+        seen = seen_of(basin, tables.seen, y)
         fastest = basin["fastest"]
         if depth.size > 0:
             fastest = grid_fastest(kx.size, ky.size, kx, ky, flow_x, flow_y, depth, work)
@@ -66,8 +69,8 @@ def add_on_grids(t, y, dydt, out, handle):
             at = basin["carried"] + q * n
             add_fifth_order(
                 basin["scheme"], kx.size, ky.size, kx, ky, turned(t, basin), flow_x, flow_y, depth,
-                tables.work[ring : ring + basin["outer"]], scalar["least"], scalar["greatest"], fastest, y[at : at + n],
-                work, dydt[at : at + n],
+                tables.work[ring : ring + basin["outer"]], scalar["least"], scalar["greatest"], fastest,
+                seen[at : at + n], work, dydt[at : at + n],
             )  # fmt: skip
 
 
@@ -80,13 +83,14 @@ def spread_on_grids(t, y, dydt, out, handle):
         if not on_grid(basin):
             continue
         kx, ky, flow_x, flow_y, depth, work = parts(tables, basin)
+        seen = seen_of(basin, tables.seen, y)
         for q in range(tables.scalars.size):
             n, ring, spreads = basin["n"], basin["outside"] + q * basin["outer"], tables.scalars[q]["diffusivity"]
             at = basin["carried"] + q * n
             if spreads > 0.0:
                 quick = grid_diffusion(
                     kx.size, ky.size, kx, ky, spreads, turned(t, basin), flow_x, flow_y, depth,
-                    tables.work[ring : ring + basin["outer"]], y[at : at + n], work, dydt[at : at + n],
+                    tables.work[ring : ring + basin["outer"]], seen[at : at + n], work, dydt[at : at + n],
                 )  # fmt: skip
                 still = basin["unsplit"] * basin["fastest"] + tables.scalars[q]["decay"]
                 out[RATE] = max(out[RATE], still + quick)

@@ -2,46 +2,36 @@
 
 Of columns as point masses on the bed, weight at mid depth: T = M V^2 / 2 + V . (W x S + Q) + W . I W / 2 + W_z H + sum
 of rho q^2 / (2 h), U = M g z - d . (S, lever), d gravity in axes of the basin, V velocity of its origin; M, S, I the
-moments of mass, Q and H momentum and its moment relative to the basin. A body brings -(F . V + T . W) with the load
-that it feels; see `frames`. What is known of the origin's acceleration along the normal, a, weighs on the water and not
-on columns that rise: a d/dt (sum of dm h / 2) is taken from it by the law, and may be given back.
+moments of mass, Q and H momentum and its moment relative to the basin. A liquid has no lever, and what it stores in its
+own axes is that of `liquid.energy`. A body brings -(F . V + T . W) with the load that it feels; see `frames_load`. What
+is known of the origin's acceleration along the normal, a, weighs on the water and not on columns that rise: a d/dt (sum
+of dm h / 2) is taken from it by the law, and may be given back.
 """
 
 from fvsolve.basins.energy import row_of as energy_row
-from fvsolve.basins.frames import AT, DOWN, GN, WX, WY, WZ, ground, place_of
+from fvsolve.basins.frames import DOWN, GN, WX, WY, WZ, ground, place_of
+from fvsolve.basins.frames_load import arm_of, mass_per, yielded
+from fvsolve.basins.free_surface.energy import per_flow
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.room import (
     ACCELERATION,
-    ATTITUDE,
-    BIAS,
     PLACE,
     SPIN,
-    SPIN_BIAS,
     TURNING,
     VELOCITY,
     cross,
     dot,
     row_of,
-    turned,
 )
 from fvsolve.kernels.mechanism.tanks import EAST, LOAD, MOMENTS, TANK_OUT
-
-THIN = 1e-6  # depth below which velocities fade [m]
-
-
-@njit(forceinline=True)
-def share_of(depth):
-    """Velocity over flow of water so deep [1/m]."""
-    wet = max(depth, THIN)
-    return 2.0 * depth / (depth * depth + wet * wet)
 
 
 @njit
 def origin_moves(tables, basin, b, out):
     """Velocity of a basin's origin, in its own axes."""
     row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
-    x, y, z = turned(out, row + ATTITUDE, tables.plane[basin["frame"] + AT : basin["frame"] + AT + 3], 0)
+    x, y, z = arm_of(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
     u, v, w = u + out[row + VELOCITY], v + out[row + VELOCITY + 1], w + out[row + VELOCITY + 2]
     e = tank + EAST
@@ -52,7 +42,7 @@ def origin_moves(tables, basin, b, out):
 def origin_gathers(tables, basin, b, out):
     """Accelerations of a basin's origin and of its turning, solved ones, in its own axes."""
     row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
-    x, y, z = turned(out, row + ATTITUDE, tables.plane[basin["frame"] + AT : basin["frame"] + AT + 3], 0)
+    x, y, z = arm_of(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
     cx, cy, cz = cross(out, row + SPIN, u, v, w)
     tx, ty, tz = cross(out, row + TURNING, x, y, z)
@@ -69,15 +59,8 @@ def origin_gathers(tables, basin, b, out):
 @njit
 def felt(tables, basin, b, out):
     """Force and torque on the body as it moves: those with joints held, and what gives way along the normal."""
-    row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
-    x, y, z = turned(out, row + ATTITUDE, tables.plane[basin["frame"] + AT : basin["frame"] + AT + 3], 0)
-    wx, wy, wz = (
-        out[row + TURNING] - out[row + SPIN_BIAS], out[row + TURNING + 1] - out[row + SPIN_BIAS + 1],
-        out[row + TURNING + 2] - out[row + SPIN_BIAS + 2],
-    )  # fmt: skip
-    ax = out[row + ACCELERATION] - out[row + BIAS] + wy * z - wz * y
-    ay = out[row + ACCELERATION + 1] - out[row + BIAS + 1] + wz * x - wx * z
-    az = out[row + ACCELERATION + 2] - out[row + BIAS + 2] + wx * y - wy * x
+    ax, ay, az, wx, wy, wz = yielded(tables, basin, out)
+    tank = tables.layout[0]["tank"] + TANK_OUT * b
     e, m = tank + EAST, tank + MOMENTS
     a, c, d = dot(out, e + 6, ax, ay, az), -dot(out, e + 3, wx, wy, wz), dot(out, e, wx, wy, wz)
     push = out[m] * a + out[m + 1] * c + out[m + 2] * d
@@ -101,7 +84,8 @@ def add_power(t, y, dydt, out, handle, power):
         wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
         fx, fy, fz, tx, ty, tz = felt(tables, basin, b, out)
         power[row] -= fx * vx + fy * vy + fz * vz + tx * wx + ty * wy + tz * wz
-        power[row + 3] = gained(tables, basin, b, y, dydt, out, vx, vy, vz)
+        own = 0.0 if basin["deep"] == 1 else power[row + 3]
+        power[row + 3] = own + gained(tables, basin, b, y, dydt, out, vx, vy, vz)
         power[row + 4] = (plane[at + GN] + plane[at + DOWN + 2]) * rising(tables, basin, y, dydt)
 
 
@@ -109,7 +93,7 @@ def add_power(t, y, dydt, out, handle, power):
 def rising(tables, basin, y, dydt):
     """d/dt of the sum of dm h / 2 [kg m/s]."""
     plane, total, n, o = tables.plane, 0.0, basin["n"], basin["y"]
-    for i in range(n):
+    for i in range(n if basin["deep"] == 1 else 0):
         total += plane[basin["area"] + i] * max(plane[basin["plan"] + i] + y[o + i], 0.0) * dydt[o + i]
     return tables.settings[0]["rho"] * total
 
@@ -117,22 +101,24 @@ def rising(tables, basin, y, dydt):
 @njit
 def gained(tables, basin, b, y, dydt, out, vx, vy, vz):
     """d/dt (T + U) [W]."""
-    plane, n, o, at, rho = tables.plane, basin["n"], basin["y"], basin["frame"], tables.settings[0]["rho"]
+    plane, n, o, at, per_area = tables.plane, basin["n"], basin["y"], basin["frame"], mass_per(tables, basin)
     m, wx, wy, wz = tables.layout[0]["tank"] + TANK_OUT * b, plane[at + WX], plane[at + WY], plane[at + WZ]
     ax, ay, az, bx, by, bz = origin_gathers(tables, basin, b, out)
     qx = qy = turn = fx = fy = spin = inner = lever = high = 0.0
     dx = dy = dxx = dxy = dyy = 0.0
     for i in range(n):
         x, z = place_of(plane, basin, i)
-        per, depth = rho * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
+        per, depth = per_area * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
         p, q, more = y[o + n + i], y[o + 2 * n + i], per * dydt[o + i]
-        dp, dq, share, bed = dydt[o + n + i], dydt[o + 2 * n + i], share_of(depth), ground(plane, basin, i)
-        u, v = share * p, share * q
-        inner += per * (u * dp + v * dq) - 0.5 * more * (u * u + v * v)
+        dp, dq = dydt[o + n + i], dydt[o + 2 * n + i]
         qx, qy, turn = qx + per * p, qy + per * q, turn + per * (x * q - z * p)
         fx, fy, spin = fx + per * dp, fy + per * dq, spin + per * (x * dq - z * dp)
         dx, dy, dxx, dxy, dyy = dx + more * x, dy + more * z, dxx + more * x * x, dxy + more * x * z, dyy + more * z * z
-        lever, high = lever + per * depth * (bed + 0.5 * depth), high + more * (bed + depth)
+        if basin["deep"] == 1:
+            share, bed = per_flow(depth), ground(plane, basin, i)
+            u, v = share * p, share * q
+            inner += per * (u * dp + v * dq) - 0.5 * more * (u * u + v * v)
+            lever, high = lever + per * depth * (bed + 0.5 * depth), high + more * (bed + depth)
     mass, sx, sy, xx, xy, yy = out[m], out[m + 1], out[m + 2], out[m + 3], out[m + 4], out[m + 5]
     ax, ay, az = ax - (wy * vz - wz * vy), ay - (wz * vx - wx * vz), az - (wx * vy - wy * vx)  # of its parts
     px, py, pz = mass * vx + qx - wz * sy, mass * vy + qy + wz * sx, mass * vz + wx * sy - wy * sx
@@ -150,31 +136,32 @@ def gained(tables, basin, b, y, dydt, out, vx, vy, vz):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """T + U [J], in place of what a basin that stands still would hold."""
+    """T + U [J], in place of what water that stands still would hold; a liquid's own beside it."""
     tables = open_tables(handle)
-    plane, rho = tables.plane, tables.settings[0]["rho"]
+    plane = tables.plane
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["frame"] < 0:
             continue
         n, o, at, m = basin["n"], basin["y"], basin["frame"], tables.layout[0]["tank"] + TANK_OUT * b
+        per_area = mass_per(tables, basin)
         vx, vy, vz = origin_moves(tables, basin, b, out)
         wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
         qx = qy = turn = inner = lever = 0.0
         for i in range(n):
             x, z = place_of(plane, basin, i)
-            per, depth = rho * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
+            per, depth = per_area * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
             p, q = y[o + n + i], y[o + 2 * n + i]
-            inner += 0.5 * per * share_of(depth) * (p * p + q * q)
             qx, qy, turn = qx + per * p, qy + per * q, turn + per * (x * q - z * p)
-            lever += per * depth * (ground(plane, basin, i) + 0.5 * depth)
+            if basin["deep"] == 1:
+                inner += 0.5 * per * per_flow(depth) * (p * p + q * q)
+                lever += per * depth * (ground(plane, basin, i) + 0.5 * depth)
         mass, sx, sy, xx, xy, yy = out[m], out[m + 1], out[m + 2], out[m + 3], out[m + 4], out[m + 5]
         total = 0.5 * mass * (vx * vx + vy * vy + vz * vz)
         total += vx * (qx - wz * sy) + vy * (qy + wz * sx) + vz * (wx * sy - wy * sx)
         total += 0.5 * (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy + (xx + yy) * wz * wz) + wz * turn + inner
         row = row_of(tables, basin["body"])
-        x, z, high = turned(out, row + ATTITUDE, plane[at + AT : at + AT + 3], 0)
-        total += mass * tables.settings[0]["gravity"] * (out[row + PLACE + 2] + high)
-        stored[stored.size - tables.basins.size + b] = total - (
-            plane[at + DOWN] * sx + plane[at + DOWN + 1] * sy + plane[at + DOWN + 2] * lever
-        )
+        total += mass * tables.settings[0]["gravity"] * (out[row + PLACE + 2] + arm_of(tables, basin, out)[2])
+        total -= plane[at + DOWN] * sx + plane[at + DOWN + 1] * sy + plane[at + DOWN + 2] * lever
+        k = stored.size - tables.basins.size + b
+        stored[k] = total + (0.0 if basin["deep"] == 1 else stored[k])

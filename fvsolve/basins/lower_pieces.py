@@ -15,6 +15,10 @@ WALLS = Pieces(
     observe="walls: observe_walls", power="walls: wall_power",
 )  # fmt: skip
 SIDES = Pieces(home=HOME, see="moving_meshes: see_meshes", prepare="moving_meshes: drive_sides")
+FRAMES = Pieces(
+    home=HOME, prepare="frames: set_frames", enter="frames_flow: turn_fluid", follow="frames_flow: follow_bodies",
+    power="frames_energy: add_power", stored="frames_energy: add_stored",
+)  # fmt: skip
 VALUES = Pieces(home=HOME, leave="carried: patch_values", observe="carried: observe_values")
 GRIDS = Pieces(home=HOME, carry="carried_grids: carry_on_grids")
 FIFTH = Pieces(home=HOME, carry="carried_grids: add_on_grids")

@@ -61,14 +61,14 @@ def lower_lines(draft, basin, row) -> None:
         lower_corners(draft, basin, row, axis)
         return
     drawn = 1.0 / np.diff((mesh.grid.x, mesh.grid.y)[axis])
-    row["stretch"] = draft.to_plane(np.concatenate([np.ones(basin.n + drawn.size), drawn]))
+    row["stretch"] = draft.to_plane(np.concatenate([np.ones(2 * drawn.size), drawn, np.ones(2 * mesh.grid.nx)]))
     row["lines"] = draft.to_plane(np.zeros(drawn.size + 1 + BESIDE))
 
 
 def lower_corners(draft, basin, row, axis: int) -> None:
     """The same of corners of a mesh of any cells."""
     mesh, (x, y) = basin.mesh, basin.mesh.points.T
-    row["corners"], row["stretch"] = x.size, draft.to_plane(np.ones(basin.n))
+    row["corners"], row["stretch"] = x.size, draft.to_plane(np.ones(2 * basin.n))
     row["lines"] = draft.to_plane(np.zeros(x.size))
     room = np.zeros(moving_meshes.ROOM)
     row["places"] = draft.to_plane(np.concatenate([x, y, mesh.points[:, axis], *mesh.centre.T, room]))

@@ -242,7 +242,7 @@ def size_patch(tables, basin, patch):
     for m in range(patch["faces"]):
         own = plane[at + integers[patch["ring"] + m]]
         i = integers[patch["ring"] + patch["faces"] + m]
-        plane[patch["normals"] + 2 * patch["faces"] + m] = own / plane[basin["area"] + i]
+        plane[patch["normals"] + 2 * patch["faces"] + m] = own / plane[basin["drawn"] + i]
         length += own
     plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
 
@@ -276,7 +276,8 @@ def put_speeds(tables, basin):
 
 @njit(forceinline=True)
 def moves_of(tables, basin):
-    """Speeds of sides, and room for what they find: thrust on faces of the boundary, and what else a law books."""
-    sides, thrust = basin["sides"], basin["thrust"]
+    """Speeds of sides, room for what they find: thrust on faces of the boundary, what else a law books; and wide."""
+    sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     many = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
-    return tables.plane[sides : sides + many], tables.work[thrust : thrust + 2 * basin["outer"]]
+    plane, found = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]
+    return plane[sides : sides + many], found, plane[rows : rows + basin["n"]]

@@ -10,13 +10,14 @@ lines and areas as they are. Corners of other meshes are what lines are to grids
 from math import sqrt
 
 from fvsolve.basins.energy import row_of
+from fvsolve.basins.stretch import fill, multiply, row_across, see_densities, see_depths, stretched, widen
 from fvsolve.jit import njit
 from fvsolve.kernels.accounts import OF_WALL, wall_rows
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import motion
 from fvsolve.kernels.mechanism.room import FORCE
 from fvsolve.kernels.mechanism.room import row_of as row_of_body
-from fvsolve.kernels.records import NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
+from fvsolve.kernels.records import NO_DRAG, NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.schedules import schedule_slopes
 
 FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.MovingWall`
@@ -33,26 +34,33 @@ def across(basin):
     return many, many + 1
 
 
-@njit(forceinline=True)
-def row_across(basin, i):
-    """In which of the rows that stretch cell i lies."""
-    if basin["nx"] == 0:
-        return i
-    return i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
-
-
 @njit
 def see(t, y, seen, out, handle):
-    """Lines and areas of basins as they are at y, and in `seen` the state as all others see it."""
+    """Lines and areas of basins as they are at y, and in `seen` of the tables the state as all others see it.
+
+    Where no `seen` is given kernels come next that take contents themselves: of these cells then those that patches and
+    walls look at, unless more do.
+    """
     tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["walls"] > 0:
             stretch_cells(tables, basin, y)
-            copy(y[done : basin["y"]], seen[done:])
-            see_cells(tables, basin, y, seen)
+            copy(y[done : basin["y"]], tables.seen[done:])
+            if seen.size == 0 and takes_contents(basin) and basin["carried"] < 0 and basin["friction"] == NO_DRAG:
+                see_near(tables, b, y)
+            else:
+                see_rows(tables, basin, y)
+            if basin["nx"] > 0:
+                stretch_patches(tables, b)
             done = basin["y"] + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
-    copy(y[done:], seen[done:])
+    copy(y[done:], tables.seen[done:])
+
+
+@njit(forceinline=True)
+def takes_contents(basin):
+    """Whether the kernel of its rates does: that of water on grids, row by row."""
+    return basin["deep"] == 1 and basin["nx"] > 0
 
 
 @njit
@@ -62,55 +70,82 @@ def copy(source, target):
         target[i] = source[i]
 
 
-@njit(forceinline=True)
-def rows_of(basin):
-    """Where in `plane` it stands by how much rows are stretched; of grids behind that of cells."""
-    return basin["stretch"] + (basin["n"] if basin["nx"] > 0 else 0)
-
-
-@njit
-def spread(rows, turn, nx, wide):
-    """By how much cells are stretched, of a grid from columns or rows."""
-    for j in range(wide.size // nx):
-        for i in range(nx):
-            wide[j * nx + i] = rows[j if turn == 1 else i]
-
-
-@njit
-def multiply(values, factors, products):
-    """products = values * factors; either may be the same array as another."""
-    for i in range(products.size):
-        products[i] = values[i] * factors[i]
-
-
 @njit
 def stretch_cells(tables, basin, y):
-    """By how much cells are stretched, and areas, with walls where they are; of grids widths and patches too."""
-    plane, walls, at, n = tables.plane, tables.walls, rows_of(basin), basin["n"]
+    """By how much columns, rows or cells are stretched with walls where they are, and 1 over that."""
+    plane, walls, at = tables.plane, tables.walls, basin["stretch"]
     many, lines = across(basin)
-    rows, wide = plane[at : at + many], plane[basin["stretch"] : basin["stretch"] + n]
-    for i in range(many):
-        rows[i] = 1.0
+    wide, narrow = plane[at : at + many], plane[at + many : at + 2 * many]
+    fill(1.0, wide)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         weights, travel = plane[walls[k]["weights"] + lines :], y[walls[k]["y"]]
         for i in range(many):
-            rows[i] += weights[i] * travel
-    if basin["nx"] > 0:
-        spread(rows, basin["turn"], basin["nx"], wide)
-    multiply(plane[basin["drawn"] :], wide, plane[basin["area"] : basin["area"] + n])
-    if basin["nx"] == 0:
-        return
-    spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
+            wide[i] += weights[i] * travel
     for i in range(many):
-        plane[spacing + i] = plane[at + many + i] / plane[at + i]  # 1 / widths as drawn
+        narrow[i] = 1.0 / wide[i]
+    if basin["nx"] > 0:
+        spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
+        multiply(plane[at + 2 * many :], narrow, plane[spacing : spacing + many])  # 1 / widths as drawn
+
+
+@njit
+def factors_of(tables, basin, j):
+    """(wide, narrow) of the cells of row j of a grid, or of all of a mesh."""
+    plane, nx, at, (many, _) = tables.plane, basin["nx"], basin["stretch"], across(basin)
+    if nx == 0 or basin["turn"] == 0:
+        return plane[at : at + many], plane[at + many : at + 2 * many]
+    row = at + 3 * many
+    fill(plane[at + j], plane[row : row + nx])
+    fill(plane[at + many + j], plane[row + nx : row + 2 * nx])
+    return plane[row : row + nx], plane[row + nx : row + 2 * nx]
+
+
+@njit
+def see_rows(tables, basin, y):
+    """Areas, and U - U0 of all cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
+    rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
+    many = tables.scalars.size if basin["carried"] >= 0 else 0
+    for j in range(rows):
+        a, z, (wide, narrow) = j * size, (j + 1) * size, factors_of(tables, basin, j)
+        multiply(plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z])
+        if basin["deep"] == 1:
+            see_depths(plane[basin["plan"] + a :], wide, narrow, y[first + a :], seen[first + a : first + z])
+        else:
+            see_densities(basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z])
+        for q in range(1, 3 + many):
+            at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
+            multiply(y[at + a :], narrow, seen[at + a : at + z])
+
+
+@njit
+def see_near(tables, b, y):
+    """The same of the cells of water behind patches, walls among them."""
+    plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
+    n, first = basin["n"], basin["y"]
+    for p in range(patches.size):
+        for m in range(patches[p]["count"] if patches[p]["basin"] == b else 0):
+            i = tables.integers[patches[p]["first"] + m]
+            wide = stretched(plane, basin, i)
+            plane[basin["area"] + i] = plane[basin["drawn"] + i] * wide
+            seen[first + i] = (y[first + i] - plane[basin["plan"] + i] * (wide - 1.0)) / wide
+            seen[first + n + i], seen[first + 2 * n + i] = y[first + n + i] / wide, y[first + 2 * n + i] / wide
+
+
+@njit
+def stretch_patches(tables, b):
+    """Sizes of the patches of a grid."""
     for p in range(tables.patches.size):
-        if tables.basins[tables.patches[p]["basin"]]["y"] == basin["y"]:
-            stretch_patch(tables, basin, tables.patches[p])
+        if tables.patches[p]["basin"] == b:
+            stretch_patch(tables, tables.basins[b], tables.patches[p])
 
 
 @njit
 def stretch_patch(tables, basin, patch):
-    """Sizes of a patch that rides on a side along which lines move, or stands before cells that stretch."""
+    """Sizes of a patch that rides on a side along which lines move, or stands before cells that stretch.
+
+    Rates of what cells contain go with lengths over areas as drawn.
+    """
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     for m in range(patch["count"]):
         area += plane[basin["area"] + integers[patch["first"] + m]]
@@ -118,52 +153,10 @@ def stretch_patch(tables, basin, patch):
     for m in range(many):
         i = integers[patch["ring"] + many + m]
         rides = abs(plane[at + (1 if basin["turn"] == 1 else 0) * many + m]) < 0.5
-        per_area = plane[at + 3 * many + m] * (1.0 if rides else 1.0 / stretched(plane, basin, i))
+        per_area = plane[at + 3 * many + m] * (stretched(plane, basin, i) if rides else 1.0)
         plane[at + 2 * many + m] = per_area
-        length += per_area * plane[basin["area"] + i]
+        length += per_area * plane[basin["drawn"] + i]
     plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
-
-
-@njit(forceinline=True)
-def stretched(plane, basin, i):
-    """Area of cell i over that as drawn."""
-    return plane[basin["stretch"] + i]
-
-
-@njit
-def see_cells(tables, basin, y, seen):
-    """U - U0 of all cells, from what they contain: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
-    plane, n, first = tables.plane, basin["n"], basin["y"]
-    wide = plane[basin["stretch"] : basin["stretch"] + n]
-    if basin["deep"] == 1:
-        see_depths(plane[basin["plan"] :], wide, y[first:], seen[first:])
-    else:
-        see_densities(basin["density"], wide, y[first:], seen[first:])
-    many = tables.scalars.size if basin["carried"] >= 0 else 0
-    for q in range(1, 3 + many):
-        at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
-        divide(y[at:], wide, seen[at : at + n])
-
-
-@njit
-def see_depths(rest, wide, content, seen):
-    """Deviations of depths from those at rest."""
-    for i in range(wide.size):
-        seen[i] = (content[i] - rest[i] * (wide[i] - 1.0)) / wide[i]
-
-
-@njit
-def see_densities(rest, wide, content, seen):
-    """Deviations of densities from that at rest."""
-    for i in range(wide.size):
-        seen[i] = (content[i] - rest * (wide[i] - 1.0)) / wide[i]
-
-
-@njit
-def divide(content, wide, seen):
-    """seen = content / wide."""
-    for i in range(seen.size):
-        seen[i] = content[i] / wide[i]
 
 
 @njit
@@ -199,7 +192,7 @@ def drive_lines(t, y, dydt, out, handle):
                 dydt[walls[k]["y"]] = speed
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
         for i in range(many):
-            if not plane[rows_of(basin) + i] > ROOM:
+            if not plane[basin["stretch"] + i] > ROOM:
                 out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
         for i in range(many if basin["nx"] > 0 else 0):
             most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
@@ -219,13 +212,14 @@ def nearest(tables, basin, i):
 
 @njit(forceinline=True)
 def moves_of(tables, basin):
-    """Speeds of lines along x and along y, and room for what they find on the boundary, as grids want them."""
-    plane, at, (_, lines) = tables.plane, basin["lines"], across(basin)
+    """Speeds of lines along x and along y, room for what they find on the boundary; wide and narrow."""
+    plane, at, rows, (many, lines) = tables.plane, basin["lines"], basin["stretch"], across(basin)
     speeds, none = plane[at : at + lines + BESIDE], plane[:0]
     thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * basin["outer"]]
+    wide, narrow = plane[rows : rows + many], plane[rows + many : rows + 2 * many]
     if basin["turn"] == 1:
-        return none, speeds, thrust
-    return speeds, none, thrust
+        return none, speeds, thrust, wide, narrow
+    return speeds, none, thrust, wide, narrow
 
 
 @njit
@@ -259,13 +253,14 @@ def push_bodies(t, y, dydt, out, handle):
     """Forces on walls, outward, less those of the profile; bodies feel them, as steps do."""
     tables = open_tables(handle)
     layout, walls, masses, st = tables.layout[0], tables.walls, tables.masses, tables.settings[0]
+    seen = tables.seen
     for k in range(walls.size):
         wall, total, waves = walls[k], 0.0, 0.0
         basin = tables.basins[wall["basin"]]
         for m in range(wall["count"]):
             face, length = tables.integers[wall["faces"] + m], tables.plane[wall["lengths"] + m]
             total += length * tables.work[basin["thrust"] + face]
-            waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], y)
+            waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], seen)
         total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
         out[layout["wall"] + k] = total
         if wall["body"] >= 0:
@@ -284,17 +279,18 @@ def push_bodies(t, y, dydt, out, handle):
 
 @njit
 def swell(t, y, dydt, out, handle):
-    """Rates of what cells contain, from those of what they hold per area."""
+    """Rates of what cells contain of scalars, from those of what they hold per area; others are made so as found."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
-        if basin["walls"] == 0:
+        if basin["walls"] == 0 or basin["carried"] < 0:
             continue
-        n, many = basin["n"], tables.scalars.size if basin["carried"] >= 0 else 0
-        wide = tables.plane[basin["stretch"] :]
-        for q in range(3 + many):
-            at = basin["y"] + q * n if q < 3 else basin["carried"] + (q - 3) * n
-            multiply(dydt[at:], wide, dydt[at : at + n])
+        n, (rows, size) = basin["n"], (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, basin["n"])
+        for j in range(rows):
+            wide = factors_of(tables, basin, j)[0]
+            for q in range(tables.scalars.size):
+                at = basin["carried"] + q * n + j * size
+                widen(wide, dydt[at : at + size])
 
 
 @njit

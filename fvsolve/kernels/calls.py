@@ -17,7 +17,7 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import table_types
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
-# SEE makes of a state what the pieces of all others see of it, where that is something else (`basins.walls`).
+# SEE makes of a state what the pieces of all but RHS see of it, where that is something else (`basins.walls`).
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, SEE, JOBS = range(9)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
 ARGUMENTS = dict.fromkeys((RHS, CLOSE, SEE), RATES)
@@ -193,11 +193,14 @@ else:
 
 
 @njit(forceinline=True)
-def see(t, y, out, handle):
-    """Let `seen` be what the pieces see of a state, in scenes where that is something else."""
+def see(t, y, seen, out, handle):
+    """Let `seen` be what the pieces see of a state, in scenes where that is something else.
+
+    seen : that of the tables, or none of it where rates come next, whose kernels need less
+    """
     tables, k = open_tables(handle), 0
     while tables.calls[SEE, k] != 0:
-        call_rates(tables.calls[SEE, k], t, y, tables.seen, out, handle)
+        call_rates(tables.calls[SEE, k], t, y, seen, out, handle)
         k += 1
 
 
@@ -212,17 +215,16 @@ def run(job, t, y, dydt, out, handle):
 
 @njit
 def rhs_in_turn(t, y, dydt, out, handle):
-    """Every piece of the right-hand side."""
-    tables = open_tables(handle)
-    see(t, y, out, handle)
-    run(RHS, t, tables.seen if tables.seen.size > 0 else y, dydt, out, handle)
+    """Every piece of the right-hand side; they see states as these are, see `basins.stretch`."""
+    see(t, y, y[:0], out, handle)
+    run(RHS, t, y, dydt, out, handle)
 
 
 @njit
 def observe_in_turn(t, y, out, handle, values):
     """Every piece that reads probes."""
     tables, k = open_tables(handle), 0
-    see(t, y, out, handle)
+    see(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[OBSERVE, k] != 0:
         call_reader(calls[OBSERVE, k], t, seen, out, handle, values)
@@ -251,7 +253,7 @@ def events_in_turn(t, y, handle, g):
     """Every piece of the event functions."""
     tables, k = open_tables(handle), 0
     calls, out = tables.calls, tables.spare
-    see(t, y, out, handle)
+    see(t, y, tables.seen, out, handle)
     seen = tables.seen if tables.seen.size > 0 else y
     while calls[EVENTS, k] != 0:
         call_reader(calls[EVENTS, k], t, seen, out, handle, g)
@@ -262,7 +264,7 @@ def events_in_turn(t, y, handle, g):
 def power_in_turn(t, y, dydt, out, handle, power):
     """Every piece that fills `power`."""
     tables, k = open_tables(handle), 0
-    see(t, y, out, handle)
+    see(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[POWER, k] != 0:
         call_energies(calls[POWER, k], t, seen, dydt, out, handle, power)
@@ -273,7 +275,7 @@ def power_in_turn(t, y, dydt, out, handle, power):
 def stored_in_turn(t, y, dydt, out, handle, stored):
     """Every piece that fills `stored`."""
     tables, k = open_tables(handle), 0
-    see(t, y, out, handle)
+    see(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[STORED, k] != 0:
         call_energies(calls[STORED, k], t, seen, dydt, out, handle, stored)

@@ -39,14 +39,14 @@ class Pieces:
     leave: str = ""  # values of scalars with which water leaves pipes and cells
     mix: str = ""  # and their values at nodes
     carry: str = ""  # rates of what is carried in cells
-    swell: str = ""  # of all rates of cells that stretch, those of what they contain
+    swell: str = ""  # of rates of scalars in cells that stretch, those of what they contain
     # and beside the right-hand side
     observe: str = ""  # reads probes
     record: str = ""  # notes an accepted state
     events: str = ""  # event functions
     power: str = ""
     stored: str = ""
-    see: str = ""  # makes of states what all others see of them, in place of dydt
+    see: str = ""  # makes of states what all these see of them, in place of dydt
     home: str = HOME
 
 

@@ -91,7 +91,7 @@ def patch_loss(tables, patch, flow, y):
     for m in range(patch["faces"]):
         i, at, many = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
         depth = max(depths[i] + y[o + i], 0.0)
-        share, wide = per_flow(depth), plane[at + 2 * many + m] * area[i]
+        share, wide = per_flow(depth), plane[at + 2 * many + m] * plane[basin["drawn"] + i]
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
         away = -each * weight(plane, basin, leaves, i, y) * area_of(tables, patch) / length_of(tables, patch)
         along = u * plane[at + m] + v * plane[at + many + m]

@@ -27,6 +27,7 @@ from fvsolve.basins.faces import (
     put_inward,
     put_sides,
 )
+from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
 from fvsolve.kernels.records import UPWIND
 
@@ -176,7 +177,7 @@ def shallow_rates(
     flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
     through : float64[b]  volumes inward through the boundary [m3/s], or empty
     moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: thrust on faces
-    of the boundary less that at rest, over density [m2/s2], float64[b]
+    of the boundary less that at rest, over density [m2/s2], float64[b]; and `wide`, see `basins.stretch`
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -243,6 +244,8 @@ def shallow_rates(
                 put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
         quickest(w, top)
         put_rates(w, rate_h[first:last], rate_x[first:last], rate_y[first:last])
+        if moves is not None:
+            swell(moves[2][first:last], rate_h[first:last], rate_x[first:last], rate_y[first:last])
     most = 0.0
     for i in range(BLOCK):
         most = max(most, top[i])

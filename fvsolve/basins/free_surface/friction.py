@@ -15,12 +15,12 @@ FASTEST = 20.0  # [1/s]
 
 
 @njit
-def add_friction(law, g, coefficient, fastest, depth0, dh, qx, qy, rate_x, rate_y):
+def add_friction(law, g, coefficient, fastest, depth0, dh, qx, qy, held_x, held_y, rate_x, rate_y):
     """Add -r q to the rates of unit flows; returns the greatest rate 2 r [1/s] that the flow's error fades at.
 
     law, coefficient : MANNING n [s/m^(1/3)] or DARCY f [-], float64[n] or float64[1] for all
     fastest : bound of r [1/s], in scenes FASTEST; depth0, dh : depth of the profile and less that [m]
-    qx, qy : unit flows [m2/s]
+    qx, qy : unit flows [m2/s]; held_x, held_y : what the rates are those of, these or what cells contain of them
     """
     most, one = 0.0, coefficient.size == 1
     for i in range(dh.size):
@@ -34,6 +34,6 @@ def add_friction(law, g, coefficient, fastest, depth0, dh, qx, qy, rate_x, rate_
             rate = 0.125 * value * speed / wet
         rate *= fastest / (fastest + rate + TINY)
         most = max(most, rate)
-        rate_x[i] -= rate * qx[i]
-        rate_y[i] -= rate * qy[i]
+        rate_x[i] -= rate * held_x[i]
+        rate_y[i] -= rate * held_y[i]
     return 2.0 * most

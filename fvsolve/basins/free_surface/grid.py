@@ -38,6 +38,7 @@ from fvsolve.basins.free_surface.rows import (
 )
 from fvsolve.basins.free_surface.smooth import put_smooth
 from fvsolve.basins.patches import put_inward
+from fvsolve.basins.stretch import fill
 from fvsolve.jit import njit
 from fvsolve.kernels.records import LINEAR, WENO5
 
@@ -47,7 +48,7 @@ PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # rows of cells at hand
 BLOCK, SIDE, FLUX = FIELDS * STRIDE, SIDES * STRIDE, FLUXES * STRIDE
 WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # floats that `grid_rates` works in
-MOVING = WORK + STRIDE
+MOVING = WORK + 3 * STRIDE
 
 
 @njit
@@ -64,18 +65,35 @@ def place(j, i):
 
 
 @njit
-def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves):
+def factors_of(j, left, right, moves, room):
+    """(wide, narrow) of columns of row j, see `basins.stretch`."""
+    wide, narrow = moves[3], moves[4]
+    if moves[0].size > 0:
+        return wide[left:right], narrow[left:right]
+    one, other = room[: right - left], room[STRIDE : STRIDE + right - left]
+    fill(wide[j], one)
+    fill(narrow[j], other)
+    return one, other
+
+
+@njit
+def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves):
     """Columns `first` to `last` of row j of cells and their ghosts; also one beyond the grid, from those before it."""
+    ring = work[: RING * BLOCK]
     fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
     cells, walls = ring[place(j, left - first) :], reflect.size > 0
     if 0 <= j < ny:
         a, b = j * nx + left, j * nx + right
-        put_cells(
-            g, plan[0, a:b], plan[1, a:b], dh[a:b], qx[a:b], qy[a:b], kx[left:right], ky[j],
-            cells, top[GHOSTS + left - first :],
-        )  # fmt: skip
-        if fifth:
-            put_flows(qx[a:b], qy[a:b], cells)
+        h, x, y, highest = dh[a:b], qx[a:b], qy[a:b], top[GHOSTS + left - first :]
+        if moves is None:
+            put_cells(g, plan[0, a:b], plan[1, a:b], h, x, y, kx[left:right], ky[j], None, cells, highest)
+            if fifth:
+                put_flows(x, y, None, cells)
+        else:
+            factors = factors_of(j, left, right, moves, work[WORK + STRIDE :])
+            put_cells(g, plan[0, a:b], plan[1, a:b], h, x, y, kx[left:right], ky[j], factors, cells, highest)
+            if fifth:
+                put_flows(x, y, factors, cells)
         block = ring[place(j, -GHOSTS) :]
         if left == 0:
             put_end(fields, 3 if fifth else 2, reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
@@ -117,13 +135,13 @@ def grid_rates(
     kx float64[nx], ky float64[ny] : 1 / widths of columns and rows [1/m]
     reflect : float64[2 (nx + ny)], 1 a wall and 0 open, west, east, south, north; or empty, walls all around
     plan : float64[PLANS, n], depth of the profile at rest and its surface less the level [m]
-    dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]
+    dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]; where lines move what cells contain of both
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
     through : float64[2 (nx + ny)]  flows inward through faces of the boundary [m3/s], in the order of reflect, or empty
     work : float64[WORK], fastest where it begins at a cache line; float64[MOVING] where lines move
     moves : None, or speeds of lines along x and along y [m/s], float64[nx + 9] and float64[ny + 9], empty where they
-    stand still, and what they find: thrust on faces of the boundary less that at rest, over density [m2/s2],
-    float64[2 (nx + ny)]
+    stand still, what they find: thrust on faces of the boundary less that at rest, over density [m2/s2],
+    float64[2 (nx + ny)]; and of columns or rows that stretch `wide` and `narrow`, see `basins.stretch`
     """
     most = 0.0
     for first in range(0, nx, MOST):
@@ -152,12 +170,12 @@ def column_rates(
     reach = 3 if fifth else 2
     ahead = min(reach, ny)
     for j in range(ahead):
-        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves)
+        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
     for j in range(-1, -1 - reach, -1):
-        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves)
+        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
     for j in range(-1, ny + 1):
         while ahead < j + reach:
-            put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, ring, top, moves)
+            put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
             ahead += 1
         # values of row j at its southern and northern faces
         now, was = j & 1, (j - 1) & 1
@@ -220,10 +238,14 @@ def column_rates(
         if through.size > 0 and last == nx:
             through[ny + j - 1] = -along[n] / ky[j - 1]
         a, z = (j - 1) * nx + first, (j - 1) * nx + last
-        put_rates(
-            g, kx[first:last], ky[j - 1], ends[PUSH + 1 :], sides[was * SIDE + PUSH :], along, south, north,
-            rate_h[a:z], rate_x[a:z], rate_y[a:z],
-        )  # fmt: skip
+        one, other = kx[first:last], ky[j - 1]
+        push_x, push_y = ends[PUSH + 1 :], sides[was * SIDE + PUSH :]
+        to_h, to_x, to_y = rate_h[a:z], rate_x[a:z], rate_y[a:z]
+        if moves is None:
+            put_rates(g, one, other, push_x, push_y, along, south, north, None, to_h, to_x, to_y)
+        else:
+            wide, _ = factors_of(j - 1, first, last, moves, work[WORK + STRIDE :])
+            put_rates(g, one, other, push_x, push_y, along, south, north, wide, to_h, to_x, to_y)
     most = 0.0
     for i in range(STRIDE):
         most = max(most, top[i])

@@ -11,17 +11,13 @@ from fvsolve.basins.free_surface.lower_dispersion import Watch, deep, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.lower_pieces import MARKED
+from fvsolve.basins.lower_pieces import FRAMES, MARKED
 from fvsolve.case.cells import means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces
 
 HOME = __package__
-FRAMES = Pieces(
-    home="fvsolve.basins", prepare="frames: set_frames", enter="frames: turn_water", follow="frames: follow_bodies",
-    power="frames_energy: add_power", stored="frames_energy: add_stored",
-)  # fmt: skip
 WATER = Pieces(
     home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_water",
     power="energy: add_power", stored="energy: add_stored",

@@ -16,6 +16,7 @@ from fvsolve.basins.behind import (
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import give_way
+from fvsolve.basins.stretch import seen_of, stretched
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import PATCH, RATE
@@ -60,8 +61,8 @@ def patch_pressures(t, y, dydt, out, handle):
         patch = tables.patches[k]
         if tables.basins[patch["basin"]]["kind"] != MINE:
             continue
-        node = tables.nodes[patch["node"]]
-        stored, depth, volume, squares = water_behind(tables, patch, y)
+        node, seen = tables.nodes[patch["node"]], seen_of(tables.basins[patch["basin"]], tables.seen, y)
+        stored, depth, volume, squares = water_behind(tables, patch, seen)
         area = area_of(tables, patch)
         slope, content = st["rho"] * st["gravity"], st["rho"] * area
         spread = area * squares / (volume * volume) if volume > HARDLY * area else 1.0
@@ -77,8 +78,10 @@ def patch_flows(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for k in range(tables.patches.size):
         patch = tables.patches[k]
-        if tables.basins[patch["basin"]]["kind"] == MINE:
-            pass_patch(tables, patch, out[tables.layout[0]["net"] + patch["node"]], y, dydt, out)
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] == MINE:
+            asked, seen = out[tables.layout[0]["net"] + patch["node"]], seen_of(basin, tables.seen, y)
+            pass_patch(tables, patch, asked, seen, dydt, out)
 
 
 @njit
@@ -97,7 +100,8 @@ def pass_patch(tables, patch, asked, y, dydt, out):
         out[layout["supply"] + patch["node"]] += (had * volume / total - 1.0) * asked
     flow = had * asked / (rho * total)  # of depth, over weights [1/s]
     for m in range(patch["count"] if dydt.size > 0 else 0):
-        dydt[o + integers[first + m]] += flow * weight(plane, basin, leaves, integers[first + m], y)
+        i = integers[first + m]
+        dydt[o + i] += flow * weight(plane, basin, leaves, i, y) * stretched(plane, basin, i)
     per_width = -flow * area_of(tables, patch) / length_of(tables, patch)  # over weights [m/s]
     for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
         k = integers[patch["ring"] + patch["faces"] + m]

@@ -4,6 +4,7 @@ from fvsolve.basins.free_surface import faces, grid
 from fvsolve.basins.free_surface.friction import FASTEST, add_friction
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import book_open, wanted
+from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import NO_DRAG, RATE
@@ -33,13 +34,20 @@ def weight_of(st, plane, basin):
 
 
 @njit
-def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
+def finish_water(tables, b, rate, y, rates, out):
     """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
     st, basin = tables.settings[0], tables.basins[b]
     if basin["friction"] != NO_DRAG:
-        roughness = tables.basins["roughness"][b : b + 1]
+        n, o, seen, roughness = (
+            basin["n"],
+            basin["y"],
+            seen_of(basin, tables.seen, y),
+            tables.basins["roughness"][b : b + 1],
+        )
         fades = add_friction(
-            basin["friction"], st["gravity"], roughness, FASTEST, depth, dh, qx, qy, rate_x, rate_y
+            basin["friction"], st["gravity"], roughness, FASTEST, tables.plane[basin["plan"] :], seen[o : o + n],
+            seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
+            rates[n : 2 * n], rates[2 * n :],
         )  # fmt: skip
         out[RATE] = max(out[RATE], fades)
     book_open(tables, b, st["rho"], out)
@@ -48,7 +56,7 @@ def finish_water(tables, b, rate, depth, dh, qx, qy, rate_x, rate_y, out):
 
 @njit
 def on_grid(tables, b, y, dydt, out, moves):
-    """Rates of cells of a rectangle; moves : None, or as `grid.grid_rates` has it."""
+    """Rates of cells of a rectangle, of contents where it moves; moves : None, or as `grid.grid_rates` has it."""
     st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
     n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
     nx, ny, through, g = basin["nx"], basin["ny"], basin["through"], weight_of(st, plane, basin)
@@ -59,15 +67,15 @@ def on_grid(tables, b, y, dydt, out, moves):
     dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
-    rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
     rate = grid.grid_rates(
         g, basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
-        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y, moves,
+        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rates[n : 2 * n],
+        rates[2 * n :], moves,
     )  # fmt: skip
     if f >= 0:
         through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
-    finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+    finish_water(tables, b, rate, y, rates, out)
 
 
 @njit
@@ -82,24 +90,24 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def on_mesh(tables, b, y, dydt, out, moves):
-    """Rates of cells of any mesh; moves : None, or as `faces.shallow_rates` has it."""
+    """Rates of cells of any mesh, of contents where it moves; moves : None, or as `faces.shallow_rates` has it."""
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
     basin = tables.basins[b]
     n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
-    plan = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n))
-    dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
+    plan, seen = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), seen_of(basin, tables.seen, y)
+    dh, qx, qy = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
-    rate_x, rate_y = rates[n : 2 * n], rates[2 * n :]
     flow = work[:0]
     if f >= 0:  # scalars are carried by them
         flow = work[f : f + basin["faces"]]
     rate = faces.shallow_rates(
         weight_of(st, plane, basin), basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
-        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rate_x, rate_y, moves,
+        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rates[n : 2 * n],
+        rates[2 * n :], moves,
     )  # fmt: skip
-    finish_water(tables, b, rate, plan[0], dh, qx, qy, rate_x, rate_y, out)
+    finish_water(tables, b, rate, y, rates, out)
 
 
 @njit

@@ -24,27 +24,34 @@ FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
 
 
 @inner
-def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, cells, top):
+def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
     """Depth, surface, velocities and wave speed of a row; top[i] becomes the greatest rate of its column so far.
 
     Velocity is q / h, which fades as 2 h q / (h^2 + THIN^2) below THIN.
+    factors : None, or (wide, narrow) of cells whose contents dh, qx and qy are, see `basins.stretch`
     """
     for i in range(dh.size):
-        depth = max(depth0[i] + dh[i], 0.0)
+        rise = dh[i]
+        if factors is not None:
+            rise = (rise - depth0[i] * (factors[0][i] - 1.0)) * factors[1][i]
+        depth = max(depth0[i] + rise, 0.0)
         wet = max(depth, THIN)
         part = 2.0 * depth / (depth * depth + wet * wet)
+        if factors is not None:
+            part *= factors[1][i]
         u, v, c = qx[i] * part, qy[i] * part, sqrt(g * depth)
         rate = (abs(u) + c) * kx[i] + (abs(v) + c) * ky
-        cells[i], cells[i + SURFACE], cells[i + EAST] = depth, surface0[i] + dh[i], u
+        cells[i], cells[i + SURFACE], cells[i + EAST] = depth, surface0[i] + rise, u
         cells[i + NORTH], cells[i + WAVE] = v, c
         top[i] = rate if rate > top[i] else top[i]
 
 
 @njit
-def put_flows(qx, qy, cells):
-    """The unit flows of a row."""
+def put_flows(qx, qy, factors, cells):
+    """The unit flows of a row; factors : as in `put_cells`."""
     for i in range(qx.size):
-        cells[i + FLOW_EAST], cells[i + FLOW_NORTH] = qx[i], qy[i]
+        per = 1.0 if factors is None else factors[1][i]
+        cells[i + FLOW_EAST], cells[i + FLOW_NORTH] = qx[i] * per, qy[i] * per
 
 
 @njit
@@ -155,13 +162,19 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
 
 
 @inner
-def put_rates(g, kx, ky, push_x, push_y, x, south, north, dh, dx, dy):
-    """Rates of a row: what comes in less what goes out, and the push of surface and pressure."""
+def put_rates(g, kx, ky, push_x, push_y, x, south, north, wide, dh, dx, dy):
+    """Rates of a row: what comes in less what goes out, and the push of surface and pressure.
+
+    wide : None, or of cells that are stretched, for rates of what these contain; see `basins.stretch`
+    """
     for i in range(dh.size):
-        dh[i] = kx[i] * (x[i] - x[i + 1]) + ky * (south[i] - north[i])
-        dx[i] = kx[i] * ((x[i + AFTER] - x[i + (BEFORE + 1)]) - g * push_x[i]) + ky * (
+        along, across = kx[i], ky
+        if wide is not None:
+            along, across = along * wide[i], across * wide[i]
+        dh[i] = along * (x[i] - x[i + 1]) + across * (south[i] - north[i])
+        dx[i] = along * ((x[i + AFTER] - x[i + (BEFORE + 1)]) - g * push_x[i]) + across * (
             south[i + ALONG] - north[i + ALONG]
         )
-        dy[i] = ky * ((south[i + AFTER] - north[i + BEFORE]) - g * push_y[i]) + kx[i] * (
+        dy[i] = across * ((south[i + AFTER] - north[i + BEFORE]) - g * push_y[i]) + along * (
             x[i + ALONG] - x[i + (ALONG + 1)]
         )

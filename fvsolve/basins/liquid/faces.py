@@ -29,6 +29,7 @@ from fvsolve.basins.faces import (
 from fvsolve.basins.liquid.driven import driven
 from fvsolve.basins.liquid.grid_full import log_sum
 from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
@@ -209,7 +210,7 @@ def liquid_rates(
     work : float64[work_size(integers)]
     moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: on faces of the
     boundary pressure over that at rest [Pa], then what law linear loses beside them, speed (c^2 r^2 - m^2)
-    [kg^2/(m3 s3)], float64[2 b]
+    [kg^2/(m3 s3)], float64[2 b]; and `wide`, see `basins.stretch`
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -275,6 +276,8 @@ def liquid_rates(
             if through.size > 0:
                 put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
         put_rates(w, rate_r[first:last], rate_x[first:last], rate_y[first:last])
+        if moves is not None:
+            swell(moves[2][first:last], rate_r[first:last], rate_x[first:last], rate_y[first:last])
     most = 0.0
     for i in range(BLOCK):
         most = max(most, w[_TOP + i])

@@ -8,6 +8,7 @@ is read once: its own faces, then those towards the rows before it, whose waves 
 
 from fvsolve.basins.liquid import driven
 from fvsolve.basins.liquid.driven import BEYOND, drive_row, feel, mirror_driven, send_driven, sweep
+from fvsolve.basins.stretch import swell_row
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.ends import entering_cells, leaving_cells
 from fvsolve.kernels.limiters import by_limiter, slope
@@ -218,7 +219,8 @@ def grid_rates(
     through : float64[2 (nx + ny)]  what comes in through faces of the boundary [kg/(m s)], in that order, or empty
     work : float64[work_size(nx, ny)]
     moves : None, or speeds of lines along x and along y [m/s], float64[nx + 1] and float64[ny + 1], empty where they
-    stand still; what they find on faces of the boundary, as `faces.liquid_rates` has it; density at rest [kg/m3]
+    stand still; what they find on faces of the boundary, as `faces.liquid_rates` has it; density at rest [kg/m3]; and
+    of columns or rows that stretch `wide`, see `basins.stretch`
     """
     wide, f = nx + 2 * BEYOND, nx + 1
     up, down, work = work[: RING * nx], work[RING * nx : 2 * RING * nx], work[2 * RING * nx :]
@@ -322,4 +324,6 @@ def grid_rates(
                 )  # fmt: skip
         elif j > 0:
             settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])
+        if moves is not None and j > 0:
+            swell_row(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
     return c * steepest(kx, ky)

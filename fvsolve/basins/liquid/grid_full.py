@@ -33,6 +33,7 @@ from fvsolve.basins.liquid.grid import (
 )
 from fvsolve.basins.liquid.waves import invariant, state
 from fvsolve.basins.patches import put_inward
+from fvsolve.basins.stretch import swell_row
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.reconstruction import value_weno5
@@ -283,6 +284,8 @@ def grid_rates(
                 ky[j - 1], between[before:], between[before + nx :], between[before + 2 * nx :], gu, gd, gt,
                 rate_r[a:z], rate_y[a:z], rate_x[a:z],
             )  # fmt: skip
+            if moves is not None:
+                swell_row(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
     most = 0.0
     for i in range(nx):
         most = max(most, top[i])

@@ -29,8 +29,8 @@ def on_mesh(basin):
 @njit(forceinline=True)
 def lines_of(tables, basin):
     """What lines of a grid do, as kernels of liquids want it."""
-    along, across, thrust = walls.moves_of(tables, basin)
-    return along, across, thrust, basin["density"]
+    along, across, thrust, wide, _ = walls.moves_of(tables, basin)
+    return along, across, thrust, basin["density"], wide
 
 
 @njit

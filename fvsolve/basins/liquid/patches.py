@@ -5,6 +5,7 @@ from math import log1p
 from fvsolve.basins.behind import area_of, length_of
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import give_way
+from fvsolve.basins.stretch import seen_of, stretched
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import LAW_LOG
@@ -32,7 +33,7 @@ def patch_pressures(t, y, dydt, out, handle):
         basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
         if basin["kind"] != MINE:
             continue
-        stored, slope = mean_deviation(tables, patch, y), basin["speed"] * basin["speed"]
+        stored, slope = mean_deviation(tables, patch, seen_of(basin, tables.seen, y)), basin["speed"] * basin["speed"]
         pressure = slope * stored
         if tables.settings[0]["law"] == LAW_LOG:
             strain = stored / basin["density"]
@@ -55,7 +56,8 @@ def patch_flows(t, y, dydt, out, handle):
         asked = out[tables.layout[0]["net"] + patch["node"]]
         n, flow = basin["n"], asked / (basin["thickness"] * area_of(tables, patch))
         for m in range(patch["count"]):
-            dydt[basin["y"] + tables.integers[patch["first"] + m]] += flow
+            i = tables.integers[patch["first"] + m]
+            dydt[basin["y"] + i] += flow * stretched(tables.plane, basin, i)
         for m in range(patch["faces"]):
             i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
             push = -basin["speed"] * asked / (basin["thickness"] * length_of(tables, patch))

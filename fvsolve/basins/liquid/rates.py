@@ -3,6 +3,7 @@
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.patches import book_open, wanted
+from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
@@ -22,23 +23,54 @@ def on_mesh(basin):
     return basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0
 
 
+@njit(forceinline=True)
+def states_of(tables, basin, y):
+    """Deviations of density and both mass-flow densities of cells."""
+    n, o, seen = basin["n"], basin["y"], seen_of(basin, tables.seen, y)
+    return seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
+
+
+@njit(forceinline=True)
+def rates_of(tables, basin, dydt):
+    """Where their rates go, of contents where walls move; where none are asked for, room that nobody reads."""
+    n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["unused"])
+    return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
+
+
+@njit(forceinline=True)
+def outside_of(tables, basin):
+    """What the boundary sends back, room for what passes it, and room to work in."""
+    plane, work, outer, through = tables.plane, tables.work, basin["outer_given"], basin["through"]
+    reflect = plane[basin["reflect"] : basin["reflect"] + outer]
+    return reflect, work[through : through + outer], work[basin["work"] :]
+
+
+@njit(forceinline=True)
+def spacing_of(plane, basin):
+    """1 / widths of columns and rows."""
+    k, nx, ny = basin["spacing"], basin["nx"], basin["ny"]
+    return plane[k : k + nx], plane[k + nx : k + nx + ny]
+
+
+@njit
+def finish_liquid(tables, b, rate, out):
+    """Book what passes an open boundary, and let steps follow the waves."""
+    book_open(tables, b, tables.basins[b]["thickness"], out)
+    out[RATE] = max(out[RATE], rate)
+
+
 @njit
 def linear_grid(tables, b, y, dydt, out, moves):
     """Rates under law linear on a grid; moves : as in `grid.grid_rates`."""
-    plane, work, basin = tables.plane, tables.work, tables.basins[b]
-    n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
-    through = basin["through"]
-    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
-    rates = to[first : first + 3 * n]
+    basin = tables.basins[b]
+    kx, ky = spacing_of(tables.plane, basin)
+    (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
+    reflect, through, work = outside_of(tables, basin)
     rate = grid.grid_rates(
-        basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx],
-        plane[k + nx : k + nx + ny], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-        work[through : through + basin["outer_given"]], work[basin["work"] :],
-        rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
+        basin["speed"], basin["small"], basin["scheme"], basin["limiter"], basin["nx"], basin["ny"], kx, ky, reflect,
+        r, mx, my, through, work, rate_r, rate_x, rate_y, moves,
     )  # fmt: skip
-    book_open(tables, b, basin["thickness"], out)
-    out[RATE] = max(out[RATE], rate)
+    finish_liquid(tables, b, rate, out)
 
 
 @njit
@@ -53,21 +85,15 @@ def waves_on_grids(t, y, dydt, out, handle):
 @njit
 def full_grid(tables, b, table, y, dydt, out, moves):
     """Rates with the full momentum flux on a grid, of its waves or, with no table, under law log."""
-    plane, work, basin = tables.plane, tables.work, tables.basins[b]
-    n, o, k, nx, ny = basin["n"], basin["y"], basin["spacing"], basin["nx"], basin["ny"]
-    through = basin["through"]
-    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
-    rates = to[first : first + 3 * n]
+    basin = tables.basins[b]
+    kx, ky = spacing_of(tables.plane, basin)
+    (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
+    reflect, through, work = outside_of(tables, basin)
     rate = grid_full.grid_rates(
-        basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], nx, ny,
-        plane[k : k + nx], plane[k + nx : k + nx + ny],
-        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-        work[through : through + basin["outer_given"]], work[basin["work"] :],
-        rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
+        basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], basin["nx"],
+        basin["ny"], kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y, moves,
     )  # fmt: skip
-    book_open(tables, b, basin["thickness"], out)
-    out[RATE] = max(out[RATE], rate)
+    finish_liquid(tables, b, rate, out)
 
 
 @njit
@@ -82,20 +108,15 @@ def rates_on_grids(t, y, dydt, out, handle):
 @njit
 def any_mesh(tables, b, table, y, dydt, out, moves):
     """Rates on a mesh, of its waves or, with no table, under laws linear and log; moves : as in `liquid_rates`."""
-    plane, work, integers, basin = tables.plane, tables.work, tables.integers, tables.basins[b]
-    n, o, through = basin["n"], basin["y"], basin["through"]
-    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
-    rates = to[first : first + 3 * n]
+    basin = tables.basins[b]
+    (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
+    reflect, through, work = outside_of(tables, basin)
     rate = faces.liquid_rates(
         tables.settings[0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["wide"],
-        plane[basin["mesh"] :],
-        integers[basin["links"] :], plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
-        y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-        work[through : through + basin["outer_given"]], work[basin["work"] :],
-        rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
+        tables.plane[basin["mesh"] :], tables.integers[basin["links"] :], reflect, r, mx, my, through, work,
+        rate_r, rate_x, rate_y, moves,
     )  # fmt: skip
-    book_open(tables, b, basin["thickness"], out)
-    out[RATE] = max(out[RATE], rate)
+    finish_liquid(tables, b, rate, out)
 
 
 @njit

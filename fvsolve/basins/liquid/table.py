@@ -7,6 +7,7 @@ from fvsolve.basins.liquid.patches import mean_deviation
 from fvsolve.basins.liquid.rates import any_mesh, full_grid, on_grid, on_mesh
 from fvsolve.basins.liquid.waves import pressure
 from fvsolve.basins.patches import wanted
+from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import CELL_FIELD
@@ -45,7 +46,7 @@ def patch_pressures(t, y, dydt, out, handle):
         if basin["kind"] != MINE:
             continue
         table = tables.plane[basin["table"] :]
-        found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, y))
+        found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, seen_of(basin, tables.seen, y)))
         out[layout["pressure"] + patch["node"]] = found
         out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of(tables, patch))
 

@@ -28,7 +28,7 @@ from fvsolve.kernels.mechanism.room import (
     row_of,
     turned,
 )
-from fvsolve.kernels.records import BALL, FREE, PRISMATIC, REVOLUTE
+from fvsolve.kernels.records import BALL, BODY_OUT, FREE, PRISMATIC, REVOLUTE
 from fvsolve.kernels.schedules import schedule_slopes, schedule_value
 
 
@@ -86,118 +86,119 @@ def rates(body, first, y):
 
 
 @njit
-def set_free(body, y, out, here):
+def set_free(body, y, own):
     """Attitude, place and motion of a free body; o is its centre of mass."""
-    turn_by(out, here + ATTITUDE, *parameters(body, 3, y))
-    cx, cy, cz = turned(out, here + ATTITUDE, body["centre"], 0)
+    turn_by(own, ATTITUDE, *parameters(body, 3, y))
+    cx, cy, cz = turned(own, ATTITUDE, body["centre"], 0)
     at, x0 = body["y"], body["start"]
-    put(out, here + ARM, -cx, -cy, -cz)
-    put(out, here + PLACE, x0[0] + y[at] - cx, x0[1] + y[at + 1] - cy, x0[2] + y[at + 2] - cz)
+    put(own, ARM, -cx, -cy, -cz)
+    put(own, PLACE, x0[0] + y[at] - cx, x0[1] + y[at + 1] - cy, x0[2] + y[at + 2] - cz)
     vx, vy, vz = rates(body, 0, y)
-    put(out, here + STREAM, vx, vy, vz)
-    put(out, here + SPIN, *turned(out, here + ATTITUDE, rates(body, 3, y), 0))
-    ax, ay, az = cross(out, here + SPIN, vx, vy, vz)
-    put(out, here + APPARENT, -ax, -ay, -az)
-    put(out, here + SPIN_BIAS, 0.0, 0.0, 0.0)
+    put(own, STREAM, vx, vy, vz)
+    put(own, SPIN, *turned(own, ATTITUDE, rates(body, 3, y), 0))
+    ax, ay, az = cross(own, SPIN, vx, vy, vz)
+    put(own, APPARENT, -ax, -ay, -az)
+    put(own, SPIN_BIAS, 0.0, 0.0, 0.0)
 
 
 @njit
-def hang(body, out, tables, here):
+def hang(body, out, tables, own):
     """Begin with what a body has of the one it is joined to: place of the joint, its axes in `scratch` from 9 on."""
     work = tables.scratch
     if body["parent"] < 0:
         for k in range(9):
             work[9 + k] = body["attitude"][k]
         for k in range(3):
-            out[here + PLACE + k], out[here + ARM + k] = body["at"][k], 0.0
-            out[here + SPIN + k] = out[here + STREAM + k] = 0.0
-            out[here + SPIN_BIAS + k] = out[here + APPARENT + k] = 0.0
+            own[PLACE + k], own[ARM + k] = body["at"][k], 0.0
+            own[SPIN + k] = own[STREAM + k] = 0.0
+            own[SPIN_BIAS + k] = own[APPARENT + k] = 0.0
         return
-    up = row_of(tables, body["parent"])
-    times(out, up + ATTITUDE, body["attitude"], 0, work, 9)
-    x, y, z = turned(out, up + ATTITUDE, body["at"], 0)
+    at = row_of(tables, body["parent"])
+    up = out[at : at + BODY_OUT]
+    times(up, ATTITUDE, body["attitude"], 0, work, 9)
+    x, y, z = turned(up, ATTITUDE, body["at"], 0)
     for k, far in ((0, x), (1, y), (2, z)):
-        out[here + PLACE + k] = out[up + PLACE + k] + far
-        out[here + ARM + k] = out[up + ARM + k] + far
-        out[here + SPIN + k], out[here + STREAM + k] = out[up + SPIN + k], out[up + STREAM + k]
-        out[here + SPIN_BIAS + k], out[here + APPARENT + k] = out[up + SPIN_BIAS + k], out[up + APPARENT + k]
+        own[PLACE + k] = up[PLACE + k] + far
+        own[ARM + k] = up[ARM + k] + far
+        own[SPIN + k], own[STREAM + k] = up[SPIN + k], up[STREAM + k]
+        own[SPIN_BIAS + k], own[APPARENT + k] = up[SPIN_BIAS + k], up[APPARENT + k]
 
 
 @njit
-def turn_joint(body, t, y, out, tables, here):
+def turn_joint(body, t, y, tables, own):
     """A hinge: axes turned, S q' and, where it is driven, S q''."""
     angle, rate, change = angle_of(body, t, y, tables)
     turn_about(tables.scratch, 0, angle, body["axis"])
-    times(tables.scratch, 9, tables.scratch, 0, out, here + ATTITUDE)
-    a, b, c = turned(out, here + ATTITUDE, body["axis"], 0)
+    times(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
+    a, b, c = turned(own, ATTITUDE, body["axis"], 0)
     if change != 0.0:
-        joint_acceleration(out, here, a * change, b * change, c * change, 1)
-    move_by(out, here, a * rate, b * rate, c * rate, *cross(out, here + ARM, a * rate, b * rate, c * rate))
+        joint_acceleration(own, a * change, b * change, c * change, 1)
+    move_by(own, a * rate, b * rate, c * rate, *cross(own, ARM, a * rate, b * rate, c * rate))
 
 
 @njit
-def slide_joint(body, t, y, out, tables, here):
+def slide_joint(body, t, y, tables, own):
     """A slider: place moved, likewise."""
     travel, rate, change = angle_of(body, t, y, tables)
-    keep_axes(out, tables, here)
-    a, b, c = turned(out, here + ATTITUDE, body["axis"], 0)
+    keep_axes(tables, own)
+    a, b, c = turned(own, ATTITUDE, body["axis"], 0)
     for k, x in ((0, a), (1, b), (2, c)):
-        out[here + PLACE + k] += x * travel
-        out[here + ARM + k] += x * travel
+        own[PLACE + k] += x * travel
+        own[ARM + k] += x * travel
     if change != 0.0:
-        joint_acceleration(out, here, a * change, b * change, c * change, 0)
-    move_by(out, here, 0.0, 0.0, 0.0, a * rate, b * rate, c * rate)
+        joint_acceleration(own, a * change, b * change, c * change, 0)
+    move_by(own, 0.0, 0.0, 0.0, a * rate, b * rate, c * rate)
 
 
 @njit
-def keep_axes(out, tables, here):
+def keep_axes(tables, own):
     """Axes are those of the joint."""
     for k in range(9):
-        out[here + ATTITUDE + k] = tables.scratch[9 + k]
+        own[ATTITUDE + k] = tables.scratch[9 + k]
 
 
 @njit
-def move_by(out, here, wx, wy, wz, vx, vy, vz):
+def move_by(own, wx, wy, wz, vx, vy, vz):
     """Add S q' = (w, v) to a body's motion, and V x S q' to what velocities alone accelerate."""
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
-        out[here + SPIN + k] += w
-        out[here + STREAM + k] += v
-    ax, ay, az = cross(out, here + SPIN, wx, wy, wz)
-    bx, by, bz = cross(out, here + SPIN, vx, vy, vz)
-    dx, dy, dz = cross(out, here + STREAM, wx, wy, wz)
+        own[SPIN + k] += w
+        own[STREAM + k] += v
+    ax, ay, az = cross(own, SPIN, wx, wy, wz)
+    bx, by, bz = cross(own, SPIN, vx, vy, vz)
+    dx, dy, dz = cross(own, STREAM, wx, wy, wz)
     for k, a, b in ((0, ax, bx + dx), (1, ay, by + dy), (2, az, bz + dz)):
-        out[here + SPIN_BIAS + k] += a
-        out[here + APPARENT + k] += b
+        own[SPIN_BIAS + k] += a
+        own[APPARENT + k] += b
 
 
 @njit
-def set_joined(body, t, y, out, tables, here):
+def set_joined(body, t, y, out, tables, own):
     """Attitude, place and motion of a body from those of the one that it is joined to."""
-    hang(body, out, tables, here)
+    hang(body, out, tables, own)
     if body["joint"] == REVOLUTE:
-        turn_joint(body, t, y, out, tables, here)
+        turn_joint(body, t, y, tables, own)
     elif body["joint"] == PRISMATIC:
-        slide_joint(body, t, y, out, tables, here)
+        slide_joint(body, t, y, tables, own)
     elif body["joint"] == BALL:
         turn_by(tables.scratch, 0, *parameters(body, 0, y))
-        times(tables.scratch, 9, tables.scratch, 0, out, here + ATTITUDE)
-        a, b, c = turned(out, here + ATTITUDE, rates(body, 0, y), 0)
-        move_by(out, here, a, b, c, *cross(out, here + ARM, a, b, c))
+        times(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
+        a, b, c = turned(own, ATTITUDE, rates(body, 0, y), 0)
+        move_by(own, a, b, c, *cross(own, ARM, a, b, c))
     else:
-        keep_axes(out, tables, here)
+        keep_axes(tables, own)
 
 
 @njit
-def joint_acceleration(out, here, x, y, z, turns):
+def joint_acceleration(own, x, y, z, turns):
     """Add the acceleration of a driven joint, S q''."""
     if turns == 1:
-        out[here + SPIN_BIAS] += x
-        out[here + SPIN_BIAS + 1] += y
-        out[here + SPIN_BIAS + 2] += z
-        x, y, z = cross(out, here + ARM, x, y, z)
-    out[here + APPARENT] += x
-    out[here + APPARENT + 1] += y
-    out[here + APPARENT + 2] += z
+        own[SPIN_BIAS] += x
+        own[SPIN_BIAS + 1] += y
+        own[SPIN_BIAS + 2] += z
+        x, y, z = cross(own, ARM, x, y, z)
+    own[APPARENT] += x
+    own[APPARENT + 1] += y
+    own[APPARENT + 2] += z
 
 
 @njit(forceinline=True)
@@ -224,19 +225,19 @@ def kinematics(t, y, dydt, out, handle):
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     for i in range(bodies.size):
-        body, here = bodies[i], row_of(tables, i)
+        body, at = bodies[i], row_of(tables, i)
+        own = out[at : at + BODY_OUT]
         if body["joint"] == FREE:
-            set_free(body, y, out, here)
+            set_free(body, y, own)
         else:
-            set_joined(body, t, y, out, tables, here)
-        x, y0, z = cross(out, here + SPIN, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
-        v = here + STREAM
-        put(out, here + VELOCITY, out[v] + x, out[v + 1] + y0, out[v + 2] + z)
-        put(out, here + BIAS, *at_origin(out, here, here + APPARENT, SPIN_BIAS))
+            set_joined(body, t, y, out, tables, own)
+        x, y0, z = cross(own, SPIN, own[ARM], own[ARM + 1], own[ARM + 2])
+        put(own, VELOCITY, own[STREAM] + x, own[STREAM + 1] + y0, own[STREAM + 2] + z)
+        put(own, BIAS, *at_origin(own, 0, APPARENT, SPIN_BIAS))
         weight = -body["mass"] * gravity
-        x, y0, z = turned(out, here + ATTITUDE, body["centre"], 0)
-        put(out, here + FORCE, 0.0, 0.0, weight)
-        put(out, here + TORQUE, y0 * weight, -x * weight, 0.0)
+        x, y0, z = turned(own, ATTITUDE, body["centre"], 0)
+        put(own, FORCE, 0.0, 0.0, weight)
+        put(own, TORQUE, y0 * weight, -x * weight, 0.0)
     stretch(out, tables)
 
 

@@ -9,7 +9,7 @@ xx yy zz xy xz yz) and six of force.
 
 from math import sqrt
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import held_by
 from fvsolve.kernels.mechanism.joints import at_origin, parameters, rates
@@ -32,7 +32,7 @@ from fvsolve.kernels.mechanism.room import (
     turned,
 )
 from fvsolve.kernels.mechanism.tanks import add_tanks
-from fvsolve.kernels.records import ABOUT, FREE, PRISMATIC, RATE, REVOLUTE
+from fvsolve.kernels.records import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, REVOLUTE
 
 INERTIA, LOAD = 10, 6
 
@@ -46,68 +46,69 @@ def loads_at(tables):
     return first, first + INERTIA * tables.bodies.size
 
 
-@njit
-def columns(body, out, here, work, at):
-    """S of the freedoms of a joint: angular and linear velocity that each gives the axes at o."""
-    kind, x, y, z = body["joint"], out[here + ARM], out[here + ARM + 1], out[here + ARM + 2]
+@inner
+def columns(body, own, s):
+    """S of the freedoms of a joint: angular and linear velocity that each gives the axes at o; own : the body's row."""
+    kind, x, y, z = body["joint"], own[ARM], own[ARM + 1], own[ARM + 2]
+    first = 0
     if kind == FREE:
         for k in range(18):
-            work[at + k] = 0.0
-        work[at + 3] = work[at + 10] = work[at + 17] = 1.0
-        at += 18
+            s[k] = 0.0
+        s[3] = s[10] = s[17] = 1.0
+        first = 18
     if kind == REVOLUTE or kind == PRISMATIC:
-        a, b, c = turned(out, here + ATTITUDE, body["axis"], 0)
+        a, b, c = turned(own, ATTITUDE, body["axis"], 0)
         if kind == PRISMATIC:
-            put(work, at, 0.0, 0.0, 0.0)
-            put(work, at + 3, a, b, c)
+            put(s, 0, 0.0, 0.0, 0.0)
+            put(s, 3, a, b, c)
         else:
-            put(work, at, a, b, c)
-            put(work, at + 3, y * c - z * b, z * a - x * c, x * b - y * a)
+            put(s, 0, a, b, c)
+            put(s, 3, y * c - z * b, z * a - x * c, x * b - y * a)
         return
     for k in range(3):
-        a, b, c = out[here + ATTITUDE + k], out[here + ATTITUDE + 3 + k], out[here + ATTITUDE + 6 + k]
-        put(work, at + 6 * k, a, b, c)
+        a, b, c = own[ATTITUDE + k], own[ATTITUDE + 3 + k], own[ATTITUDE + 6 + k]
+        put(s, first + 6 * k, a, b, c)
         if kind == FREE:
-            put(work, at + 6 * k + 3, 0.0, 0.0, 0.0)
+            put(s, first + 6 * k + 3, 0.0, 0.0, 0.0)
         else:
-            put(work, at + 6 * k + 3, y * c - z * b, z * a - x * c, x * b - y * a)
+            put(s, first + 6 * k + 3, y * c - z * b, z * a - x * c, x * b - y * a)
 
 
-@njit
-def inertia_at(body, out, here, work, at):
+@inner
+def inertia_at(body, own, found):
     """Ten numbers of a body about o: R J R' and what its mass adds."""
-    m, own, r = body["mass"], body["inertia"], here + ATTITUDE
-    gx, gy, gz = turned(out, r, body["centre"], 0)
-    gx, gy, gz = gx + out[here + ARM], gy + out[here + ARM + 1], gz + out[here + ARM + 2]
-    work[at] = m
-    put(work, at + 1, m * gx, m * gy, m * gz)
-    ax, ay, az = back_row(out, r, own)
-    bx, by, bz = back_row(out, r + 3, own)
-    cx, cy, cz = back_row(out, r + 6, own)
-    work[at + 4] = ax * out[r] + ay * out[r + 1] + az * out[r + 2] + m * (gy * gy + gz * gz)
-    work[at + 5] = bx * out[r + 3] + by * out[r + 4] + bz * out[r + 5] + m * (gx * gx + gz * gz)
-    work[at + 6] = cx * out[r + 6] + cy * out[r + 7] + cz * out[r + 8] + m * (gx * gx + gy * gy)
-    work[at + 7] = ax * out[r + 3] + ay * out[r + 4] + az * out[r + 5] - m * gx * gy
-    work[at + 8] = ax * out[r + 6] + ay * out[r + 7] + az * out[r + 8] - m * gx * gz
-    work[at + 9] = bx * out[r + 6] + by * out[r + 7] + bz * out[r + 8] - m * gy * gz
+    m, inertia, r = body["mass"], body["inertia"], ATTITUDE
+    gx, gy, gz = turned(own, r, body["centre"], 0)
+    gx, gy, gz = gx + own[ARM], gy + own[ARM + 1], gz + own[ARM + 2]
+    found[0] = m
+    put(found, 1, m * gx, m * gy, m * gz)
+    ax, ay, az = back_row(own, r, inertia)
+    bx, by, bz = back_row(own, r + 3, inertia)
+    cx, cy, cz = back_row(own, r + 6, inertia)
+    found[4] = ax * own[r] + ay * own[r + 1] + az * own[r + 2] + m * (gy * gy + gz * gz)
+    found[5] = bx * own[r + 3] + by * own[r + 4] + bz * own[r + 5] + m * (gx * gx + gz * gz)
+    found[6] = cx * own[r + 6] + cy * own[r + 7] + cz * own[r + 8] + m * (gx * gx + gy * gy)
+    found[7] = ax * own[r + 3] + ay * own[r + 4] + az * own[r + 5] - m * gx * gy
+    found[8] = ax * own[r + 6] + ay * own[r + 7] + az * own[r + 8] - m * gx * gz
+    found[9] = bx * own[r + 6] + by * own[r + 7] + bz * own[r + 8] - m * gy * gz
 
 
 @njit(forceinline=True)
-def back_row(out, r, own):
+def back_row(own, r, inertia):
     """A row of R times the inertia of a body in its own axes."""
-    x, y, z = out[r], out[r + 1], out[r + 2]
+    x, y, z = own[r], own[r + 1], own[r + 2]
     return (
-        x * own[0] + y * own[3] + z * own[6],
-        x * own[1] + y * own[4] + z * own[7],
-        x * own[2] + y * own[5] + z * own[8],
+        x * inertia[0] + y * inertia[3] + z * inertia[6],
+        x * inertia[1] + y * inertia[4] + z * inertia[7],
+        x * inertia[2] + y * inertia[5] + z * inertia[8],
     )
 
 
 @njit(forceinline=True)
-def momentum(work, at, wx, wy, wz, vx, vy, vz):
+def momentum(inertia, wx, wy, wz, vx, vy, vz):
     """(torque or angular momentum about o, force or momentum) that an inertia has with (w, v), six numbers."""
-    m, hx, hy, hz = work[at], work[at + 1], work[at + 2], work[at + 3]
-    xx, yy, zz, xy, xz, yz = work[at + 4], work[at + 5], work[at + 6], work[at + 7], work[at + 8], work[at + 9]
+    m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
+    xx, yy, zz, xy, xz, yz = inertia[4], inertia[5], inertia[6], inertia[7], inertia[8], inertia[9]
     return (
         xx * wx + xy * wy + xz * wz + hy * vz - hz * vy,
         xy * wx + yy * wy + yz * wz + hz * vx - hx * vz,
@@ -118,19 +119,19 @@ def momentum(work, at, wx, wy, wz, vx, vy, vz):
     )
 
 
-@njit
-def bias(out, here, work, inertia, load):
+@inner
+def bias(own, inertia, load):
     """What a body's motion asks of its joint about o, less what pushes it: I A + V x* I V - forces."""
-    w, v, a, c = here + SPIN, here + STREAM, here + SPIN_BIAS, here + APPARENT
-    lx, ly, lz, px, py, pz = momentum(work, inertia, out[w], out[w + 1], out[w + 2], out[v], out[v + 1], out[v + 2])
-    tx, ty, tz, fx, fy, fz = momentum(work, inertia, out[a], out[a + 1], out[a + 2], out[c], out[c + 1], out[c + 2])
-    ax, ay, az = cross(out, w, lx, ly, lz)
-    bx, by, bz = cross(out, v, px, py, pz)
-    gx, gy, gz = cross(out, w, px, py, pz)
-    f, m = here + FORCE, here + TORQUE
-    ex, ey, ez = cross(out, here + ARM, out[f], out[f + 1], out[f + 2])
-    put(work, load, tx + ax + bx - out[m] - ex, ty + ay + by - out[m + 1] - ey, tz + az + bz - out[m + 2] - ez)
-    put(work, load + 3, fx + gx - out[f], fy + gy - out[f + 1], fz + gz - out[f + 2])
+    w, v, a, c = SPIN, STREAM, SPIN_BIAS, APPARENT
+    lx, ly, lz, px, py, pz = momentum(inertia, own[w], own[w + 1], own[w + 2], own[v], own[v + 1], own[v + 2])
+    tx, ty, tz, fx, fy, fz = momentum(inertia, own[a], own[a + 1], own[a + 2], own[c], own[c + 1], own[c + 2])
+    ax, ay, az = cross(own, w, lx, ly, lz)
+    bx, by, bz = cross(own, v, px, py, pz)
+    gx, gy, gz = cross(own, w, px, py, pz)
+    f, m = FORCE, TORQUE
+    ex, ey, ez = cross(own, ARM, own[f], own[f + 1], own[f + 2])
+    put(load, 0, tx + ax + bx - own[m] - ex, ty + ay + by - own[m + 1] - ey, tz + az + bz - own[m + 2] - ez)
+    put(load, 3, fx + gx - own[f], fy + gy - own[f + 1], fz + gz - own[f + 2])
 
 
 @njit
@@ -139,68 +140,72 @@ def fill(y, out, tables):
     bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
     n = freedoms.size
     first, loads = loads_at(tables)
-    for i in range(bodies.size):
-        here, inertia = row_of(tables, i), first + INERTIA * i
+    for i in range(bodies.size):  # whose numbers are views: indices that are constants cost no more than they must
+        here, at = row_of(tables, i), first + INERTIA * i
+        own, inertia, load = out[here : here + BODY_OUT], work[at : at + INERTIA], work[loads + LOAD * i :]
         if bodies[i]["freedoms"] > 0:
-            columns(bodies[i], out, here, work, 6 * bodies[i]["freedom"])
-        inertia_at(bodies[i], out, here, work, inertia)
-        bias(out, here, work, inertia, loads + LOAD * i)
+            columns(bodies[i], own, work[6 * bodies[i]["freedom"] :])
+        inertia_at(bodies[i], own, inertia)
+        bias(own, inertia, load)
     for i in range(bodies.size - 1, -1, -1):
-        body, inertia, load = bodies[i], first + INERTIA * i, loads + LOAD * i
+        body, at = bodies[i], first + INERTIA * i
+        inertia, load = work[at : at + INERTIA], work[loads + LOAD * i :]
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
-            s, row, path, depth = 6 * j, 8 * n + freedoms[j]["row"], freedoms[j]["path"], freedoms[j]["depth"]
-            found = 0.0
-            for k in range(6):
-                found -= work[s + k] * work[load + k]
+            s, path, depth = work[6 * j :], paths[freedoms[j]["path"] :], freedoms[j]["depth"]
+            row = work[8 * n + freedoms[j]["row"] :]
+            found = -(s[0] * load[0] + s[1] * load[1] + s[2] * load[2])
+            found -= s[3] * load[3] + s[4] * load[4] + s[5] * load[5]
             if body["damping"] > 0.0:
                 k = body["rate"] + (j - body["freedom"])
                 found -= body["damping"] * (body["speed"][j - body["freedom"]] + y[k])
             if body["stiffness"] > 0.0:
                 found -= body["stiffness"] * (body["start"][0] + y[body["y"]])
             work[6 * n + j] = found - freedoms[j]["balance"]  # last, so that what is balanced leaves no bit
-            tx, ty, tz, fx, fy, fz = momentum(
-                work, inertia, work[s], work[s + 1], work[s + 2], work[s + 3], work[s + 4], work[s + 5]
-            )
+            tx, ty, tz, fx, fy, fz = momentum(inertia, s[0], s[1], s[2], s[3], s[4], s[5])
             for k in range(depth + 1):
-                c = 6 * paths[path + k]
-                turn = work[c] * tx + work[c + 1] * ty + work[c + 2] * tz
-                work[row + k] = turn + (work[c + 3] * fx + work[c + 4] * fy + work[c + 5] * fz)
+                c = work[6 * path[k] :]
+                turn = c[0] * tx + c[1] * ty + c[2] * tz
+                row[k] = turn + (c[3] * fx + c[4] * fy + c[5] * fz)
         if body["parent"] >= 0:
-            up, over = first + INERTIA * body["parent"], loads + LOAD * body["parent"]
+            over, up = work[first + INERTIA * body["parent"] :], work[loads + LOAD * body["parent"] :]
             for k in range(INERTIA):
-                work[up + k] += work[inertia + k]
+                over[k] += inertia[k]
             for k in range(LOAD):
-                work[over + k] += work[load + k]
+                up[k] += load[k]
     add_tanks(out, tables)
     add_networks(y, out, tables)
 
 
 @njit
 def factor(tables):
-    """M = L'L in its own place, rows of freedoms from the leaves on; L has no entry that M has not."""
+    """M = L'L in its own place, rows of freedoms from the leaves on; L has no entry that M has not.
+
+    On the diagonal stands 1 over that of L, which is what all who come later divide by.
+    """
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     for j in range(n - 1, -1, -1):
-        row, depth, path = 8 * n + freedoms[j]["row"], freedoms[j]["depth"], freedoms[j]["path"]
-        root = sqrt(work[row + depth])
-        work[row + depth] = root
+        row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
+        per = 1.0 / sqrt(row[depth])
+        row[depth] = per
         for k in range(depth):
-            work[row + k] /= root
+            row[k] *= per
         for k in range(depth):
-            up, share = 8 * n + freedoms[paths[path + k]]["row"], work[row + k]
+            up, share = work[8 * n + freedoms[path[k]]["row"] :], row[k]
             for m in range(k + 1):
-                work[up + m] -= share * work[row + m]
+                up[m] -= share * row[m]
 
 
 @njit
 def halve(tables, at):
     """z with L' z = b, in the place of b at scratch[at]: |z|^2 = b' M^-1 b."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
+    b = work[at : at + n]
     for j in range(n - 1, -1, -1):
-        row, depth, path = 8 * n + freedoms[j]["row"], freedoms[j]["depth"], freedoms[j]["path"]
-        z = work[at + j] / work[row + depth]
-        work[at + j] = z
+        row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
+        z = b[j] * row[depth]
+        b[j] = z
         for k in range(depth):
-            work[at + paths[path + k]] -= work[row + k] * z
+            b[path[k]] -= row[k] * z
 
 
 @njit
@@ -208,12 +213,13 @@ def solve(tables, at):
     """x with M x = b, in the place of b at scratch[at]."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     halve(tables, at)
+    b = work[at : at + n]
     for j in range(n):
-        row, depth, path = 8 * n + freedoms[j]["row"], freedoms[j]["depth"], freedoms[j]["path"]
-        x = work[at + j]
+        row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
+        x = b[j]
         for k in range(depth):
-            x -= work[row + k] * work[at + paths[path + k]]
-        work[at + j] = x / work[row + depth]
+            x -= row[k] * b[path[k]]
+        b[j] = x * row[depth]
 
 
 @njit
@@ -222,16 +228,23 @@ def spread(out, tables):
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     loads = loads_at(tables)[1]
     for i in range(bodies.size):
-        body, here, own = bodies[i], row_of(tables, i), loads + LOAD * i
-        for k in range(LOAD):
-            work[own + k] = work[loads + LOAD * body["parent"] + k] if body["parent"] >= 0 else 0.0
-        for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
+        body, at, given = bodies[i], row_of(tables, i), work[loads + LOAD * i :]
+        own = out[at : at + BODY_OUT]
+        if body["parent"] >= 0:
+            up = work[loads + LOAD * body["parent"] :]
             for k in range(LOAD):
-                work[own + k] += work[6 * j + k] * work[6 * n + j]
+                given[k] = up[k]
+        else:
+            for k in range(LOAD):
+                given[k] = 0.0
+        for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
+            s, rate = work[6 * j :], work[6 * n + j]
+            for k in range(LOAD):
+                given[k] += s[k] * rate
         for k in range(3):  # for a while where what comes of it belongs
-            out[here + TURNING + k] = out[here + SPIN_BIAS + k] + work[own + k]
-            out[here + ACCELERATION + k] = out[here + APPARENT + k] + work[own + 3 + k]
-        put(out, here + ACCELERATION, *at_origin(out, here, here + ACCELERATION, TURNING))
+            own[TURNING + k] = own[SPIN_BIAS + k] + given[k]
+            own[ACCELERATION + k] = own[APPARENT + k] + given[3 + k]
+        put(own, ACCELERATION, *at_origin(own, 0, ACCELERATION, TURNING))
 
 
 @njit
@@ -313,9 +326,10 @@ def quickest_body(out, tables):
     """
     rate, freedoms, work, lines = out[RATE], tables.freedoms, tables.scratch, tables.lines
     stiffness, damping, n, at = 0.0, 0.0, freedoms.size, 7 * freedoms.size
+    turns = 0.0
     for i in range(tables.bodies.size):
-        w = row_of(tables, i) + SPIN
-        rate = max(rate, sqrt(out[w] * out[w] + out[w + 1] * out[w + 1] + out[w + 2] * out[w + 2]))
+        own = out[row_of(tables, i) :]
+        turns = max(turns, own[SPIN] * own[SPIN] + own[SPIN + 1] * own[SPIN + 1] + own[SPIN + 2] * own[SPIN + 2])
         if tables.bodies[i]["damping"] > 0.0 or tables.bodies[i]["stiffness"] > 0.0:
             for j in range(tables.bodies[i]["freedom"], tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"]):
                 for m in range(n):
@@ -335,7 +349,7 @@ def quickest_body(out, tables):
         easy = ease(tables, at)
         stiffness += spring * easy
         damping += brake * easy
-    return max(rate, 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
+    return max(max(rate, sqrt(turns)), 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
 
 
 @njit

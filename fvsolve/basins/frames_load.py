@@ -1,0 +1,128 @@
+"""What what rides on a body puts on it: force and torque with joints held, moments of mass. Knows rows of tables."""
+
+from fvsolve.basins.frames import AT, AX, AY, AZ, DOWN, GN, GX, GY, LEVEL, PLACES, SURFACE, TURN, WX, WY, WZ
+from fvsolve.jit import njit
+from fvsolve.kernels.mechanism.room import (
+    ACCELERATION,
+    ARM,
+    ATTITUDE,
+    BIAS,
+    SPIN_BIAS,
+    TURNING,
+    add_force,
+    add_torque,
+    back,
+    put,
+    row_of,
+    turned,
+)
+from fvsolve.kernels.mechanism.tanks import ARM_OF, EAST, LOAD, MOMENTS, TANK_OUT
+
+
+@njit
+def arm_of(tables, basin, out):
+    """Where the origin of a basin lies from that of its body, in axes of the world [m]."""
+    at = basin["frame"] + AT
+    return turned(out, row_of(tables, basin["body"]) + ATTITUDE, tables.plane[at : at + 3], 0)
+
+
+@njit(forceinline=True)
+def mass_per(tables, basin):
+    """Mass per area over what cells hold: depth [kg/m3], or density of a liquid [m]."""
+    return tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"]
+
+
+@njit(fastmath={"reassoc"})
+def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, dy):
+    """Of cells of one y: mass, its rate (1, x, xx), flow along x and y (1, x), rates of flow, weight times height.
+
+    The order of sums is left to the compiler, which makes whole vectors of them.
+    """
+    r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
+    for i in range(h.size):
+        depth, per = max(rest[i] + h[i], 0.0), per_area * area[i]
+        mass, more, v, dv = per * depth, per * dh[i], per * qy[i], per * dy[i]
+        r0, r1, r2 = r0 + mass, r1 + mass * x[i], r2 + mass * x[i] * x[i]
+        d0, d1, d2 = d0 + more, d1 + more * x[i], d2 + more * x[i] * x[i]
+        p0, v0, v1 = p0 + per * qx[i], v0 + v, v1 + v * x[i]
+        p1, f0, f1 = p1 + per * dx[i], f0 + dv, f1 + dv * x[i]
+        if deep:
+            g0 += mass * (surface[i] - rest[i] + level + 0.5 * depth)
+    return r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0
+
+
+@njit
+def moments(tables, basin, y, rates, first):
+    """Sums over cells, in axes of the basin: moments 1, x, y, xx, xy, yy of mass [kg ..] and of its weight along the
+    normal; of the rate of mass x, y, xx, xy, yy; momentum along x and y and its moment about z, and rates of these.
+    """
+    plane, n, o, per_area = tables.plane, basin["n"], basin["y"], mass_per(tables, basin)
+    m = sx = sy = xx = xy = yy = lever = 0.0
+    dx = dy = dxx = dxy = dyy = 0.0
+    qx = qy = turn = fx = fy = spin = 0.0
+    nx, places = basin["nx"], int(plane[basin["frame"] + PLACES])
+    level, deep = plane[basin["frame"] + LEVEL], basin["deep"] == 1
+    surface, rows, wide = int(plane[basin["frame"] + SURFACE]), basin["ny"] if nx > 0 else n, nx if nx > 0 else 1
+    for row in range(rows):
+        z, at = plane[places + (nx if nx > 0 else n) + row], row * wide
+        a, b, x = o + at, first + at, places + (0 if nx > 0 else row)
+        r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0 = row_sums(
+            deep, per_area, level, plane[x : x + wide], plane[basin["area"] + at :], plane[basin["plan"] + at :],
+            plane[surface + at :], y[a : a + wide], y[a + n :], y[a + 2 * n :], rates[b:], rates[b + n :],
+            rates[b + 2 * n :],
+        )  # fmt: skip
+        m, sx, sy, lever = m + r0, sx + r1, sy + r0 * z, lever + g0
+        xx, xy, yy = xx + r2, xy + r1 * z, yy + r0 * z * z
+        dx, dy, dxx, dxy, dyy = dx + d1, dy + d0 * z, dxx + d2, dxy + d1 * z, dyy + d0 * z * z
+        qx, qy, turn = qx + p0, qy + v0, turn + v1 - p0 * z
+        fx, fy, spin = fx + p1, fy + f0, spin + f1 - p1 * z
+    return m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin
+
+
+@njit
+def load_body(tables, basin, b, y, rates, first, out):
+    """Force and torque of what is in a basin on its body with joints held, and its moments along the normal."""
+    m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = moments(
+        tables, basin, y, rates, first
+    )
+    plane, at = tables.plane, basin["frame"]
+    gx, gy, gz = plane[at + GX], plane[at + GY], -plane[at + GN]
+    wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
+    ax, ay, az = plane[at + AX], plane[at + AY], plane[at + AZ]
+    # force: M G - W' x S - W x (W x S + S' + Q) - Q'
+    px, py, pz = qx + dx - wz * sy, qy + dy + wz * sx, wx * sy - wy * sx
+    hx = m * gx + az * sy - (wy * pz - wz * py) - fx
+    hy = m * gy - az * sx - (wz * px - wx * pz) - fy
+    hz = m * gz - (ax * sy - ay * sx) - (wx * py - wy * px)
+    # torque: S x G + lever n x g - I W' - I' W - H' - W x (I W + H)
+    lx, ly, lz = yy * wx - xy * wy, xx * wy - xy * wx, (xx + yy) * wz + turn
+    tx = sy * gz - lever * plane[at + DOWN + 1] - (yy * ax - xy * ay) - (dyy * wx - dxy * wy) - (wy * lz - wz * ly)
+    ty = -sx * gz + lever * plane[at + DOWN] - (xx * ay - xy * ax) - (dxx * wy - dxy * wx) - (wz * lx - wx * lz)
+    tz = sx * gy - sy * gx - (xx + yy) * az - (dxx + dyy) * wz - spin - (wx * ly - wy * lx)
+    body, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    rx, ry, rz = arm_of(tables, basin, out)
+    put(out, tank + MOMENTS, m, sx, sy)
+    put(out, tank + MOMENTS + 3, xx, xy, yy)
+    for k in range(3):
+        put(out, tank + EAST + 3 * k, *turned(out, body + ATTITUDE, plane[at + TURN + k : at + TURN + 9 : 3], 0))
+    put(out, tank + ARM_OF, out[body + ARM] + rx, out[body + ARM + 1] + ry, out[body + ARM + 2] + rz)
+    put(out, tank + LOAD, hx, hy, hz)
+    put(out, tank + LOAD + 3, tx, ty, tz)
+    add_force(out, body, rx, ry, rz, *back(out, tank + EAST, hx, hy, hz))
+    add_torque(out, body, *back(out, tank + EAST, tx, ty, tz))
+
+
+@njit(forceinline=True)
+def beyond(out, i, j):
+    """The vector at i less that at j."""
+    return out[i] - out[j], out[i + 1] - out[j + 1], out[i + 2] - out[j + 2]
+
+
+@njit
+def yielded(tables, basin, out):
+    """Accelerations of a basin's origin and of its turning beyond those with joints held, in axes of the world."""
+    row = row_of(tables, basin["body"])
+    rx, ry, rz = arm_of(tables, basin, out)
+    wx, wy, wz = beyond(out, row + TURNING, row + SPIN_BIAS)
+    ax, ay, az = beyond(out, row + ACCELERATION, row + BIAS)
+    return ax + wy * rz - wz * ry, ay + wz * rx - wx * rz, az + wx * ry - wy * rx, wx, wy, wz
