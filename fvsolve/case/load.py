@@ -119,7 +119,8 @@ class _Reader:
         for name, node in parts["nodes"].items():
             if isinstance(node, Body):
                 kinds["nodes"][name] = bodies.Riding(node)
-            kinds["nodes"] |= {f"{name}.{point}": BodyPoint for point in getattr(node, "points", {})}
+        for name, node in self.group("nodes").items():  # of those at fault too
+            kinds["nodes"] |= dict.fromkeys(check.points_of(name, node), BodyPoint)
         for name, kind in [*kinds["nodes"].items()]:
             if name in self.frozen:
                 kinds["nodes"][name] = basins.Pool({}, self.frozen[name])
