@@ -136,6 +136,13 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
 
 
+def heads(asked: dict[tuple, Any], gravity: float) -> Found:
+    """Faults of probes of heads where nothing weighs, by their keys."""
+    for keys, probe in asked.items() if gravity == 0.0 else ():
+        if probe is not None and probe.quantity == "head":
+            yield keys, f"{probe.text}: there is no head where gravity is 0; wanted pressure"
+
+
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
     """Faults of claims at a time outside the run."""
     for text, claim in expect.items():

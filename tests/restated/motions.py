@@ -19,7 +19,9 @@ def part(probe: str) -> tuple[str, str, str]:
     """(part, vector, axis) of a probe that is one along an axis of the world; the vector is "-" of any other."""
     name, _, what = probe.rpartition(".")
     found = (what[:-1], what[-1:])
-    return (name, *found) if found[1] in "xyz" and found[0] in (*AXIAL, *POLAR) and "@" not in what else (probe, "-", "")
+    return (
+        (name, *found) if found[1] in "xyz" and found[0] in (*AXIAL, *POLAR) and "@" not in what else (probe, "-", "")
+    )
 
 
 def otherwise(case: dict) -> dict:
@@ -276,7 +278,10 @@ def split(case: dict, name: str) -> dict:
     other, whole = copy.deepcopy(case), case["nodes"][name]
     inertia = np.array(whole["inertia"])
     inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
-    centre, turn = np.array(whole.get("centre_of_mass", [0.0, 0.0, 0.0])), Rotation.from_euler("ZYX", [0.5, -0.3, 0.8]).as_matrix()
+    centre, turn = (
+        np.array(whole.get("centre_of_mass", [0.0, 0.0, 0.0])),
+        Rotation.from_euler("ZYX", [0.5, -0.3, 0.8]).as_matrix(),
+    )
     at = np.array([0.2, -0.1, 0.3])
     other["nodes"][name] |= {"mass": whole["mass"] / 3.0, "inertia": (inertia / 3.0).tolist()}
     other["nodes"][f"{name}-rest"] = {

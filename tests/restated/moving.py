@@ -69,10 +69,24 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
                    "rotational_stiffness": 1.5, "rotational_damping": 0.05},
     }  # fmt: skip
     probes = seen("arm.eye", "slider.tip", "wrist.grip", "plate.edge", "kite.nose", "kite")
-    probes += [f"{one}.{what}{axis}" for one in ("arm", "kite", "wrist") for what in ("w", "angular_momentum_") for axis in "xyz"]
+    probes += [
+        f"{one}.{what}{axis}"
+        for one in ("arm", "kite", "wrist")
+        for what in ("w", "angular_momentum_")
+        for axis in "xyz"
+    ]
     probes += [f"arm.joint_f{axis}" for axis in "xyz"] + [f"base.joint_t{axis}" for axis in "xyz"]
-    probes += ["lift.force", "lift.A.pressure", "lift.B.pressure", "string.force", "rubber.torque", "rope.force", "arm.rate",
-               "slider.rate", "kite.kinetic_energy"]
+    probes += [
+        "lift.force",
+        "lift.A.pressure",
+        "lift.B.pressure",
+        "string.force",
+        "rubber.torque",
+        "rope.force",
+        "arm.rate",
+        "slider.rate",
+        "kite.kinetic_energy",
+    ]
     made = bodies(nodes, END, probes, links, 1 / 32, **stepped(method, 2e-3))
     made["fluid"] = dict(LAWS[law])
     return made | more
@@ -80,7 +94,12 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
 
 def loop(method: str = "rk4", **more) -> dict:
     """A parallelogram of three bars in a plane aslant, closed by a pin, on a spring."""
-    bar = {"mass": 2.0, "inertia": [1 / 6, 1 / 6, 0.01], "centre_of_mass": [0, 0, -0.5], "points": {"end": [0, 0, -1.0]}}
+    bar = {
+        "mass": 2.0,
+        "inertia": [1 / 6, 1 / 6, 0.01],
+        "centre_of_mass": [0, 0, -0.5],
+        "points": {"end": [0, 0, -1.0]},
+    }
     aslant = {"attitude": {"roll": 0.3, "yaw": 0.5}}
     nodes = {
         "world": {"type": "frame", "points": {"hook": [0.5, 0.4, -2.0]}},
@@ -95,7 +114,13 @@ def loop(method: str = "rk4", **more) -> dict:
         "loop": {"type": "pin", "from": "two.end", "to": "coupler.end", "axis": [0, 1, 0]},
         "pull": {"type": "spring", "from": "world.hook", "to": "coupler.mid", "stiffness": 80.0},
     }
-    probes = seen("coupler.mid", "two.end") + ["one.angle", "two.rate", "loop.force", "pull.force", *(f"one.joint_f{axis}" for axis in "xyz")]
+    probes = seen("coupler.mid", "two.end") + [
+        "one.angle",
+        "two.rate",
+        "loop.force",
+        "pull.force",
+        *(f"one.joint_f{axis}" for axis in "xyz"),
+    ]
     return bodies(nodes, END, probes, links, 1 / 32, **stepped(method, 4e-3)) | more
 
 
@@ -117,7 +142,10 @@ def piston(method: str = "rk4", law: str = "", by: str = "mass", **more) -> dict
     if by == "body":
         lid = body(400.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "rate": 0.1}, points={"eye": [0, 0, 0]})
         ground, end = {"type": "frame", "points": {"far": [1.0, 0, 0]}}, {"from": "lid.eye", "to": "ground.far"}
-    links = {"spring": {"type": "spring", **end, "stiffness": 2e4, "preload": rest}, "brake": {"type": "damper", **end, "damping": 50.0}}
+    links = {
+        "spring": {"type": "spring", **end, "stiffness": 2e4, "preload": rest},
+        "brake": {"type": "damper", **end, "damping": 50.0},
+    }
     probes = ["b.lid.force", "b.lid.power", "b.lid.travel", "b.depth@0.3,0.2" if not law else "b.pressure@0.3,0.2"]
     step = {"": 8e-3, "linear": 4e-4, "log": 4e-4, "table": 2e-5, "mixture": 1e-4}[law]
     made = scene({"b": pool, "lid": lid, "ground": ground}, links, 16 * step, stepped(method, step), probes, 2 * step)
@@ -132,7 +160,15 @@ def flume(method: str = "rk4", **more) -> dict:
             "start": {"level": "1 + 0.03 * cos(2 * x)"}}  # fmt: skip
     links = {"tap": {"type": "valve", "from": "b.gate", "to": "t", "area": 0.02}}
     nodes = {"b": pool, "t": {"type": "tank", "area": 0.3, "level": 0.9}}
-    probes = ["b.paddle.force", "b.paddle.power", "b.paddle.travel", "b.depth@0.3,0.2", "b.u@0.9,0.1", "tap.flow", "t.level"]
+    probes = [
+        "b.paddle.force",
+        "b.paddle.power",
+        "b.paddle.travel",
+        "b.depth@0.3,0.2",
+        "b.u@0.9,0.1",
+        "tap.flow",
+        "t.level",
+    ]
     return scene(nodes, links, END, stepped(method, 8e-3), probes, 1 / 32) | more
 
 
@@ -159,7 +195,11 @@ def rocking(method: str = "rk4", sloshing: str = "cells", **more) -> dict:
     )  # fmt: skip
     pool = {"type": "basin", "on": "hull", "at": [-0.5, -0.4, -0.9], "size": [1.0, 0.8], "cells": [6, 5], "level": 0.25,
             "sloshing": sloshing}  # fmt: skip
-    nodes = {"hull": hull, "b": pool, "world": {"type": "frame", "points": {"right": [0, 1.5, -1.0], "left": [0, -1.5, -1.0]}}}
+    nodes = {
+        "hull": hull,
+        "b": pool,
+        "world": {"type": "frame", "points": {"right": [0, 1.5, -1.0], "left": [0, -1.5, -1.0]}},
+    }
     links = {side: {"type": "spring", "from": f"world.{side}", "to": f"hull.{side}", "stiffness": 900.0, "preload": 0.0}
              for side in ("right", "left")}  # fmt: skip
     probes = seen("hull.right") + [f"hull.w{axis}" for axis in "xyz"]
@@ -176,7 +216,14 @@ def u_tube(method: str = "rk4", free: bool = True, **more) -> dict:
         "port": {"type": "tank", "on": "hull", "at": [0, 4, -1.5], "area": 1.2, "level": 0.8},
         "starboard": {"type": "tank", "on": "hull", "at": [0, -4, -1.5], "area": 1.2, "level": 0.8},
     }  # fmt: skip
-    duct = {"type": "rigid-column", "from": "port", "to": "starboard", "length": 8.0, "diameter": 0.6, "minor_loss": 1.0}
+    duct = {
+        "type": "rigid-column",
+        "from": "port",
+        "to": "starboard",
+        "length": 8.0,
+        "diameter": 0.6,
+        "minor_loss": 1.0,
+    }
     probes = ["duct.flow", "port.level", "starboard.level", "hull.angle", "hull.ay"]
     return scene(nodes, {"duct": duct}, 10 * END, stepped(method, 0.05), probes, 1 / 8) | more
 
