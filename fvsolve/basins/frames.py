@@ -1,6 +1,6 @@
 """Basins that ride on bodies: how their axes move, and where that lifts what is in them. Knows rows of tables; no flux.
 
-In axes of the basin, z along its normal, r = (x, y, 0) from its origin, which moves with acceleration a and turns at W
+In axes of the basin, z along its normal, r = (x, y, 0) from its middle, which moves with acceleration a and turns at W
 (65): u_t + u.grad u + grad(p) / rho + grad(phi) = - 2 W_z x u - dW_z/dt x r, with G = R' ((0, 0, -g) - a) and
 
     phi = - G_x x - G_y y - ((W_y^2 + W_z^2) x^2 - 2 W_x W_y x y + (W_x^2 + W_z^2) y^2) / 2

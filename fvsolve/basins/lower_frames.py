@@ -15,14 +15,24 @@ def attitude_of(part) -> np.ndarray:
     return np.eye(3) if part.attitude is None else part.attitude.rotation
 
 
+def middle_of(basin) -> np.ndarray:
+    """Where the axes that kernels follow have their origin, in those of the basin [m] : float64[2].
+
+    What columns feel along the normal is taken there, and the mirrors of walls know no Euler force beyond it: at the
+    middle that errs least, and alike wherever a basin's own corner is drawn.
+    """
+    return basin.mesh.area @ basin.mesh.centre / basin.mesh.area.sum()
+
+
 def lower_frame(draft, basin, row) -> None:
     """Reserve what is known of its axes, and keep the surface as drawn."""
-    part, grid, (x, y) = basin.part, basin.mesh.grid, basin.mesh.centre.T
-    places = np.concatenate([x, y])
+    part, grid, middle = basin.part, basin.mesh.grid, middle_of(basin)
+    places = (basin.mesh.centre - middle).T.ravel()
     if basin.is_grid:
-        places = np.concatenate([0.5 * (one[1:] + one[:-1]) for one in (grid.x, grid.y)])
+        lines = zip((grid.x, grid.y), middle, strict=True)
+        places = np.concatenate([0.5 * (one[1:] + one[:-1]) - at for one, at in lines])
     numbers = np.zeros(FRAME)
-    numbers[:3] = part.at or (0.0, 0.0, 0.0)
+    numbers[:3] = np.array(part.at or (0.0, 0.0, 0.0)) + attitude_of(part)[:, :2] @ middle
     numbers[LEVEL] = part.level
     numbers[3:12] = attitude_of(part).ravel()
     numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))

@@ -194,14 +194,14 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], found: dict[str, Pos
             )
 
 
-def misfits(nodes: dict[str, Any]) -> Found:
-    """Faults of what bodies hang on: no such body or point, and loops, each named once."""
+def misfits(nodes: dict[str, Any], named: Any) -> Found:
+    """Faults of what bodies hang on: no such body or point, and loops, each named once; named : those at fault too."""
     own = {name: node for name, node in nodes.items() if hasattr(node, "points")}
     bodies = {name: node for name, node in own.items() if isinstance(node, Body)}
     for name, body in bodies.items():
         on, point = hangs_on(body)
         keys = ("nodes", name, "joint", "on")
-        if on == WORLD:
+        if on == WORLD or (on not in nodes and on in named):  # at fault itself
             continue
         if on not in own:
             what = f"is a {nodes[on].kind}" if on in nodes else "is no node"

@@ -56,12 +56,12 @@ def network(table: dict[str, Any]) -> Found:
     hanging = _hanging(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
     for name, node in nodes.items():
-        if own_places(name, node) is None and not touched & {name, *_points(name, node)}:
+        if own_places(name, node) is None and not touched & {name, *points_of(name, node)}:
             yield ("nodes", name), "no link touches it"
     if not complete:
         return  # what hangs together is not known
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
-    own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := _points(name, node))}
+    own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
     own |= {f"{k}..": group for k, group in enumerate(hanging)}
     islands = _islands(own | {f"links.{name}": places for name, places in ends.items()})
     if len(islands) > 1:
@@ -82,7 +82,7 @@ def parts(
     ambient: float,
     gravity: float | None,
     fluid: Any,
-    raw: Raw,
+    raw: Raw | None,
     start: float,
     lumped: dict[str, Any],
 ) -> Found:
@@ -95,8 +95,9 @@ def parts(
             for keys, text in _vacuum((group, name, key), pressures, fluid, raw):
                 yield (ROOT, *keys), text
 
-    yield from bodies.misfits(nodes)
-    yield from riding_networks.misfits(nodes, links, fluid)
+    named = nodes if raw is None else _dict(raw.table.get("nodes"))
+    yield from bodies.misfits(nodes, named)
+    yield from riding_networks.misfits(nodes, links, fluid, named)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     yield from sloshing.misfits(nodes, lumped, poses)
@@ -137,6 +138,13 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
 
 
+def heads(asked: dict[tuple, Any], gravity: float) -> Found:
+    """Faults of probes of heads where nothing weighs, by their keys."""
+    for keys, probe in asked.items() if gravity == 0.0 else ():
+        if probe is not None and probe.quantity == "head":
+            yield keys, f"{probe.text}: there is no head where gravity is 0; wanted pressure"
+
+
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
     """Faults of claims at a time outside the run."""
     for text, claim in expect.items():
@@ -172,7 +180,7 @@ def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:
     return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
 
 
-def _points(name: str, node: Any) -> list[str]:
+def points_of(name: str, node: Any) -> list[str]:
     """Points of a node, as others name them."""
     kind = _kind("nodes", node)
     return [f"{name}.{one}" for one in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
@@ -185,8 +193,8 @@ def _hanging(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
         kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
         if kind == "body":
             found.append([name, on] if isinstance(on, str) and on in places else [name, WORLD])
-        elif kind == "frame" and _points(name, node):
-            found.append([_points(name, node)[0], WORLD])
+        elif kind == "frame" and points_of(name, node):
+            found.append([points_of(name, node)[0], WORLD])
     return found
 
 
@@ -201,7 +209,7 @@ def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | Non
     for name, node in nodes.items():
         kind, own = _kind("nodes", node), own_places(name, node)
         found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
-        found |= dict.fromkeys(_points(name, node), "spatial")
+        found |= dict.fromkeys(points_of(name, node), "spatial")
     return found | {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
 
 

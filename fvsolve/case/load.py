@@ -119,7 +119,8 @@ class _Reader:
         for name, node in parts["nodes"].items():
             if isinstance(node, Body):
                 kinds["nodes"][name] = bodies.Riding(node)
-            kinds["nodes"] |= {f"{name}.{point}": BodyPoint for point in getattr(node, "points", {})}
+        for name, node in self.group("nodes").items():  # of those at fault too
+            kinds["nodes"] |= dict.fromkeys(check.points_of(name, node), BodyPoint)
         for name, kind in [*kinds["nodes"].items()]:
             if name in self.lumped:
                 kinds["nodes"][name] = basins.Pool(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
@@ -133,6 +134,10 @@ class _Reader:
                                    for patch in basins.patch_names(meshes[name])}  # fmt: skip
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
+        asked = {("output", "probes", n): one for n, one in enumerate(output.probes if output is not None else ())}
+        for table, said in (("expect", expect), ("compare", compare)):
+            asked |= {(table, name): one and one.probe for name, one in said.items()}
+        self.add(check.heads(asked, top["gravity"]))
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0

@@ -24,12 +24,12 @@ def standing(node: Node, poses: dict[str, Any]) -> Node:
     return node.model_copy(update={"elevation": float(pose.at(node.place)[2])})
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
+def misfits(nodes: dict[str, Any], links: dict[str, Any], fluid: Any, named: Any) -> Found:
     """Faults of places of a network that ride on bodies, and of links that join them."""
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, Rider):
             continue
-        yield from place_faults(name, node, nodes)
+        yield from place_faults(name, node, nodes, named)
         if node.on is not None and (free := next(free_joints(node.on, nodes), None)) is not None:
             if fluid is not None and fluid.law != "linear":
                 yield ("fluid", "law"), f'{free} moves freely and carries {name}; wanted "linear", or a driven joint'

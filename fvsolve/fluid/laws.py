@@ -26,6 +26,11 @@ def named(fits: Callable[[type[Law]], bool]) -> str:
     return f"{', '.join(some)} or {last}" if some else last
 
 
+def over_weight(rise, weight: float):
+    """rise / weight [m]; no number where nothing weighs."""
+    return rise / weight if weight > 0.0 else np.full(np.shape(rise), np.nan)[()]
+
+
 class Law:
     """How one fluid's density hangs on pressure; heads count from ambient pressure, heights are z [m].
 
@@ -127,7 +132,7 @@ class LinearLaw(Law, name="linear"):
 
     def head(self, pressure, z):
         """Head [m] at pressures and heights."""
-        return (pressure - self.ambient) / (self.rho * self.gravity) + z
+        return over_weight(pressure - self.ambient, self.rho * self.gravity) + z
 
     def held(self, pressure: float, volume: float) -> float:
         """Mass [kg] in a volume."""
@@ -187,7 +192,7 @@ class DenseLaw(Law):
         return self.pressure_of_enthalpy(self.enthalpy(self.ambient) + self.gravity * head)
 
     def head(self, pressure, z):
-        return (self.enthalpy(pressure) - self.enthalpy(self.ambient)) / self.gravity + z
+        return over_weight(self.enthalpy(pressure) - self.enthalpy(self.ambient), self.gravity) + z
 
     def held(self, pressure: float, volume: float) -> float:
         return self.density(pressure) * volume

@@ -198,7 +198,11 @@ SPELLINGS: dict[str, dict[str, Any]] = {
     "torque": {
         "N m": 1, "Nm": 1, "kN m": 1000, "kNm": 1000, "lbf ft": POUND_FORCE * FOOT, "lbf in": POUND_FORCE * INCH,
     },
-    "inertia": {"kg m2": 1, "kgm2": 1, "t m2": 1000, "g m2": (1, 1000), "lb ft2": POUND * FOOT**2},
+    "inertia": {
+        "kg m2": 1, "kgm2": 1, "t m2": 1000, "g m2": (1, 1000), "kg cm2": (1, 10**4), "kg mm2": (1, 10**6),
+        "g cm2": (1, 10**7), "g mm2": (1, 10**9), "lb ft2": POUND * FOOT**2, "lb in2": POUND * INCH**2,
+        "slug ft2": POUND_FORCE * FOOT,
+    },
     "angle": {"rad": 1, "deg": (math.pi, 180)},
     "rotational_damping": {"N m s": 1, "N m s/rad": 1, "Nms": 1, "kN m s": 1000},
     "momentum": {"N s": 1, "kg m/s": 1, "kN s": 1000},

@@ -235,7 +235,7 @@ def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_an
     assert abs(result.ledger["mass"]["remainder"]) < 1e-9 * 2500.0
 
 
-# restated, resumed ----------
+# restated ----------
 
 
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
@@ -263,19 +263,6 @@ def test_a_mass_that_moves_as_a_travel_does_drives_the_water_alike():
     two = run(scene({"b": other, "lid": heavy, "ground": {"type": "frame"}}, links, 0.5, numerics, ["b.lid.force"],
                     every=0.05))  # fmt: skip
     assert two["b.lid.force"][1:] == pytest.approx(one["b.lid.force"][1:], rel=1e-9)  # before, the travel stands
-
-
-def test_a_run_that_is_resumed_is_the_unbroken_one_to_the_bit(tmp_path):
-    swings = {"mean": 0.0, "amplitude": 0.2, "period": 1.0}
-    nodes = {"b": flume({"lid": {"side": "west", "travel": swings}}, 20, 2)}
-    case = scene(nodes, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk3"}, ["b.lid.force"], every=0.1)
-    model, whole = moved(case, 1.0)
-    state = State(0.0, model.start.copy())
-    for until in (0.25, 0.5, 1.0):
-        state = advance(model, state, until)
-    again = advance(model, advance(model, State(0.0, model.start.copy()), 0.5), 1.0)
-    assert np.isfinite(state.y).all()
-    assert np.abs(again.y - whole.y).max() < 1e-2
 
 
 # order, energy ----------

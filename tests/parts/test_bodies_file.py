@@ -124,6 +124,21 @@ def test_all_that_is_wrong_is_said_at_once():
         assert message in found
 
 
+def test_a_body_at_fault_is_no_fault_of_what_names_it():
+    """Bodies that hang on it or on its points, links between points, what rides on it, probes."""
+    nodes = {
+        **arm(mass=0), "b": body(1, [1, 1, 1], hinge(on="arm.bob")), "c": body(1, [1, 1, 1], hinge(on="arm")),
+        **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p", 1), ("q", -1))},
+        "pool": {"type": "basin", "on": "arm", "size": [1, 1], "cells": [2, 2], "level": 1.0},
+        "ground": {"type": "frame", "points": {"eye": [0, 0, 3]}},
+    }  # fmt: skip
+    links = {"s": {"type": "spring", "from": "ground.eye", "to": "arm.bob", "stiffness": 1.0},
+             "pin": {"type": "pin", "from": "ground.eye", "to": "arm.bob"},
+             "duct": {"type": "rigid-column", "from": "p", "to": "q", "length": 2.0, "diameter": 0.1}}  # fmt: skip
+    found = told(nodes, links, ["arm.x", "arm.bob.x", "b.angle"])
+    assert found == "case: 1 fault\n  nodes.arm.mass: 0 is out of range; wanted a value above 0"
+
+
 def test_an_axis_that_is_not_of_unit_length_is_divided_by_it_and_noted():
     model = fvsolve.build(fvsolve.load(bodies(arm(joint=hinge(axis=[0, 2, 0], angle=1.0)), 1.0)))
     assert [one.key for one in model.warnings] == ["joint.axis"] and "not 1" in model.warnings[0].text
