@@ -131,6 +131,14 @@ class Case(Shown):
         """The same with bodies and masses where the file has them, from which bushings and preloads count."""
         return replace(self, found={}) if self.found else self
 
+    @property
+    def settles(self) -> bool:
+        """Whether bodies and masses are to stand where their forces balance, and some may have to be moved for it."""
+        joints = [node.joint for node in self.nodes.values() if node.kind == "body"]
+        free = any(joint.kind != "fixed" and joint.driven is None for joint in joints)
+        free = free or any(node.kind == "mass" for node in self.nodes.values())
+        return free and self.numerics.initial == "equilibrium"
+
     def ahead(self, first: str, second: str) -> float:
         """How far place `second` lies ahead of `first` at the start [m]; of points their distance."""
         return bodies.ahead(self.loaded, self.poses, first, second)

@@ -44,6 +44,8 @@ def classed(case: Case, keys: tuple[Any, ...]) -> str:
     if found == COUNTED:
         found = SHAPE if any(one["type"] == "pipe" and "cells" not in one for one in links) else PROFILE
     unsteady = any(one.get("friction", {}).get("model") == "unsteady" for one in links)
+    if found == VALUE and case.settles and keys[0] in ("nodes", "links"):
+        found = PROFILE  # it may be what balances
     return SHAPE if found == PROFILE and unsteady else found  # its terms are chosen by the start
 
 

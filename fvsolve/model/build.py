@@ -26,7 +26,7 @@ from fvsolve.model.ranges import flow_notices
 from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
-from fvsolve.model.settling import settled, wanted
+from fvsolve.model.settling import settled
 
 
 def build(case) -> Model:
@@ -38,7 +38,7 @@ def build(case) -> Model:
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; wanted what load() gives")
     told = []
-    if wanted(case):  # of equilibrium
+    if case.settles:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
         case, told = settled(case, drafted(steady))
     draft = drafted(case)

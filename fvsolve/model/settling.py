@@ -62,13 +62,6 @@ class Found:
         return mine[0] < 0.5 * its[0] or mine[1] < 0.5 * its[1]
 
 
-def wanted(case) -> bool:
-    """Whether a case asks for a balance that bodies or masses may have to be moved for."""
-    joints = [node.joint for node in case.nodes.values() if node.kind == "body"]
-    free = any(joint.kind != "fixed" and joint.driven is None for joint in joints)
-    return case.numerics.initial == "equilibrium" and (free or any(one.kind == "mass" for one in case.nodes.values()))
-
-
 def settled(case, draft) -> tuple[Any, list[Notice]]:
     """(the case with bodies and masses where forces balance, what is to be known of that), by a draft of its steady
     start.

@@ -243,7 +243,7 @@ class Result(Shown):
 
         if field is None:
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
-            basins = [node for node in self.case.nodes.values() if node.kind == "basin"]
+            basins = [self.case.nodes[name] for name in self.case.meshes]
             bodies = any(node.kind == "body" for node in self.case.nodes.values())
             field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
             field = "speed" if bodies and not pipes and not basins else field

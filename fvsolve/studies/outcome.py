@@ -132,7 +132,6 @@ def without_basins(case, study: str, riding: bool = False) -> None:
 
     riding : whether those that ride on bodies will do
     """
-    basins = {name: node for name, node in case.nodes.items() if node.kind == "basin"}
-    names = [name for name, node in basins.items() if not (riding and node.on)]
+    names = [name for name in case.meshes if not (riding and case.nodes[name].on)]
     if names:
         raise FvsolveError(f"{study} does not know basins yet; the case has {listing(names)}")

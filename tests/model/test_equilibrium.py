@@ -13,7 +13,9 @@ from truth.scenes import AMBIENT, GRAVITY, RHO, reservoir, valve
 from truth.trees import body
 
 import fvsolve
+from fvsolve.case.changes import changes
 from fvsolve.errors import CaseError
+from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}
 
@@ -469,6 +471,21 @@ def test_a_body_comes_to_rest_on_a_stop():
 
 
 # studies --------------------------------------------------------------------------------------------------------
+
+
+def test_a_key_that_a_run_takes_as_a_value_changes_the_start_where_it_is_part_of_a_balance():
+    rubber = {"type": "bushing", "from": "wall.a", "to": "beam", "rotational_stiffness": 40.0}
+    case, key = balanced({"wall": CEILING, "beam": hinged()}, {"rubber": rubber}), "links.rubber.rotational_stiffness"
+    assert changes(fvsolve.load(case), key) == "profile"
+    assert changes(fvsolve.load(case, {"numerics.initial": "steady"}), key) == "value"
+
+
+@pytest.mark.parametrize("sloshing", ["frozen", "modes"])
+def test_studies_refine_no_cells_of_water_that_has_none(sloshing):
+    nodes = hull(sloshing, 0.3)
+    nodes["hull"]["joint"]["rate"] = 0.2
+    found = order(fvsolve.load(bodies(nodes, 0.5, ["hull.angle"], None, 0.1, method="rk4", step=0.05)), levels=3)
+    assert found.rows
 
 
 def test_a_hull_swings_about_the_heel_that_was_found():

@@ -25,8 +25,8 @@ def pipes(case) -> dict[str, Pipe]:
 
 
 def basins(case) -> dict[str, Basin]:
-    """The basins of a case, by name."""
-    return {name: node for name, node in case.nodes.items() if isinstance(node, Basin)}
+    """The basins of a case that have cells, by name."""
+    return {name: case.nodes[name] for name in case.meshes}
 
 
 def counts(case) -> Counts:
