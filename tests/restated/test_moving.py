@@ -8,7 +8,7 @@ what a step of these scenes errs by. Implicit methods, whose Newton iterates, ag
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop"
 SWINGS = (".rate", ".angle", ".travel")
 
 
-@lru_cache(maxsize=None)
+@cache
 def first(name: str, method: str) -> Told:
     """A scene as it is drawn."""
     shown = told(SCENES[name](method))
