@@ -70,8 +70,8 @@ class BasinRows:
         """What counts as a small deviation of each quantity."""
         return [1.0] * len(self.quantities)
 
-    def start(self) -> np.ndarray:
-        """Deviations at the start : float64[quantities, n]."""
+    def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
+        """Deviations at the start : float64[quantities, n]; attitude : R of its body, where that is another."""
         return np.zeros((len(self.quantities), self.n))
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:

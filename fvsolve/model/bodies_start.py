@@ -21,7 +21,7 @@ def refuse_weightless(draft, at: Statics) -> None:
         own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
         least = ALIKE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
         for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
-            left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** 2
+            left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** -2.0
             if np.isnan(left) and len(draft.ride_table):
                 text = "fluid in tall tanks, whose own flow has no inertia here, outweighs what carries it"
                 wanted = "wanted wider tanks, a heavier body, or a driven joint"

@@ -230,11 +230,11 @@ def unstable(at: Places, found: Found) -> list[Notice]:
 
 
 def owner(at: Places, unknown: int) -> str:
-    """The body or mass that an unknown is of."""
+    """The body or mass that an unknown is of; of a mode the basin, whose name it begins with."""
     if unknown >= at.freedoms:
         return at.draft.mass_names[at.free[unknown - at.freedoms]]
     ends = at.bodies["freedom"] + at.bodies["freedoms"]
-    return at.draft.body_names[int(np.searchsorted(ends, unknown, side="right"))]
+    return at.draft.body_names[int(np.searchsorted(ends, unknown, side="right"))].partition(" ")[0]
 
 
 def report(at: Places, found: Found) -> None:

@@ -40,10 +40,12 @@ def plain(shapes: rec.Written) -> rec.Written:
 
 
 def factored(model, y: np.ndarray) -> np.ndarray:
-    """What `accelerate` leaves in `scratch` at a state: the factor of the mass matrix from 8 freedoms on."""
+    """What `accelerate` leaves in `scratch` at a state, L of the mass matrix L'L from 8 freedoms on."""
     written, t = plain(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
     call_pieces((*model.tables, *written), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
+    diagonal = 8 * len(model.tables.freedoms) + model.tables.freedoms["row"] + model.tables.freedoms["depth"]
+    written.scratch[diagonal] = 1.0 / written.scratch[diagonal]
     return written.scratch
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pytest import approx
 from scipy.optimize import brentq, minimize, root
+from scipy.spatial.transform import Rotation
 from truth.bodies import Crane, bodies, pendulum
 from truth.scenes import AMBIENT, GRAVITY, RHO, reservoir, valve
 from truth.trees import body
@@ -171,6 +172,31 @@ def test_a_plate_with_its_mass_off_centre_tilts_as_well():
     truth = root(left, [0.0, -0.1, 0.03], tol=1e-13).x
     pitch = math.atan2(-pose.attitude[2, 0], pose.attitude[0, 0])
     assert [pose.place[0], pose.place[2], pitch] == approx(truth, abs=1e-11)
+
+
+@pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (3.0, 0.2, 0.1), (-1.5, 1.2, 0.4)])
+def test_a_plate_on_four_ropes_hangs_at_its_least_potential_from_wherever_it_is_let_go(attitude):
+    """m g z_c + sum of k (l - l0)^2 / 2, whose slope in all six directions SciPy finds to be none."""
+    corners = np.array([[1, 0.5, 0], [1, -0.5, 0], [-1, 0.5, 0], [-1, -0.5, 0]])
+    hooks = np.array([[1.3, 0.7, 3.0], [1.1, -0.9, 2.6], [-1.2, 0.6, 3.2], [-0.9, -0.7, 2.8]])
+    centre = np.array([0.2, 0.1, -0.05])
+    said = dict(zip(("roll", "pitch", "yaw"), attitude, strict=True))
+    plate = body(25.0, [3, 7, 9], {"kind": "free", "at": [0, 0, 0.5], "attitude": said},
+                 centre_of_mass=centre.tolist(), points={f"c{i}": p.tolist() for i, p in enumerate(corners)})  # fmt: skip
+    top = {"type": "frame", "points": {f"c{i}": p.tolist() for i, p in enumerate(hooks)}}
+    links = {f"r{i}": spring(f"top.c{i}", f"plate.c{i}", 300.0, 2.0) for i in range(4)}
+    model = built(balanced({"plate": plate, "top": top}, links))
+
+    def potential(q):
+        turn = Rotation.from_rotvec(q[3:])
+        ropes = np.linalg.norm(turn.apply(corners) + q[:3] - hooks, axis=1)
+        return 25.0 * GRAVITY * (q[:3] + turn.apply(centre))[2] + 150.0 * np.sum((ropes - 2.0) ** 2)
+
+    pose = model.case.poses["plate"]
+    found = np.concatenate([pose.place, Rotation.from_matrix(pose.attitude).as_rotvec()])
+    truth = minimize(potential, [0.0, 0.0, 0.5, 0.0, 0.0, 0.0], method="BFGS", options={"gtol": 1e-7})
+    assert found == approx(truth.x, abs=1e-6)
+    assert potential(found) <= truth.fun * (1.0 + 1e-14)
 
 
 def test_a_boom_stands_where_the_pressures_of_its_cylinder_carry_it():

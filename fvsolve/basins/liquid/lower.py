@@ -112,7 +112,7 @@ class LiquidRows(BasinRows):
             return self.waves.deviation(self.part.pressure + pressure)
         return self.density * np.expm1(pressure / (self.density * self.speed**2))
 
-    def start(self) -> np.ndarray:
+    def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
         if given is not None:
             found[0] = self.deviation(self.formula(given.pressure))
