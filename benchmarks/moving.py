@@ -1,14 +1,17 @@
-"""What motion costs: right-hand sides of water between walls that move, and on bodies, beside those that stand still.
+"""What motion costs: right-hand sides of basins between walls that move, and on bodies, beside those that stand still.
 
 `python benchmarks/moving.py [--quick]` prints nanoseconds a cell, best of several, all in one process and in turn, and
-their ratios; the goal is 1.2. Everything is compiled before.
+their ratios; the goal is 1.2. Water on grids, then on triangles, then liquids. Everything is compiled before.
 """
 
 import argparse
+import tempfile
+from pathlib import Path
 from time import process_time
 
 import numpy as np
 from measure import machine
+from planes_scenes import of_triangles
 
 from fvsolve.case import load
 from fvsolve.model import build
@@ -31,12 +34,20 @@ SCENES = {  # keys of the basin, joint of its body
 }
 
 
-def model_of(cells: int, keys: dict, joint: dict | None, scheme: str):
-    """The model of a square basin with a hump of water."""
-    start = {"level": "1 + 0.1*exp(-(x - 5)^2 - (y - 5)^2)"}
-    basin = {"type": "basin", "size": [10, 10], "cells": [cells, cells], "level": 1.0, "start": start, **keys}
+HUMP = "exp(-(x - 5)^2 - (y - 5)^2)"
+LIQUID = {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "start": {"pressure": f"1e6 + 1e5*{HUMP}"}}
+SURFACE = {"level": 1.0, "start": {"level": f"1 + 0.1*{HUMP}"}}
+
+
+def model_of(cells: int, keys: dict, joint: dict | None, scheme: str, law: str = "", shape: dict | None = None):
+    """The model of a square basin with a hump of water, or of a liquid under a law; shape : of a mesh for a grid."""
+    shape = shape or {"size": [10, 10], "cells": [cells, cells]}
+    basin = {"type": "basin"} | shape | (LIQUID if law else SURFACE) | keys
     nodes = {"basin": basin} | ({"body": {**BODY, "joint": joint}} if joint else {})
-    return build(load({"schema": 1, "fluid": WATER, "nodes": nodes, "numerics": {"end": 1.0, "scheme": scheme}}))
+    numerics = {"end": 1.0, "scheme": scheme}
+    return build(
+        load({"schema": 1, "fluid": WATER | ({"law": law} if law else {}), "nodes": nodes, "numerics": numerics})
+    )
 
 
 def evaluation(model, y: np.ndarray, handle):
@@ -59,26 +70,42 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer sizes and repeats")
     quick = parser.parse_args().quick
     print(machine("numpy", "numba"))
+    rounds = 7 if quick else 25
     for scheme in ("muscl",) if quick else ("upwind", "muscl", "upwind5"):
         for cells in (128,) if quick else (64, 256):
-            table(scheme, cells, 7 if quick else 25)
+            table(f"{scheme}, {cells} x {cells} cells", SCENES, rounds, cells, scheme)
+    still = {name: SCENES[name] for name in ("stands still", "wall along x moves", "wall along y moves")}
+    for law in ("linear", "log"):
+        for cells in (128,) if quick else (64, 256):
+            table(f"liquid, {law}, {cells} x {cells} cells", still, rounds, cells, "muscl", law)
+    with tempfile.TemporaryDirectory() as folder:
+        for kind, law in (("water", ""), ("liquid, log", "log")):
+            shape = of_triangles(Path(folder) / "square.msh", 128)
+            wall = {"travel": SWING}
+            near = {"patches": {"lid": wall | {"zone": 2.0}}}
+            scenes = {
+                "stands still": ({}, None),
+                "wall moves": ({"patches": {"lid": wall}}, None),
+                "in a zone": (near, None),
+            }
+            table(f"{kind}, triangles", scenes, rounds, 128, "muscl", law, shape)
 
 
-def table(scheme: str, cells: int, rounds: int) -> None:
-    """One scheme on one size."""
-    timers = {}
-    for name, (keys, joint) in SCENES.items():
-        model = model_of(cells, keys, joint, scheme)
+def table(title: str, scenes: dict, rounds: int, *what) -> None:
+    """Scenes of one kind, `what` as `model_of` has it beside keys and joint."""
+    timers, (cells, *more) = {}, what
+    for name, (keys, joint) in scenes.items():
+        model = model_of(cells, keys, joint, *more)
         with model.slate() as slate:
             timers[name] = evaluation(model, initial_state(model).y, slate.handle), slate, model
-    times = max(1, 60000 // cells**2 + 1) * 4
-    best = dict.fromkeys(timers, np.inf)
+    many = next(iter(timers.values()))[2].all_cells
+    times, best = max(1, 60000 // many + 1) * 4, dict.fromkeys(timers, np.inf)
     for _ in range(rounds):  # in turn, so that one noisy moment spoils no single scene
         for name, (spent, *_) in timers.items():
             best[name] = min(best[name], spent(times) / times)
-    print(f"\n{scheme}, {cells} x {cells} cells       ns a cell    ratio (goal {GOAL:g})")
+    print(f"\n{title:24s}       ns a cell    ratio (goal {GOAL:g})")
     for name, one in best.items():
-        print(f"{name:24s}{1e9 * one / cells**2:14.2f}{one / best['stands still']:9.2f}")
+        print(f"{name:24s}{1e9 * one / many:14.2f}{one / best['stands still']:9.2f}")
 
 
 if __name__ == "__main__":

@@ -39,7 +39,8 @@ def square(cells: int, size: float = SIZE) -> dict:
 
 
 def of_triangles(path: Path, cells: int) -> dict:
-    """About cells^2 triangles of the same square, written to a file if there is none."""
+    """About cells^2 triangles of the same square, written to a file if there is none; `lid` is its eastern side."""
     if not path.exists():
-        write_msh(path, *triangles((SIZE, SIZE), SIZE / cells * np.sqrt(4.0 / np.sqrt(3.0))), {})
+        east = {"lid": lambda x, y: np.abs(x - SIZE) < 1e-6}
+        write_msh(path, *triangles((SIZE, SIZE), SIZE / cells * np.sqrt(4.0 / np.sqrt(3.0))), east)
     return {"mesh": {"file": str(path)}}

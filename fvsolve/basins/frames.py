@@ -14,10 +14,10 @@ origin, and vertical momentum: both of the order of angle times depth over wave 
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, cross, row_of, turned
-from fvsolve.kernels.records import NO_WEIGHT, STATUS, WHERE
+from fvsolve.kernels.records import GN, NO_WEIGHT, STATUS, WHERE
 
 AT, TURN = 0, 3  # numbers of a frame: place of its origin and attitude, by rows, in axes of its body,
-GX, GY, GN, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n, W and dW/dt in its own axes,
+GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n, W and dW/dt in its own axes,
 SURFACE = 21  # offsets in `plane`: of surfaces as drawn, and of places of columns and rows, or of cells
 PLACES = 22
 DOWN = 23  # gravity alone, three numbers

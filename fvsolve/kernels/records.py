@@ -406,6 +406,7 @@ LAYOUT = np.dtype(
     align=True,
 )
 BODY_OUT = 45  # numbers of each body in `out`
+GN = 14  # place of g_n among the numbers of a frame, see `basins.frames`
 TANK_OUT = 24  # numbers in `out` of what rides on bodies, see `mechanism.tanks`
 RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # first entries of `out`
 OUT_HEAD = 4

@@ -7,9 +7,8 @@ from fvsolve.basins.patches import book_open, wanted
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import NO_DRAG, RATE
+from fvsolve.kernels.records import GN, NO_DRAG, RATE
 
-GN = 14  # place of g_n among the numbers of a frame
 MINE = kind_of(__package__)
 
 

@@ -61,21 +61,26 @@ def feel_full(push, n, thrust, mass, along):
 @inner
 def sweep(c, rho, speeds, step, forward, backward):
     """Waves at faces become fluxes of mass and momentum less what faces sweep; speeds : every `step`-th of a face."""
+    per = 1.0 / c
     for i in range(forward.size):
         m, x, speed = forward[i] - backward[i], forward[i] + backward[i], speeds[step * i]
-        forward[i], backward[i] = m - speed * (rho + x / c), c * x - speed * m
+        forward[i], backward[i] = m - speed * (rho + per * x), c * x - speed * m
 
 
 @inner
 def settle_row(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
     """Rates of a row of cells from faces i and i + 1; what is along faces stays while these pass."""
-    m, p, v = mass[1:], push[1:], speeds[1:]
-    last = rate_r.size - 1
+    m, p, last = mass[1:], push[1:], rate_r.size - 1
     for i in range(rate_r.size):
-        before, after = along[max(i - 1, 0)] + along[i], along[i] + along[min(i + 1, last)]
         rate_r[i] = k[i] * (mass[i] - m[i])
         rate_m[i] = k[i] * (push[i] - p[i])
-        rate_t[i] = 0.5 * k[i] * (v[i] * after - speeds[i] * before)
+    beyond, wide, before, after, swept = along[1:], k[1:], speeds[1:], speeds[2:], rate_t[1:]
+    for i in range(last - 1):  # cells that have one on either side
+        low, high = along[i] + beyond[i], beyond[i] + along[i + 2]
+        swept[i] = 0.5 * wide[i] * (after[i] * high - before[i] * low)
+    for i in (0, last):
+        low, high = along[max(i - 1, 0)] + along[i], along[i] + along[min(i + 1, last)]
+        rate_t[i] = 0.5 * k[i] * (speeds[i + 1] * high - speeds[i] * low)
 
 
 @inner

@@ -8,7 +8,7 @@ acts on both bodies where `to` is, so that what it does is force times d(rho)/dt
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.accounts import bushing_rows, bushing_stores
+from fvsolve.kernels.accounts import OF_BUSHING, bushing_rows, bushing_stores
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.lines import point_at, spin_of
 from fvsolve.kernels.mechanism.matrix import ease, lean_at, lean_by
@@ -144,7 +144,7 @@ def power_bushings(t, y, dydt, out, handle, power):
         power[at] += bushing["turn_stiffness"] * (a * p + b * q + c * s)
         power[at + 1] = bushing["damping"] * (u * u + v * v + w * w)
         power[at + 1] += bushing["turn_damping"] * (p * p + q * q + s * s)
-        at += 2
+        at += OF_BUSHING
 
 
 @njit
