@@ -23,7 +23,8 @@ from restated import motions
 from restated.moving import METHODS, SCENES, machine, piston, stepped
 from restated.telling import Told, alike, told
 
-pytestmark = pytest.mark.filterwarnings("error")  # of numbers that are none
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
 ROUND, BY_DIFFERENCES = 1e-9, 1e-4
 EACH = ["rk4", "gauss-4", "rodas-4"]
 IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop", "carried", "rocking", "frozen",

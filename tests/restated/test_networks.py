@@ -19,7 +19,8 @@ from restated import sayings
 from restated.drawing import drawn, networks
 from restated.telling import alike, told
 
-pytestmark = pytest.mark.filterwarnings("error")  # of numbers that are none
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
 ROUND = 1e-9
 
 

@@ -14,7 +14,8 @@ from restated.drawing import drawn, numerics, probes
 from restated.parts import LINKS, NODES
 from restated.telling import told
 
-pytestmark = pytest.mark.filterwarnings("error")  # of numbers that are none
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
 ELSEWHERE = {
     "basin", "mass", "frame", "body", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque",
     "pin", "bushing",
