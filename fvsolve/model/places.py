@@ -17,7 +17,7 @@ BESIDE = 1e-6  # [rad], [m] by which differences are taken
 CHAMBERS, PUSHES = "kernels.masses: chambers", "kernels.masses: finish_masses"
 
 
-class Places(Statics):
+class Displaced(Statics):
     """What freedoms and masses feel where they may be put; y : states, deviations from the start."""
 
     def __init__(self, draft) -> None:

@@ -8,22 +8,16 @@ in balance by what is stated stays there, stable or not; so does what nothing pu
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fvsolve import attitude
 from fvsolve.case import check
-from fvsolve.case.bodies import coordinate
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
+from fvsolve.model.balance import nodes_at, owner, report, told, upset
 from fvsolve.model.bodies_start import ALIKE, CLOSE, SNAP
-from fvsolve.model.places import Places
-from fvsolve.parts.attitude import Attitude
-from fvsolve.parts.schedule import constant
+from fvsolve.model.places import Displaced
 
 TRIES, HALVINGS = 100, 30
 TURN = 0.3  # [rad] of a step at most
@@ -32,7 +26,6 @@ FLAT = 1e-9  # share of the greatest eigenvalue below which nothing holds
 LEAST = 1e-6  # share of it that a step reckons with at least, and that is unstable
 NEAR = 1e-4  # share of its forces by which a place that is stated may be out of balance and is meant
 SHUT = 1e-14  # [m] by which constraints may be open, likewise
-STIR = 1e-15  # of a length or an angle: less is where it stood
 OVER = 0.5  # share of the force along a step that may turn round by it
 
 
@@ -68,13 +61,15 @@ def settled(case, draft) -> tuple[Any, list[Notice]]:
 
     CaseError where none is found. What moves at rates that are stated stays where it is.
     """
-    at = Places(draft)
+    at = Displaced(draft)
     if not at.size or at.moving():
         return case, []
     found = search(at)
-    if not found.share <= CLOSE:
-        report(at, found)
-        draft.check()
+    if found.share <= CLOSE:
+        upset(at, found.y)
+    else:
+        report(at, found.force, found.scale)
+    draft.check()
     case = replace(case, found=nodes_at(at, found.y))
     nodes, about = case.nodes | case.found, (case.ambient_pressure, case.gravity, None, None)
     for keys, text in check.parts(nodes, case.links, *about, at.t, case.lumped):
@@ -83,7 +78,7 @@ def settled(case, draft) -> tuple[Any, list[Notice]]:
     return case, [*told(case), *unstable(at, found)]
 
 
-def look(at: Places, y: np.ndarray) -> Found:
+def look(at: Displaced, y: np.ndarray) -> Found:
     """A place, constraints pushing so that least is left of forces."""
     rows, gaps, sizes = at.rows(y), at.gaps(y), np.zeros(at.count)
     at.hold(sizes)
@@ -96,7 +91,7 @@ def look(at: Places, y: np.ndarray) -> Found:
     return Found(y, force, at.scale(), rows, gaps)
 
 
-def search(at: Places) -> Found:
+def search(at: Displaced) -> Found:
     """The place in balance that steps lead to, or the nearest to one that they came."""
     here = best = look(at, at.y.copy())
     meant = here.share <= NEAR
@@ -113,7 +108,7 @@ def search(at: Places) -> Found:
     return best
 
 
-def step(at: Places, here: Found, meant: bool) -> tuple[np.ndarray, np.ndarray]:
+def step(at: Displaced, here: Found, meant: bool) -> tuple[np.ndarray, np.ndarray]:
     """(step of all unknowns, what of it constraints leave free); one that is `meant` to the nearest of any kind."""
     easy, free, close = ways(at, here)
     k = easy @ at.stiffness(here.y) @ easy.T
@@ -129,7 +124,7 @@ def step(at: Places, here: Found, meant: bool) -> tuple[np.ndarray, np.ndarray]:
     return easy.T @ (close + free @ way), easy.T @ free @ way
 
 
-def ways(at: Places, here: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ways(at: Displaced, here: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(M^(-1/2) as L^-1 of M = L L', in its coordinates what constraints leave free, and the way to meet them)."""
     easy = np.linalg.inv(np.linalg.cholesky(at.mass(here.y)))
     if not at.count:
@@ -140,7 +135,7 @@ def ways(at: Places, here: Found) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return easy, all_ways[rank:].T, -np.linalg.pinv(rows, rcond=ALIKE) @ here.gaps
 
 
-def along(at: Places, here: Found, way: np.ndarray, free: np.ndarray) -> np.ndarray:
+def along(at: Displaced, here: Found, way: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Where a step leads, cut so that bodies turn little in it and the force along it does not turn round."""
     turns = at.turns()
     far = [np.max(np.abs(way[turns]), initial=0.0) / TURN,
@@ -153,70 +148,7 @@ def along(at: Places, here: Found, way: np.ndarray, free: np.ndarray) -> np.ndar
     return at.moved(here.y, share * way)
 
 
-def nodes_at(at: Places, y: np.ndarray) -> dict[str, Any]:
-    """Bodies and masses that stand elsewhere now, as a case would say them."""
-    draft, found = at.draft, {}
-    for name, row in zip(draft.body_names, at.bodies, strict=True):
-        body, first = draft.case.nodes.get(name), int(row["y"])
-        many = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
-        if body is not None and np.any(np.abs(y[first : first + many]) > STIR * (1.0 + np.abs(row["start"][:many]))):
-            change = joint_at(body.joint, row, row["start"][:many] + y[first : first + many])
-            found[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
-    far = np.abs(y[at.masses["y"][at.free]])
-    for i in at.free[far > STIR * (1.0 + np.abs(at.masses["position"][at.free]))]:
-        name, place = draft.mass_names[i], at.masses["position"][i] + y[at.masses["y"][i]]
-        found[name] = draft.case.nodes[name].model_copy(update={"initial_position": float(place)})
-    return found
-
-
-def joint_at(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
-    """What a joint says where its coordinates are q."""
-    if row["joint"] in (rec.REVOLUTE, rec.PRISMATIC):
-        return {"angle" if row["joint"] == rec.REVOLUTE else "travel": constant(float(q[0]))}
-    turn = attitude.of_euler_parameters(q[-4:])
-    if row["joint"] == rec.FREE:
-        place = q[:3] - turn @ row["centre"]
-        return {"at": tuple(place.tolist()), "attitude": said(turn)}
-    return {"attitude": said(joint.attitude.rotation @ turn)}
-
-
-def said(turn: np.ndarray) -> Attitude:
-    """An attitude by Euler parameters."""
-    return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(turn).tolist())})
-
-
-def told(case) -> Iterator[Notice]:
-    """Where what is stated elsewhere stands now."""
-    for name, node in case.found.items():
-        before = case.nodes[name]
-        if node.kind == "mass":
-            yield moved(name, "initial_position", before.initial_position, node.initial_position, "m")
-        elif node.joint.kind in ("revolute", "prismatic"):
-            key, unit = ("angle", "rad") if node.joint.kind == "revolute" else ("travel", "m")
-            yield moved(name, f"joint.{key}", *(coordinate(one.joint, 0.0) for one in (before, node)), unit)
-        else:
-            yield from stands(name, node.joint.kind == "free", case.poses[name], case.stated.poses[name])
-
-
-def stands(name: str, free: bool, pose, before) -> Iterator[Notice]:
-    """Where a ball joint's body, or a free one, stands, and how far from where it is stated to."""
-    turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
-    roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
-    text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
-    yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.attitude", turn, 0.0)
-    if free:
-        (x, y, z), far = pose.place, float(np.linalg.norm(pose.place - before.place))
-        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] m, {far:.4g} m from what is stated"
-        yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0)
-
-
-def moved(name: str, key: str, before: float, now: float, unit: str) -> Notice:
-    """That one number is another than stated."""
-    text = f"{name}: forces balance at {key.removeprefix('joint.')} {now:.6g} {unit}, stated {before:.6g} {unit}"
-    return Notice("start", f"nodes.{name}", text, key, now, before)
-
-
-def unstable(at: Places, found: Found) -> list[Notice]:
+def unstable(at: Displaced, found: Found) -> list[Notice]:
     """That a balance is not stable: what stands in it leaves it by itself, shut chambers holding as springs."""
     easy, free, _ = ways(at, found)
     own = free.T @ easy @ (at.stiffness(found.y) + at.oil(found.y)) @ easy.T @ free
@@ -227,23 +159,3 @@ def unstable(at: Places, found: Found) -> list[Notice]:
     text = (f"{name}: its forces balance, but not stably: what moves it a little grows by e in {1.0 / rate:.3g} s; "
             "state another place, or hold it")  # fmt: skip
     return [Notice("start", f"nodes.{name}", text, "stability", rate, 0.0)]
-
-
-def owner(at: Places, unknown: int) -> str:
-    """The body or mass that an unknown is of; of a mode the basin, whose name it begins with."""
-    if unknown >= at.freedoms:
-        return at.draft.mass_names[at.free[unknown - at.freedoms]]
-    ends = at.bodies["freedom"] + at.bodies["freedoms"]
-    return at.draft.body_names[int(np.searchsorted(ends, unknown, side="right"))].partition(" ")[0]
-
-
-def report(at: Places, found: Found) -> None:
-    """A fault for every body and mass that is left with a force where the search ended."""
-    turns, far = at.turns(), np.abs(found.force) > CLOSE * found.scale
-    for name in dict.fromkeys(owner(at, int(i)) for i in np.flatnonzero(far)):
-        own = np.array([owner(at, i) == name for i in range(at.size)])
-        left = [f"{np.linalg.norm(found.force[own & part]):.4g} {unit}"
-                for part, unit in ((~turns, "N"), (turns, "N m")) if np.any(far & own & part)]  # fmt: skip
-        text = f'"equilibrium" finds no place where its forces balance: {" and ".join(left)} are left'
-        remedy = 'hold it by a spring, a cylinder or a driven joint, state a place nearer to balance, or use "steady"'
-        at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")

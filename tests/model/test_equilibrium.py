@@ -181,8 +181,9 @@ def test_a_plate_on_four_ropes_hangs_at_its_least_potential_from_wherever_it_is_
     hooks = np.array([[1.3, 0.7, 3.0], [1.1, -0.9, 2.6], [-1.2, 0.6, 3.2], [-0.9, -0.7, 2.8]])
     centre = np.array([0.2, 0.1, -0.05])
     said = dict(zip(("roll", "pitch", "yaw"), attitude, strict=True))
+    points = {f"c{i}": p.tolist() for i, p in enumerate(corners)}
     plate = body(25.0, [3, 7, 9], {"kind": "free", "at": [0, 0, 0.5], "attitude": said},
-                 centre_of_mass=centre.tolist(), points={f"c{i}": p.tolist() for i, p in enumerate(corners)})  # fmt: skip
+                 centre_of_mass=centre.tolist(), points=points)  # fmt: skip
     top = {"type": "frame", "points": {f"c{i}": p.tolist() for i, p in enumerate(hooks)}}
     links = {f"r{i}": spring(f"top.c{i}", f"plate.c{i}", 300.0, 2.0) for i in range(4)}
     model = built(balanced({"plate": plate, "top": top}, links))
@@ -446,6 +447,13 @@ def test_what_nothing_holds_finds_no_balance_and_is_named():
         built(balanced({"stone": body(2.0, [1, 1, 1], {"kind": "free"})}))
     assert 'nodes.stone: "equilibrium" finds no place where its forces balance: 19.61 N are left' in str(told.value)
     assert "hold it by a spring" in str(told.value)
+
+
+def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
+    nodes = hull("cells", 0.1, 0.2, 10)
+    nodes["hull"]["centre_of_mass"] = [0, 0, 0.8]
+    with pytest.raises(CaseError, match="nodes.pool: where forces balance it is turned over"):
+        built(balanced(nodes))
 
 
 def test_what_moves_at_a_stated_rate_is_a_fault_as_before():

@@ -1,0 +1,115 @@
+"""What is said of a balance: bodies and masses as a case has them there, notices, faults. Knows words; seeks none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve import attitude
+from fvsolve.case.bodies import coordinate
+from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
+from fvsolve.model.bodies_start import CLOSE
+from fvsolve.model.places import Displaced
+from fvsolve.parts.attitude import Attitude
+from fvsolve.parts.schedule import constant
+
+STIR = 1e-15  # of a length or an angle: less is where it stood
+
+
+def nodes_at(at: Displaced, y: np.ndarray) -> dict[str, Any]:
+    """Bodies and masses that stand elsewhere now, as a case would say them."""
+    draft, found = at.draft, {}
+    for name, row in zip(draft.body_names, at.bodies, strict=True):
+        body, first = draft.case.nodes.get(name), int(row["y"])
+        many = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
+        if body is not None and np.any(np.abs(y[first : first + many]) > STIR * (1.0 + np.abs(row["start"][:many]))):
+            change = joint_at(body.joint, row, row["start"][:many] + y[first : first + many])
+            found[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
+    far = np.abs(y[at.masses["y"][at.free]])
+    for i in at.free[far > STIR * (1.0 + np.abs(at.masses["position"][at.free]))]:
+        name, place = draft.mass_names[i], at.masses["position"][i] + y[at.masses["y"][i]]
+        found[name] = draft.case.nodes[name].model_copy(update={"initial_position": float(place)})
+    return found
+
+
+def joint_at(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
+    """What a joint says where its coordinates are q."""
+    if row["joint"] in (rec.REVOLUTE, rec.PRISMATIC):
+        return {"angle" if row["joint"] == rec.REVOLUTE else "travel": constant(float(q[0]))}
+    turn = attitude.of_euler_parameters(q[-4:])
+    if row["joint"] == rec.FREE:
+        place = q[:3] - turn @ row["centre"]
+        return {"at": tuple(place.tolist()), "attitude": said(turn)}
+    return {"attitude": said(joint.attitude.rotation @ turn)}
+
+
+def said(turn: np.ndarray) -> Attitude:
+    """An attitude by Euler parameters."""
+    return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(turn).tolist())})
+
+
+def told(case) -> Iterator[Notice]:
+    """Where what is stated elsewhere stands now."""
+    for name, node in case.found.items():
+        before = case.nodes[name]
+        if node.kind == "mass":
+            yield moved(name, "initial_position", before.initial_position, node.initial_position, "m")
+        elif node.joint.kind in ("revolute", "prismatic"):
+            key, unit = ("angle", "rad") if node.joint.kind == "revolute" else ("travel", "m")
+            yield moved(name, f"joint.{key}", *(coordinate(one.joint, 0.0) for one in (before, node)), unit)
+        else:
+            yield from stands(name, node.joint.kind == "free", case.poses[name], case.stated.poses[name])
+
+
+def stands(name: str, free: bool, pose, before) -> Iterator[Notice]:
+    """Where a ball joint's body, or a free one, stands, and how far from where it is stated to."""
+    turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
+    roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
+    text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
+    yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.attitude", turn, 0.0)
+    if free:
+        (x, y, z), far = pose.place, float(np.linalg.norm(pose.place - before.place))
+        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] m, {far:.4g} m from what is stated"
+        yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0)
+
+
+def moved(name: str, key: str, before: float, now: float, unit: str) -> Notice:
+    """That one number is another than stated."""
+    text = f"{name}: forces balance at {key.removeprefix('joint.')} {now:.6g} {unit}, stated {before:.6g} {unit}"
+    return Notice("start", f"nodes.{name}", text, key, now, before)
+
+
+def owner(at: Displaced, unknown: int) -> str:
+    """The body or mass that an unknown is of; of a mode the basin, whose name it begins with."""
+    if unknown >= at.freedoms:
+        return at.draft.mass_names[at.free[unknown - at.freedoms]]
+    ends = at.bodies["freedom"] + at.bodies["freedoms"]
+    return at.draft.body_names[int(np.searchsorted(ends, unknown, side="right"))].partition(" ")[0]
+
+
+def report(at: Displaced, force: np.ndarray, scale: np.ndarray) -> None:
+    """A fault for every body and mass that is left with a force where the search ended."""
+    turns, far = at.turns(), np.abs(force) > CLOSE * scale
+    for name in dict.fromkeys(owner(at, int(i)) for i in np.flatnonzero(far)):
+        own = np.array([owner(at, i) == name for i in range(at.size)])
+        left = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
+                for part, unit in ((~turns, "N"), (turns, "N m")) if np.any(far & own & part)]  # fmt: skip
+        text = f'"equilibrium" finds no place where its forces balance: {" and ".join(left)} are left'
+        remedy = 'hold it by a spring, a cylinder or a driven joint, state a place nearer to balance, or use "steady"'
+        at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")
+
+
+def upset(at: Displaced, y: np.ndarray) -> None:
+    """A fault of what rides on bodies where nothing presses on what is in it."""
+    at.out[rec.STATUS] = rec.OK
+    at.force(y)
+    if at.out[rec.STATUS] != rec.NO_WEIGHT:
+        return
+    where = int(at.out[rec.WHERE]) - len(at.draft.basins)
+    name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
+    text = "where forces balance it is turned over, and what is in it would run out"
+    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another place, or use "steady"')
