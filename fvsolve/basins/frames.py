@@ -22,9 +22,8 @@ SURFACE = 21  # offsets in `plane`: of surfaces as drawn, and of places of colum
 PLACES = 22
 DOWN = 23  # gravity alone, three numbers
 LEVEL = 26  # of the water at rest above its origin [m]
-PHI = 27  # of a liquid, offset in `work`: see `liquid.riding`
-SIDES = 28  # of a liquid, offset in `plane`: of places of lines along x and y, or of sides of cells
-FRAME = 29  # numbers
+PHI = 27  # of a liquid: offset in `work` of what is raised; behind PLACES those of lines follow, or of sides of cells
+FRAME = 28  # numbers
 
 
 @njit
@@ -88,24 +87,39 @@ def tilt_bed(plane, basin):
 @njit
 def lift(plane, basin, per, values, lifted):
     """Values of all cells with per phi."""
-    n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
-    fx, fy, xx, xy, yy = potential(plane, basin["frame"], per)
+    n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
+    phi = potential(plane, basin["frame"], per)
     if nx == 0:
-        for i in range(n):
-            x, y = plane[places + i], plane[places + n + i]
-            lifted[i] = values[i] + (x * (fx + xx * x + xy * y) + y * (fy + yy * y))
-        return
-    for j in range(basin["ny"]):
-        y = plane[places + nx + j]
-        a, z = j * nx, (j + 1) * nx
-        lift_row(plane[places : places + nx], values[a:z], fx + xy * y, xx, y * (fy + yy * y), lifted[a:z])
+        lift_points(phi, plane[at : at + n], plane[at + n : at + 2 * n], values, lifted)
+    else:
+        lift_rows(phi, plane[at : at + nx], plane[at + nx : at + nx + basin["ny"]], values, lifted)
+
+
+@njit
+def lift_points(phi, x, y, values, lifted):
+    """Values, or nothing where these are None, with what `potential` says of points."""
+    fx, fy, xx, xy, yy = phi
+    for i in range(lifted.size):
+        rise = x[i] * (fx + xx * x[i] + xy * y[i]) + y[i] * (fy + yy * y[i])
+        lifted[i] = rise if values is None else values[i] + rise
+
+
+@njit
+def lift_rows(phi, x, y, values, lifted):
+    """The same of a grid, its columns at x and its rows at y."""
+    fx, fy, xx, xy, yy = phi
+    for j in range(y.size):
+        a, z = j * x.size, (j + 1) * x.size
+        base = None if values is None else values[a:z]
+        lift_row(x, base, fx + xy * y[j], xx, y[j] * (fy + yy * y[j]), lifted[a:z])
 
 
 @inner
 def lift_row(x, values, slope, xx, even, lifted):
-    """`lift` of a row of cells of a grid."""
+    """The same of a row."""
     for i in range(lifted.size):
-        lifted[i] = values[i] + (x[i] * (slope + xx * x[i]) + even)
+        rise = x[i] * (slope + xx * x[i]) + even
+        lifted[i] = rise if values is None else values[i] + rise
 
 
 @njit(forceinline=True)

@@ -197,6 +197,11 @@ class BasinRows:
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
 
+    @property
+    def opening(self) -> str | None:
+        """A patch that something passes which no link brings, if there is one."""
+        return next((patch for patch in self.part.patches if self.opens(patch)), None)
+
     def own(self, y: np.ndarray) -> np.ndarray:
         """Its part of the states of a model : float64[quantities, n]."""
         at = int(self.row["y"])

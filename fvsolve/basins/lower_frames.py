@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.frames import FRAME, LEVEL, PLACES, SURFACE
-from fvsolve.case.riding import free_joints
+from fvsolve.basins.faces import BLOCK, blocks
+from fvsolve.basins.frames import FRAME, LEVEL, PHI, PLACES, SURFACE
+from fvsolve.case.riding import carriers, free_joints
 
 ENOUGH = 200  # halvings
 
@@ -27,19 +28,49 @@ def middle_of(basin) -> np.ndarray:
 def lower_frame(draft, basin, row) -> None:
     """Reserve what is known of its axes, and keep the surface as drawn."""
     part, grid, middle = basin.part, basin.mesh.grid, middle_of(basin)
-    places = (basin.mesh.centre - middle).T.ravel()
+    places = [*(basin.mesh.centre - middle).T]
     if basin.is_grid:
-        lines = zip((grid.x, grid.y), middle, strict=True)
-        places = np.concatenate([0.5 * (one[1:] + one[:-1]) - at for one, at in lines])
+        lines = [one - at for one, at in zip((grid.x, grid.y), middle, strict=True)]
+        places = [0.5 * (one[1:] + one[:-1]) for one in lines]
     numbers = np.zeros(FRAME)
     numbers[:3] = np.array(part.at or (0.0, 0.0, 0.0)) + attitude_of(part)[:, :2] @ middle
-    numbers[LEVEL] = part.level
     numbers[3:12] = attitude_of(part).ravel()
-    numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
-    numbers[PLACES] = draft.to_plane(places)
+    if basin.deep:
+        numbers[LEVEL] = part.level
+        numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
+    else:
+        sides = lines if basin.is_grid else places_of_sides(basin) - middle[:, None]
+        many = sides[0].size * grid.ny + grid.nx * sides[1].size if basin.is_grid else sides[0].size
+        numbers[PHI], places = draft.to_work(basin.n + many), [*places, *sides]
+    numbers[PLACES] = draft.to_plane(np.concatenate(places))
     row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
-    joints = any(probe.quantity.startswith("joint_") for probe in draft.case.probes)
-    row["heavy"] = joints or any(free_joints(part.on, draft.case.nodes))
+    joints = asked_of_joints(draft.case)
+    row["heavy"] = any(joints) or any(free_joints(part.on, draft.case.nodes))
+    held = set(carriers(part.on, draft.case.nodes))
+    for k, body in joints:
+        if basin.opening is not None and body in held:
+            text = f"{body} carries {basin.name}, and its joint's force lacks what passes {basin.name}.{basin.opening}"
+            draft.fault(f"output.probes[{k}]", f"{text} yet; wanted none of these, or a wall there")
+
+
+def asked_of_joints(case) -> list[tuple[int, str]]:
+    """(number, body) of probes of what a joint holds."""
+    asked = enumerate(case.probes)
+    return [(k, one.name) for k, one in asked if one.part == "nodes" and one.quantity.startswith("joint_")]
+
+
+def places_of_sides(basin) -> np.ndarray:
+    """Middles of sides of cells in the order of `basins.faces`, alike from both cells : float64[2, sides]."""
+    count = int(blocks(basin.integers) * basin.integers[0] * BLOCK)
+    face = basin.integers[-count:]
+    return basin.mesh.middle[np.where(face >= 0, face, ~face)].T
+
+
+def potential_at_start(basin) -> np.ndarray:
+    """What gravity lifts cells by above their basin's middle, as its body stands at the start [J/kg]."""
+    pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
+    up = (pose.attitude @ attitude_of(basin.part)).T @ np.array([0.0, 0.0, gravity])
+    return (basin.mesh.centre - middle_of(basin)) @ up[:2]
 
 
 def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:

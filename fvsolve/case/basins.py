@@ -69,7 +69,7 @@ class Pool:
 
 def lumped_fields(basin: Basin) -> dict[str, str]:
     """What can be read at points of water without cells: its depth where it swings."""
-    return {"depth": basin.own.fields["depth"]} if basin.sloshing == "modes" and basin.own.rides else {}
+    return {"depth": basin.own.fields["depth"]} if basin.sloshing == "modes" and basin.own.sloshes else {}
 
 
 def mesh_of(basin: Basin, setting: Setting) -> Mesh:

@@ -11,6 +11,7 @@ from fvsolve.case import sloshing
 from fvsolve.case.bodies import hangs_on, poses
 from fvsolve.case.cells import means, samples
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.basin.part import Physics
 from fvsolve.parts.body.part import Body
 from fvsolve.parts.node import Rider
 from fvsolve.units import show
@@ -27,14 +28,18 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
             yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
         return
     if not basin.own.rides:
-        yield (*key, "on"), f'physics {show(basin.physics)} rides on no body yet; wanted "free-surface"'
+        wanted = " or ".join(show(name) for name, one in Physics.kinds.items() if one.rides)
+        yield (*key, "on"), f"physics {show(basin.physics)} rides on no body; wanted {wanted}"
+    if basin.sloshing != "cells" and not basin.own.sloshes:
+        yield (*key, "sloshing"), f'is of a free surface; physics {show(basin.physics)} rides by "cells" alone'
     if any(one.moves for one in basin.patches.values()):
         yield (*key, "on"), "its walls move, and its axes too; wanted one of both"
     free = next(free_joints(basin.on, nodes), None)
     for patch, one in basin.patches.items():
-        if one.boundary == "open" and free is not None and not basin.lumped:
+        opened = "impedance" if one.impedance is not None else "boundary" if one.boundary == "open" else None
+        if opened is not None and free is not None and not basin.lumped:
             text = f"{free} moves freely, and would have to feel what leaves here; wanted a wall, or a driven joint"
-            yield (*key, "patches", patch, "boundary"), text
+            yield (*key, "patches", patch, opened), text
         if f"{name}.{patch}" in joined:
             text = "a link joins here, and the basin rides on a body: between these goes a hose, which there is not yet"
             yield (*key, "patches", patch), text
@@ -65,12 +70,18 @@ def body_faults(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 
 def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
     """Bodies between one and the world whose joints forces move."""
+    for body in carriers(on, nodes):
+        joint = nodes[body].joint
+        if joint.kind != "fixed" and joint.driven is None:
+            yield body
+
+
+def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
+    """A body and those that it hangs on."""
     seen: set[str] = set()
     while isinstance(nodes.get(on), Body) and on not in seen:
         seen.add(on)
-        joint = nodes[on].joint
-        if joint.kind != "fixed" and joint.driven is None:
-            yield on
+        yield on
         on = hangs_on(nodes[on])[0]
 
 

@@ -170,7 +170,7 @@ def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]
     """Faults of basins whose water is to be modes."""
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
-        if basin.sloshing != "modes" or not basin.own.rides:
+        if basin.sloshing != "modes" or not basin.own.sloshes:
             continue
         if outline_of(mesh) is None:
             text = 'modes are known of boxes and of upright cylinders (a mesh of a circle); wanted "cells" or "frozen"'

@@ -35,6 +35,8 @@ class Accounts:
         model, case = slate.model, slate.model.case
         if len(model.tables.rides):
             raise FvsolveError("the energy of networks that ride on bodies is not booked yet")
+        if any(basin.part.on is not None and basin.opening for basin in model.basins):
+            raise FvsolveError("the energy of basins that ride on bodies is not booked where a side is open yet")
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is booked under law = "linear" alone')
         self.power, self.stored = model.functions.energies

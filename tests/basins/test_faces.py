@@ -51,7 +51,7 @@ class Field:
     def liquid(self, law, scheme, y, reflect=NONE, wide=2.0, table=None):
         work, found = np.full(liquid_faces.work_size(self.integers), np.nan), np.full_like(y, np.nan)
         return found, liquid_faces.liquid_rates(
-            law, C, RHO, table, scheme, wide, self.floats, self.integers, reflect, *y, NONE, work, *found, None
+            law, C, RHO, table, scheme, wide, self.floats, self.integers, reflect, *y, NONE, work, *found, None, None
         )
 
     def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=2.0, bounds=FREE):

@@ -180,7 +180,7 @@ FAULTS = {
         {"joint": {"kind": "revolute", "axis": [0, 0, 1]}},
         {"patches": {"gap": {"side": "east", "boundary": "open"}}},
     ),
-    "rides on no body yet": ({}, {"physics": "liquid", "level": None, "pressure": 2e5, "thickness": 0.1}),
+    "rides on no body; wanted": ({}, {"physics": "transport", "level": None, "velocity": {"u": 0.0, "v": 0.0}}),
     "one of both": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
     "unknown key": ({}, {"attitude": {"rol": 0.1}}),
 }

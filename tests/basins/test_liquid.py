@@ -60,7 +60,8 @@ class Box:
         work, found = np.full(kernel.work_size(self.nx, self.ny), np.nan), np.full((3, self.nx * self.ny), np.nan)
         flat = np.ascontiguousarray(state).reshape(3, -1)
         codes = SCHEMES[self.scheme], LIMITERS[self.limiter]
-        rate = kernel.grid_rates(*given, *codes, self.nx, self.ny, kx, ky, reflect, *flat, WALLS, work, *found, None)
+        still = (None, None) if self.log else (None,)
+        rate = kernel.grid_rates(*given, *codes, self.nx, self.ny, kx, ky, reflect, *flat, WALLS, work, *found, *still)
         return found.reshape(state.shape), rate
 
     def run(self, state: np.ndarray, end: float, courant: float = 0.8) -> np.ndarray:

@@ -27,6 +27,7 @@ class FreeSurface(Physics, name="free-surface"):
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     moves: ClassVar[bool] = True
     rides: ClassVar[bool] = True
+    sloshes: ClassVar[bool] = True
     described: ClassVar[str] = "a free surface, whose water has one density"
     steep: ClassVar[bool] = True
 

@@ -27,8 +27,8 @@ from fvsolve.basins.faces import (
     put_sides,
 )
 from fvsolve.basins.liquid.driven import driven
-from fvsolve.basins.liquid.grid_full import log_sum
-from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.basins.liquid.grid_full import log_near, log_sum, raise_row, stiffness
+from fvsolve.basins.liquid.waves import invariant, lowered, state
 from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
 from fvsolve.kernels.records import LAW_LOG, UPWIND
@@ -37,7 +37,8 @@ from fvsolve.kernels.records import LAW_LOG, UPWIND
 _U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
 _PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of what moves: pressure at the side, energy that is lost beside it
-ROWS = 13
+_PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # of what a potential pulls: see `grid_full.stiffness`
+ROWS = 16
 
 
 @njit
@@ -130,23 +131,28 @@ def settle_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
 
 
 @njit
-def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds):
-    """The same, the full momentum flux; u0, v0, c : of the cells, for the step; speeds : of the sides, or None."""
+def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, phi):
+    """The same, the full momentum flux; u0, v0, c : of the cells, for the step; speeds : of the sides, or None.
+
+    phi : None, or a potential at the sides, taken off the waves, which pulls cells by `hold_side`
+    """
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         u = forward - backward
-        through, own = u, u0[i] * nx + v0[i] * ny
+        through, own, x = u, u0[i] * nx + v0[i] * ny, forward + backward
+        if phi is not None:
+            x = lowered(c0, rho, table, x, phi[i])
         if speeds is not None:
             through, own = u - speeds[i], own - speeds[i]
         if table is not None:
-            r, p = state(table, forward + backward)
+            r, p = state(table, x)
             mass = (rho + r) * through
             push = mass * u + p
         else:
-            y = -per * (forward + backward)  # c = c0 (1 + y)
+            y = -per * x  # c = c0 (1 + y)
             mass = rho * through / ((1.0 + y) * (1.0 + y))
             p = -2.0 * bulk * log_sum(y)
             push = mass * u + p
@@ -158,6 +164,23 @@ def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds):
         w[_MASS + i] = mass
         if speeds is not None:
             w[_PUSH + i], w[_LOSS + i] = p, 0.0
+
+
+@njit
+def stiffen(c0, rho, table, r, phi, w):
+    """1 / c^2, rho c^2 and potential of a block of cells."""
+    for i in range(r.size):
+        w[_PER + i], w[_BULK + i] = stiffness(c0, rho, table, r[i])
+        w[_PHI + i] = phi[i]
+
+
+@njit
+def hold_side(phi, geo, w):
+    """What a potential does to a block of cells: less pressures that would hold them at rest, at one side of each."""
+    for i in range(BLOCK):
+        push = geo[_REACH + i] * w[_BULK + i] * log_near(w[_PER + i] * (phi[i] - w[_PHI + i]))
+        w[_RX + i] -= push * geo[_NX + i]
+        w[_RY + i] -= push * geo[_NY + i]
 
 
 @njit
@@ -197,7 +220,7 @@ def work_size(integers):
 @njit
 def liquid_rates(
     law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
-    moves,
+    moves, phi,
 ):  # fmt: skip
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
@@ -211,6 +234,7 @@ def liquid_rates(
     moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: on faces of the
     boundary pressure over that at rest [Pa], then what law linear loses beside them, speed (c^2 r^2 - m^2)
     [kg^2/(m3 s3)], float64[2 b]; and `wide`, see `basins.stretch`
+    phi : None, or under laws of the full momentum flux a potential [J/kg] of cells, filled up, and of sides
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -235,6 +259,8 @@ def liquid_rates(
             while known < need[sided]:
                 i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
                 put_primitives(law, c0, rho, table, r[i:k], mx[i:k], my[i:k], p[o:], u[o:], v[o:], c[o:])
+                if phi is not None and (table is not None or law == LAW_LOG):
+                    raise_row(c0, rho, table, phi[0][i:k], p[o : o + k - i])
                 known += 1
             if not first_order:
                 k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
@@ -249,6 +275,8 @@ def liquid_rates(
             sided += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
+        if phi is not None:
+            stiffen(c0, rho, table, r[first:last], phi[0][first:last], w)
         for k in range(slots):
             slot = j * slots + k
             where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
@@ -265,12 +293,15 @@ def liquid_rates(
             if moves is not None:
                 speeds = moves[0][(4 * j + k) * BLOCK :]
                 if full:
-                    settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, speeds)
+                    settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, speeds, None)
                 else:
                     settle_linear_moving(c0, rho, ps[own:], us[own:], vs[own:], geo, w, speeds)
                 push_walls(edges[i:edge], number[i:edge], reflect, geo, w, moves[1])
             elif full:
-                settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, None)
+                raised = None if phi is None else phi[1][slot * BLOCK :]
+                settle_log(c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, None, raised)
+                if phi is not None:
+                    hold_side(phi[1][slot * BLOCK :], geo, w)
             else:
                 settle_linear(c0, ps[own:], us[own:], vs[own:], geo, w)
             if through.size > 0:

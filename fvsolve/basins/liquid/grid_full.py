@@ -31,7 +31,7 @@ from fvsolve.basins.liquid.grid import (
     side_of,
     value_upwind5,
 )
-from fvsolve.basins.liquid.waves import invariant, state
+from fvsolve.basins.liquid.waves import invariant, lowered, state
 from fvsolve.basins.patches import put_inward
 from fvsolve.basins.stretch import swell_row
 from fvsolve.jit import inner, njit
@@ -77,6 +77,41 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 
 
 @inner
+def raise_row(c0, rho, table, phi, w):
+    """Invariants of a row where a potential is taken off: those of what rests are the same everywhere."""
+    for i in range(w.size):
+        w[i] = lowered(c0, rho, table, w[i], -phi[i])
+
+
+@njit(forceinline=True)
+def log_near(q):
+    """ln(1 + q) where q is small, as of a potential between a cell and its sides over c^2: all but q^9 / 9."""
+    high = 1.0 / 5.0 - q * (1.0 / 6.0 - q * (1.0 / 7.0 - q * (1.0 / 8.0)))
+    return q * (1.0 - q * (1.0 / 2.0 - q * (1.0 / 3.0 - q * (1.0 / 4.0 - q * high))))
+
+
+@njit(forceinline=True)
+def stiffness(c0, rho, table, r):
+    """(1 / c^2, rho c^2) of a cell: where it rests, pressure falls by rho c^2 ln(1 + phi / c^2) over a small height."""
+    if table is None:
+        bulk = rho * c0 * c0
+        return (rho + r) / bulk, bulk
+    c = (rho + r) * invariant(table, r)[1]
+    return 1.0 / (c * c), (rho + r) * c * c
+
+
+@inner
+def hold_row(c0, rho, table, k, step, r, phi, low, high, rate):
+    """What a potential does to a row of cells: less pressures that would hold them at rest, at both of their faces.
+
+    phi, low, high : potential of cells and of faces before and after; k : every `step`-th is that of a cell
+    """
+    for i in range(rate.size):
+        per, bulk = stiffness(c0, rho, table, r[i])
+        rate[i] += k[step * i] * bulk * (log_near(per * (low[i] - phi[i])) - log_near(per * (high[i] - phi[i])))
+
+
+@inner
 def carried_limited(limiter, forward, backward, b, c, d, e, f):
     """`faces_carried` by a limiter."""
     for i in range(f.size):
@@ -107,19 +142,28 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
 
 
 @inner
-def fluxes(c0, rho, table, forward, backward, along, speeds, step):
+def fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
     """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them.
 
     speeds : None, or every `step`-th is that of a face, which sweeps what it passes
+    phi : None, or a potential at the faces, taken off the waves; under law log c^2 is c0^2 (1 + y)^2 + phi there
     """
     if table is not None:
         for i in range(forward.size):
-            r, p = state(table, forward[i] + backward[i])
+            w = forward[i] + backward[i]
+            r, p = state(table, w if phi is None else lowered(c0, rho, table, w, phi[i]))
             u = forward[i] - backward[i]
             mass = (rho + r) * (u if speeds is None else u - speeds[step * i])
             forward[i], backward[i], along[i] = mass, mass * u + p, mass * along[i]
         return
     bulk, per = rho * c0 * c0, 0.5 / c0
+    if phi is not None:
+        for i in range(forward.size):
+            y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]
+            z = y * (2.0 + y) + phi[i] / (c0 * c0)
+            mass = rho * u / (1.0 + z)
+            forward[i], backward[i], along[i] = mass, mass * u - bulk * log_sum(z), mass * along[i]
+        return
     for i in range(forward.size):
         y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]  # c = c0 (1 + y)
         mass = rho * (u if speeds is None else u - speeds[step * i]) / ((1.0 + y) * (1.0 + y))
@@ -162,13 +206,14 @@ def work_size(nx, ny):
 @njit
 def grid_rates(
     c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
-    moves,
+    moves, phi,
 ):  # fmt: skip
     """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
     table : of `waves`, or None for law `log`; small : a velocity too small to mean anything, squared
     The others are those of `liquid.grid_rates`; work : float64[work_size(nx, ny)], where lines move nx + 1 more
+    phi : None, or a potential [J/kg] of cells, of faces between columns and of those between rows
     """
     wide, f, size = nx + 2 * BEYOND, nx + 1, RING * nx
     up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]
@@ -187,6 +232,8 @@ def grid_rates(
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             u, v = aside[at : at + nx], over[BEYOND : nx + BEYOND]
             put_primitives(c0, rho, table, kx, ky[rows], r[a:z], mx[a:z], my[a:z], w, u, v, top)
+            if phi is not None:
+                raise_row(c0, rho, table, phi[0][a:z], w)
             put_waves(0.5, w, v, up[at : at + nx], down[at : at + nx])
             put_waves(0.5, w, u, east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
             if moves is None or moves[0].size == 0:
@@ -210,14 +257,15 @@ def grid_rates(
                 fw[nx] = reflect[ny + rows] * fe[nx]
             if moves is None or moves[0].size == 0:
                 faces_carried(along, limiter, small, fe, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft)
-                fluxes(c0, rho, table, fe, fw, ft, None, 0)
+                over_faces = None if phi is None else phi[1][rows * f : (rows + 1) * f]
+                fluxes(c0, rho, table, fe, fw, ft, None, 0, over_faces)
             else:
                 seen = spare[SPARE : SPARE + f]
                 follow(moves[0], 1, fe, seen)
                 faces_carried(
                     along, limiter, small, seen, fw, over, over[1:], over[2:], over[3:], over[4:], over[5:], ft
                 )
-                fluxes(c0, rho, table, fe, fw, ft, moves[0], 1)
+                fluxes(c0, rho, table, fe, fw, ft, moves[0], 1, None)
                 if to_w == WALLS:
                     feel_full(fw, 1, moves[2][rows:], fe, ft)
                 if to_e == WALLS:
@@ -225,6 +273,10 @@ def grid_rates(
             if through.size > 0:
                 through[rows], through[ny + rows] = fe[0] / ky[rows], -fe[nx] / ky[rows]
             settle_row(kx, fe, fw, ft, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            if phi is not None:
+                at = rows * f
+                low, high = phi[1][at : at + nx], phi[1][at + 1 : at + f]
+                hold_row(c0, rho, table, kx, 1, r[a:z], phi[0][a:z], low, high, rate_x[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
             if (side == 0 and j > 0) or (side == 1 and j != max(ny - BEYOND + 1, 0)):
@@ -235,6 +287,8 @@ def grid_rates(
                 a, z, u = q * nx, (q + 1) * nx, aside[at : at + nx]
                 one, other = (down, up) if image(row, ny) else (up, down)
                 put_primitives(c0, rho, table, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
+                if phi is not None:
+                    raise_row(c0, rho, table, phi[0][a:z], w)
                 put_waves(0.5, w, v, one[at : at + nx], other[at : at + nx])
                 if moves is not None and moves[1].size > 0 and image(row, ny):
                     out = -moves[1][0] if side == 0 else moves[1][ny]
@@ -264,14 +318,14 @@ def grid_rates(
             faces_carried(
                 across, limiter, small, gu, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
             )
-            fluxes(c0, rho, table, gu, gd, gt, None, 0)
+            fluxes(c0, rho, table, gu, gd, gt, None, 0, None if phi is None else phi[2][j * nx : (j + 1) * nx])
         else:
             seen = spare[SPARE : SPARE + nx]
             follow(moves[1][j:], 0, gu, seen)
             faces_carried(
                 across, limiter, small, seen, gd, aside[a:], aside[b:], aside[d:], aside[e:], aside[g:], aside[h:], gt
             )
-            fluxes(c0, rho, table, gu, gd, gt, moves[1][j:], 0)
+            fluxes(c0, rho, table, gu, gd, gt, moves[1][j:], 0, None)
             if (j == 0 and to_s == WALLS) or (j == ny and to_n == WALLS):
                 feel_full(gd, nx, moves[2][2 * ny + (nx if j > 0 else 0) :], gu, gt)
         if through.size > 0 and j == 0:
@@ -286,6 +340,9 @@ def grid_rates(
             )  # fmt: skip
             if moves is not None:
                 swell_row(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            if phi is not None:
+                low, high = phi[2][a:z], phi[2][j * nx : (j + 1) * nx]
+                hold_row(c0, rho, table, ky[j - 1 :], 0, r[a:z], phi[0][a:z], low, high, rate_y[a:z])
     most = 0.0
     for i in range(nx):
         most = max(most, top[i])

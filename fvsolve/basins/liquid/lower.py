@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.liquid.observe import PRESSURE
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.lower_pieces import MARKED
+from fvsolve.basins.lower_pieces import FRAMES, MARKED
 from fvsolve.kernels.phases import Pieces
 
 HOME = __package__
@@ -19,6 +19,7 @@ LIQUID = Pieces(
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
 SCALE = 1e5  # [Pa]
+STEPS = 8  # up to the height of a cell; each errs by the cube of its strain
 SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
 
 
@@ -47,6 +48,8 @@ class LiquidRows(BasinRows):
     def pieces(self, valves: bool) -> Iterator[Pieces]:
         yield Pieces(home=HOME, rates=self.rates())
         yield LIQUID
+        if self.part.on is not None:
+            yield FRAMES
         if self.moves:
             yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
@@ -56,9 +59,10 @@ class LiquidRows(BasinRows):
     def rates(self) -> str:
         """The piece that finds rates of its cells."""
         kind = "grids" if self.is_grid else "meshes"
-        if self.moves:
+        if self.moves or self.part.on is not None:
+            how = "moving" if self.moves else "riding"
             what = "table" if self.waves is not None else "waves" if self.linear and self.is_grid else "rates"
-            return f"moving: {what}_on_moving_{kind}"
+            return f"{how}: {what}_on_{how}_{kind}"
         what = "waves" if self.linear and self.is_grid else "rates"
         return f"{'table' if self.waves is not None else 'rates'}: {what}_on_{kind}"
 
@@ -80,6 +84,8 @@ class LiquidRows(BasinRows):
         height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
         row["rest"] = self.part.pressure - self.case.ambient_pressure + height
         row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
+        if self.part.on is not None:
+            row["plan"] = draft.to_plane(np.full(self.n, self.density))
         if self.waves is not None:
             self.lower_waves(draft, row)
         if self.is_grid:
@@ -114,11 +120,28 @@ class LiquidRows(BasinRows):
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         found, given = np.zeros((3, self.n)), self.part.start
+        rest = 0.0 if self.part.on is None else self.pressure_at_start()
+        if given is not None or self.part.on is not None:
+            found[0] = self.deviation(rest + (0.0 if given is None else self.formula(given.pressure)))
         if given is not None:
-            found[0] = self.deviation(self.formula(given.pressure))
             density = self.density + (0.0 if self.linear else found[0])
             found[1], found[2] = density * self.formula(given.u), density * self.formula(given.v)
         return found
+
+    def pressure_at_start(self) -> np.ndarray:
+        """Pressure above that at rest at the middle where its body stands still: dp / rho = - d(phi) [Pa]."""
+        from fvsolve.basins.lower_frames import potential_at_start
+
+        phi = potential_at_start(self)
+        if self.linear:
+            return -self.density * phi
+        if self.waves is None:
+            return -self.density * self.speed**2 * np.log1p(phi / self.speed**2)
+        p = np.zeros(self.n)
+        for _ in range(STEPS):
+            half = p - 0.5 * phi / STEPS * (self.density + self.deviation(p))
+            p = p - phi / STEPS * (self.density + self.deviation(half))
+        return p
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         density = self.density + (np.zeros(self.n) if self.linear else y[0])

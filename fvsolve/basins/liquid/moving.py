@@ -39,7 +39,7 @@ def waves_on_moving_grids(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
-            linear_grid(tables, b, y, dydt, out, lines_of(tables, tables.basins[b]))
+            linear_grid(tables, b, y, dydt, out, lines_of(tables, tables.basins[b]), None)
 
 
 @njit
@@ -48,7 +48,7 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
-            full_grid(tables, b, None, y, dydt, out, lines_of(tables, tables.basins[b]))
+            full_grid(tables, b, None, y, dydt, out, lines_of(tables, tables.basins[b]), None)
 
 
 @njit
@@ -58,7 +58,7 @@ def table_on_moving_grids(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
             table = tables.plane[tables.basins[b]["table"] :]
-            full_grid(tables, b, table, y, dydt, out, lines_of(tables, tables.basins[b]))
+            full_grid(tables, b, table, y, dydt, out, lines_of(tables, tables.basins[b]), None)
 
 
 @njit
@@ -67,7 +67,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
-            any_mesh(tables, b, None, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]))
+            any_mesh(tables, b, None, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]), None, None)
 
 
 @njit
@@ -77,7 +77,7 @@ def table_on_moving_meshes(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
             table = tables.plane[tables.basins[b]["table"] :]
-            any_mesh(tables, b, table, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]))
+            any_mesh(tables, b, table, y, dydt, out, moving_meshes.moves_of(tables, tables.basins[b]), None, None)
 
 
 @njit

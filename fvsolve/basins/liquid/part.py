@@ -23,10 +23,13 @@ class Liquid(Physics, name="liquid"):
     starts: ClassVar[type[MovingStart]] = LiquidStart
     laws: ClassVar[tuple[str, ...]] = ("linear", "log", "table")
     moves: ClassVar[bool] = True
+    rides: ClassVar[bool] = True
     carries: ClassVar[bool] = False
     echoes: ClassVar[bool] = True
 
-    pressure: Annotated[float, Quantity("pressure", positive, "at rest [Pa]; liquid, needed there")]
+    pressure: Annotated[
+        float, Quantity("pressure", positive, "at rest [Pa], on a body that at its middle; liquid, needed there")
+    ]
     thickness: Annotated[
         float, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
     ]

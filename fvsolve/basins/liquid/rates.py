@@ -14,13 +14,13 @@ MINE = kind_of(__package__)
 @njit(forceinline=True)
 def on_grid(basin):
     """Whether it is a rectangle of liquid that stands still."""
-    return basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0
+    return basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
     """Whether it is a liquid on any other mesh that stands still."""
-    return basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0
+    return basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
@@ -60,12 +60,14 @@ def finish_liquid(tables, b, rate, out):
 
 
 @njit
-def linear_grid(tables, b, y, dydt, out, moves):
-    """Rates under law linear on a grid; moves : as in `grid.grid_rates`."""
+def linear_grid(tables, b, y, dydt, out, moves, raised):
+    """Rates under law linear on a grid; moves : as in `grid.grid_rates`; raised : None, or densities in their place."""
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
     reflect, through, work = outside_of(tables, basin)
+    if raised is not None:
+        r = raised
     rate = grid.grid_rates(
         basin["speed"], basin["small"], basin["scheme"], basin["limiter"], basin["nx"], basin["ny"], kx, ky, reflect,
         r, mx, my, through, work, rate_r, rate_x, rate_y, moves,
@@ -79,11 +81,11 @@ def waves_on_grids(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and wanted(tables.basins[b], dydt):
-            linear_grid(tables, b, y, dydt, out, None)
+            linear_grid(tables, b, y, dydt, out, None, None)
 
 
 @njit
-def full_grid(tables, b, table, y, dydt, out, moves):
+def full_grid(tables, b, table, y, dydt, out, moves, phi):
     """Rates with the full momentum flux on a grid, of its waves or, with no table, under law log."""
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
@@ -91,7 +93,7 @@ def full_grid(tables, b, table, y, dydt, out, moves):
     reflect, through, work = outside_of(tables, basin)
     rate = grid_full.grid_rates(
         basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], basin["nx"],
-        basin["ny"], kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y, moves,
+        basin["ny"], kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y, moves, phi,
     )  # fmt: skip
     finish_liquid(tables, b, rate, out)
 
@@ -102,19 +104,24 @@ def rates_on_grids(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]) and wanted(tables.basins[b], dydt):
-            full_grid(tables, b, None, y, dydt, out, None)
+            full_grid(tables, b, None, y, dydt, out, None, None)
 
 
 @njit
-def any_mesh(tables, b, table, y, dydt, out, moves):
-    """Rates on a mesh, of its waves or, with no table, under laws linear and log; moves : as in `liquid_rates`."""
+def any_mesh(tables, b, table, y, dydt, out, moves, raised, phi):
+    """Rates on a mesh, of its waves or, with no table, under laws linear and log.
+
+    moves, phi : as in `liquid_rates`; raised : None, or densities in place of the states
+    """
     basin = tables.basins[b]
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
     reflect, through, work = outside_of(tables, basin)
+    if raised is not None:
+        r = raised
     rate = faces.liquid_rates(
         tables.settings[0]["law"], basin["speed"], basin["density"], table, basin["scheme"], basin["wide"],
         tables.plane[basin["mesh"] :], tables.integers[basin["links"] :], reflect, r, mx, my, through, work,
-        rate_r, rate_x, rate_y, moves,
+        rate_r, rate_x, rate_y, moves, phi,
     )  # fmt: skip
     finish_liquid(tables, b, rate, out)
 
@@ -125,4 +132,4 @@ def rates_on_meshes(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]) and wanted(tables.basins[b], dydt):
-            any_mesh(tables, b, None, y, dydt, out, None)
+            any_mesh(tables, b, None, y, dydt, out, None, None, None)

@@ -22,7 +22,7 @@ def rates_on_grids(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if on_grid(basin) and wanted(basin, dydt):
-            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out, None)
+            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out, None, None)
 
 
 @njit
@@ -32,7 +32,7 @@ def rates_on_meshes(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if on_mesh(basin) and wanted(basin, dydt):
-            any_mesh(tables, b, tables.plane[basin["table"] :], y, dydt, out, None)
+            any_mesh(tables, b, tables.plane[basin["table"] :], y, dydt, out, None, None, None)
 
 
 @njit

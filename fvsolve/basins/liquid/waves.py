@@ -6,6 +6,8 @@ and four coefficients of s in [0, 1] an interval: of w over r, then of r and of 
 rest, where all is 0 to the bit; the first and the last are straight and have no end. `lower_waves` makes it.
 """
 
+from math import sqrt
+
 from fvsolve.jit import njit
 
 HEAD = 8  # floats before the cubics
@@ -37,6 +39,27 @@ def state(table, w):
     k, s = locate(table, OF_W, w, 8)
     r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
     return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
+
+
+@njit(forceinline=True)
+def speed(table, rho, w):
+    """c where the invariant is w."""
+    k, s = locate(table, OF_W, w, 8)
+    b, c, d = table[k + 1], table[k + 2], table[k + 3]
+    dense = rho + table[k] + s * (b + s * (c + s * d))
+    return dense / (table[OF_W] * (b + s * (2.0 * c + 3.0 * s * d)))
+
+
+@njit(forceinline=True)
+def lowered(c0, rho, table, w, phi):
+    """The invariant of what rests at w where it is raised by a potential [J/kg]: dp / rho = c dw = -d(phi).
+
+    With no table that of law log, c^2 = c0^2 less what is raised; else by a midpoint, to (phi / c^2)^3.
+    """
+    if table is None:
+        c = c0 - 0.5 * w
+        return w - 2.0 * phi / (c + sqrt(c * c + phi))
+    return w - phi / speed(table, rho, w - 0.5 * phi / speed(table, rho, w))
 
 
 @njit(forceinline=True)

@@ -173,7 +173,7 @@ class Physics(Table):
     dimensions; starts : keys of `start`
     laws : of density that it goes with, all if left out; described : what other laws do not go with, in words
     joined : whether links may join its patches; a given velocity passes others
-    moves : whether its walls may move; rides : whether it may ride on bodies
+    moves : whether its walls may move; rides : whether it may ride on bodies, sloshes : by other ways than by cells
     carries : whether it carries scalars; echoes : whether its boundary may have an impedance
     steep : whether its fronts steepen into jumps that keep, and smooth flow in the plane is of second order at most
     """
@@ -188,6 +188,7 @@ class Physics(Table):
     joined: ClassVar[bool] = True
     moves: ClassVar[bool] = False
     rides: ClassVar[bool] = False
+    sloshes: ClassVar[bool] = False
     carries: ClassVar[bool] = True
     echoes: ClassVar[bool] = False
     steep: ClassVar[bool] = False

@@ -1,0 +1,116 @@
+"""A liquid that rides on a body: what its axes do joins the pressure. Knows the tables; knows no flux.
+
+Under law linear p + rho phi is reconstructed in place of p (`frames`), so that rates are those of a liquid that stands
+still. Where the full momentum flux is, invariants are those where phi is taken off; at faces they are lowered again,
+and a cell feels the pressures there besides that would hold it at rest. What lies beyond an open side rests in the same
+axes, its pressure at rest that at their origin.
+"""
+
+from fvsolve.basins.faces import BLOCK, blocks
+from fvsolve.basins.frames import PHI, PLACES, lift, lift_points, lift_rows, potential
+from fvsolve.basins.liquid.rates import MINE, any_mesh, full_grid, linear_grid
+from fvsolve.jit import njit
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import LAW_LINEAR
+
+
+@njit(forceinline=True)
+def on_grid(basin):
+    """Whether it is a rectangle of liquid that rides."""
+    return basin["kind"] == MINE and basin["nx"] > 0 and basin["frame"] >= 0
+
+
+@njit(forceinline=True)
+def on_mesh(basin):
+    """Whether it is a liquid on any other mesh that rides."""
+    return basin["kind"] == MINE and basin["nx"] == 0 and basin["frame"] >= 0
+
+
+@njit
+def raise_densities(tables, basin, y):
+    """Deviations of density with those that rho phi would make, into `work`; returns where there."""
+    at, n, o = int(tables.plane[basin["frame"] + PHI]), basin["n"], basin["y"]
+    per = basin["density"] / (basin["speed"] * basin["speed"])
+    lift(tables.plane, basin, per, y[o : o + n], tables.work[at : at + n])
+    return at
+
+
+@njit
+def over_grid(tables, basin):
+    """phi [J/kg] of cells, of faces between columns and of those between rows: in `work`."""
+    plane, at, nx, ny = tables.plane, int(tables.plane[basin["frame"] + PLACES]), basin["nx"], basin["ny"]
+    x, y, lines = plane[at : at + nx], plane[at + nx : at + nx + ny], at + nx + ny
+    across, along = plane[lines : lines + nx + 1], plane[lines + nx + 1 : lines + nx + ny + 2]
+    work, n, many = tables.work[int(plane[basin["frame"] + PHI]) :], nx * ny, (nx + 1) * ny
+    cells, columns, rows = work[:n], work[n : n + many], work[n + many : n + many + nx * (ny + 1)]
+    phi = potential(plane, basin["frame"], 1.0)
+    lift_rows(phi, x, y, None, cells)
+    lift_rows(phi, across, y, None, columns)
+    lift_rows(phi, x, along, None, rows)
+    return cells, columns, rows
+
+
+@njit
+def over_mesh(tables, basin):
+    """phi [J/kg] of cells and of sides: in `work`."""
+    plane, at, n = tables.plane, int(tables.plane[basin["frame"] + PLACES]), basin["n"]
+    integers = tables.integers[basin["links"] :]
+    many, work = blocks(integers) * integers[0] * BLOCK, tables.work[int(plane[basin["frame"] + PHI]) :]
+    cells, sides, phi = work[:n], work[n : n + many], potential(plane, basin["frame"], 1.0)
+    lift_points(phi, plane[at : at + n], plane[at + n : at + 2 * n], None, cells)
+    at += 2 * n
+    lift_points(phi, plane[at : at + many], plane[at + many : at + 2 * many], None, sides)
+    return cells, sides
+
+
+@njit
+def waves_on_riding_grids(t, y, dydt, out, handle):
+    """Rates under law linear on grids."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if on_grid(tables.basins[b]):
+            at = raise_densities(tables, tables.basins[b], y)
+            linear_grid(tables, b, y, dydt, out, None, tables.work[at:])
+
+
+@njit
+def rates_on_riding_grids(t, y, dydt, out, handle):
+    """Rates under law log on grids."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        if on_grid(tables.basins[b]):
+            full_grid(tables, b, None, y, dydt, out, None, over_grid(tables, tables.basins[b]))
+
+
+@njit
+def table_on_riding_grids(t, y, dydt, out, handle):
+    """The same under law table."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if on_grid(basin):
+            full_grid(tables, b, tables.plane[basin["table"] :], y, dydt, out, None, over_grid(tables, basin))
+
+
+@njit
+def rates_on_riding_meshes(t, y, dydt, out, handle):
+    """Rates under laws linear and log on meshes."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if on_mesh(basin) and tables.settings[0]["law"] == LAW_LINEAR:
+            at = raise_densities(tables, basin, y)
+            any_mesh(tables, b, None, y, dydt, out, None, tables.work[at:], None)
+        elif on_mesh(basin):
+            any_mesh(tables, b, None, y, dydt, out, None, None, over_mesh(tables, basin))
+
+
+@njit
+def table_on_riding_meshes(t, y, dydt, out, handle):
+    """The same under law table."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if on_mesh(basin):
+            table, phi = tables.plane[basin["table"] :], over_mesh(tables, basin)
+            any_mesh(tables, b, table, y, dydt, out, None, None, phi)
