@@ -122,14 +122,19 @@ class Displaced(Statics):
         return found
 
     def oil(self, y: np.ndarray) -> np.ndarray:
-        """What fluid shut in behind pistons adds to -dF/dq : float64[size, size]."""
+        """What fluid shut in behind pistons adds to -dF/dq, A^2 K / V of each chamber : float64[size, size]."""
         found, nodes, first = np.zeros((self.size, self.size)), self.draft.node_table, int(self.layout["stiffness"])
+        self.stand(np.zeros_like(y))
+        per_mass = self.out[first : first + self.draft.moving].copy()  # where chambers hold what they start with
         for k, sides in self.draft.shut.items():
             row = self.draft.piston_table[k]
             self.stand(y)
-            stiff = sum(row[f"area_{side}"] * abs(row[f"sweep_{side}"]) * self.out[first + nodes[row[side]]["row"]]
-                        for side in sides)  # fmt: skip
-            lever = self.lever(k)
+            travel = self.out[int(self.layout["travel"]) + 2 * (self.first + k)]
+            lever, stiff = self.lever(k), 0.0
+            for side, sign in (("a", 1.0), ("b", -1.0)):
+                node, area = nodes[row[side]], row[f"area_{side}"]
+                bulk = per_mass[node["row"]] * node["mass"]
+                stiff += area**2 * bulk / (node["volume"] + sign * area * travel) if side in sides else 0.0
             found += stiff * np.outer(lever, lever)
         return found
 

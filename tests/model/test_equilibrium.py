@@ -10,12 +10,14 @@ from pytest import approx
 from scipy.optimize import brentq, minimize, root
 from scipy.spatial.transform import Rotation
 from truth.bodies import Crane, bodies, pendulum
-from truth.scenes import AMBIENT, GRAVITY, RHO, reservoir, valve
+from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, reservoir, valve
 from truth.trees import body
 
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.errors import CaseError
+from fvsolve.model.build import drafted
+from fvsolve.model.places import Displaced
 from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}
@@ -415,8 +417,9 @@ def test_a_pendulum_that_stands_stays_and_is_told_so():
     assert angles(built(balanced({"arm": pendulum(3.14159)}))) == approx([math.pi], abs=1e-15)
 
 
+@pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("shut", [True, False])
-def test_shut_oil_holds_a_boom_that_open_valves_do_not(shut):
+def test_shut_oil_holds_a_boom_that_open_valves_do_not(shut, law):
     """Pushed from in front, its lever grows as it lifts: at a pressure that stays it falls or rises on."""
     crane, lug = Crane(), np.array([0.5, -0.25])
 
@@ -435,11 +438,18 @@ def test_shut_oil_holds_a_boom_that_open_valves_do_not(shut):
     if not shut:
         nodes |= {"high": reservoir(float(pressure)), "low": reservoir(crane.p_b)}
         links |= {"a": valve("high", "lift.A", 1e-5), "b": valve("low", "lift.B", 1e-5)}
-    model = built(balanced(nodes, links))
+    model = built(balanced(nodes, links), fluid={**WATER, "law": law})
     grows = force * (lever(0.9 + 1e-5)[0] - lever(0.9 - 1e-5)[0]) / 2e-5 + weight * math.sin(0.9)
     assert grows > 0.0 and not model.case.found
     told = [one.value for one in model.warnings if one.key == "stability"]
     assert told == ([] if shut else [approx(math.sqrt(grows / crane.inertia), rel=1e-6)])
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_oil_that_is_shut_in_is_the_spring_of_both_chambers(law):
+    crane = Crane()
+    at = Displaced(drafted(fvsolve.load(crane.case(1.0, law=law))))
+    assert at.oil(at.y) == approx(np.array([[crane.spring(law) * crane.lever**2]]), rel=1e-12)
 
 
 def test_what_nothing_holds_finds_no_balance_and_is_named():
