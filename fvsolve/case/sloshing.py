@@ -38,7 +38,7 @@ class Outline(NamedTuple):
     is_round: bool
 
 
-class Mode(NamedTuple):
+class SloshingMode(NamedTuple):
     """One that swings along x (0) or y (1): number, k [1/m], mass [kg], height above the bed [m], w^2 [1/s2].
 
     rise : of the surface at the wall ahead, per travel of the mass [-]
@@ -92,7 +92,7 @@ def bed_of(basin: Any) -> float:
     return 0.0 if basin.bed is None else float(basin.bed.at(np.zeros(1), np.zeros(1))[0])
 
 
-def modes(outline: Outline, depth: float, density: float, gravity: float, many: int = MANY) -> list[Mode]:
+def modes(outline: Outline, depth: float, density: float, gravity: float, many: int = MANY) -> list[SloshingMode]:
     """The first modes of water in a tank, along x and y in turn."""
     from scipy.special import jnp_zeros
 
@@ -107,7 +107,7 @@ def modes(outline: Outline, depth: float, density: float, gravity: float, many: 
                 share, rise = 8.0 * steep / (k * depth * (k * side) ** 2), 4.0 * steep / (k * side)
             height = depth - 2.0 / k * float(np.tanh(0.5 * k * depth))
             mass = density * area_of(outline) * depth * share
-            found.append(Mode(along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)))
+            found.append(SloshingMode(along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)))
     return found
 
 
@@ -117,7 +117,7 @@ def area_of(outline: Outline) -> float:
     return 0.25 * np.pi * a * a if outline.is_round else a * b
 
 
-def surface(outline: Outline, mode: Mode, x: float, y: float) -> float:
+def surface(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
     """Rise of the surface at a point per travel of a mode's mass [-]."""
     from scipy.special import j1, jnp_zeros
 
@@ -239,7 +239,9 @@ def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity
     return found
 
 
-def reading(basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float) -> tuple[list[Mode], list]:
+def reading(
+    basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float
+) -> tuple[list[SloshingMode], list]:
     """The modes, and what the surface at a point is of their travels, and of all others per slope of what pushes them.
 
     Others are where they would rest: (x, y) from the middle less what the modes that are followed have of it there.
@@ -252,12 +254,12 @@ def reading(basin: Any, mesh: Any, x: float, y: float, density: float, gravity: 
     return every, [*rest, *rises]
 
 
-def slider(name: str, mode: Mode) -> str:
+def slider(name: str, mode: SloshingMode) -> str:
     """Name of the body of a mode."""
     return f"{name} {'xy'[mode.along]}{mode.number}"
 
 
-def made(basin: Any, mesh: Any, density: float, gravity: float) -> list[Mode]:
+def made(basin: Any, mesh: Any, density: float, gravity: float) -> list[SloshingMode]:
     """The modes of a basin."""
     return modes(outline_of(mesh), depth_of(basin), density, gravity)
 
