@@ -30,7 +30,7 @@ SCENES = {  # keys of the basin, joint of its body
     "wall along y moves": ({"patches": {"lid": {"side": "north", "travel": SWING}}}, None),
     "body travels": ({"on": "body"}, TRAVELS),
     "body turns": ({"on": "body"}, TURNS),
-    "body is free": ({"on": "body"}, {"kind": "free"}),
+    "body is free": ({"on": "body"}, {"kind": "free", "rate": [0.01, 0.02, 0.05]}),
 }
 
 

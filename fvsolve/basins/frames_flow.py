@@ -8,9 +8,10 @@ those of bodies (`kernels.mechanism.tanks`); once accelerations are solved, flow
 is such a layer without height. Momentum of the whole is kept to the method's order.
 """
 
-from fvsolve.basins.frames import AZ, PLACES, WZ
+from fvsolve.basins.frames import AZ, WZ
 from fvsolve.basins.frames_load import load_body, yielded
-from fvsolve.jit import inner, njit
+from fvsolve.basins.frames_push import push_flow
+from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.room import dot
 from fvsolve.kernels.mechanism.tanks import EAST, TANK_OUT
@@ -31,44 +32,11 @@ def turn_fluid(t, y, dydt, out, handle):
         twice, euler = 2.0 * tables.plane[basin["frame"] + WZ], tables.plane[basin["frame"] + AZ]
         out[RATE] = max(out[RATE], abs(twice))
         to, first = (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["unused"])
-        if twice != 0.0 or euler != 0.0:
-            own = 0.0 if basin["deep"] == 0 and tables.settings[0]["law"] == LAW_LINEAR else 1.0
+        own = 0.0 if basin["deep"] == 0 and tables.settings[0]["law"] == LAW_LINEAR else 1.0
+        if (twice != 0.0 or euler != 0.0) and (basin["heavy"] == 0 or basin["nx"] == 0):
             push_flow(tables.plane, basin, y, to, first, own, twice, 0.0, 0.0, euler)
         if basin["heavy"] == 1:
-            load_body(tables, basin, b, y, to, first, out)
-
-
-@njit
-def push_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
-    """Add to rates of flow 2 W q and depth times a push that is even but for `turn` times the place.
-
-    Depth is what is held per area, `own` the share of its deviation that counts.
-    """
-    n, o, nx, places = basin["n"], basin["y"], basin["nx"], int(plane[basin["frame"] + PLACES])
-    rows, wide = (basin["ny"], nx) if nx > 0 else (1, n)
-    for row in range(rows):
-        at = row * wide
-        a, z, p = o + at, o + at + wide, basin["plan"] + at
-        x = plane[places : places + wide]
-        if nx > 0:
-            level = plane[places + nx + row]
-            push_row(x, plane[p : p + wide], y[a:z], y[a + n : z + n], y[a + 2 * n : z + 2 * n], own,
-                     twice, east + turn * level, north, turn, rates[first + n + at : first + n + at + wide],
-                     rates[first + 2 * n + at : first + 2 * n + at + wide])  # fmt: skip
-        else:
-            for i in range(n):
-                depth = max(plane[p + i] + own * y[o + i], 0.0)
-                rates[first + n + i] += twice * y[o + 2 * n + i] + depth * (east + turn * plane[places + n + i])
-                rates[first + 2 * n + i] += depth * (north - turn * x[i]) - twice * y[o + n + i]
-
-
-@inner
-def push_row(x, rest, dh, qx, qy, own, twice, east, north, turn, rate_x, rate_y):
-    """`push_flow` of a row of cells of a grid."""
-    for i in range(rate_x.size):
-        depth = max(rest[i] + own * dh[i], 0.0)
-        rate_x[i] += twice * qy[i] + depth * east
-        rate_y[i] += depth * (north - turn * x[i]) - twice * qx[i]
+            load_body(tables, basin, b, y, to, first, own, twice, euler, out)
 
 
 @njit

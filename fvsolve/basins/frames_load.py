@@ -1,6 +1,7 @@
 """What what rides on a body puts on it: force and torque with joints held, moments of mass. Knows rows of tables."""
 
 from fvsolve.basins.frames import AT, AX, AY, AZ, DOWN, GN, GX, GY, LEVEL, PLACES, SURFACE, TURN, WX, WY, WZ
+from fvsolve.basins.frames_push import push_cells
 from fvsolve.jit import njit
 from fvsolve.kernels.mechanism.room import (
     ACCELERATION,
@@ -52,9 +53,11 @@ def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, d
 
 
 @njit
-def moments(tables, basin, y, rates, first):
+def moments(tables, basin, y, rates, first, own, twice, euler):
     """Sums over cells, in axes of the basin: moments 1, x, y, xx, xy, yy of mass [kg ..] and of its weight along the
     normal; of the rate of mass x, y, xx, xy, yy; momentum along x and y and its moment about z, and rates of these.
+
+    On grids these rates first get, row by row, what `frames_flow.turn_fluid` adds to others at once.
     """
     plane, n, o, per_area = tables.plane, basin["n"], basin["y"], mass_per(tables, basin)
     m = sx = sy = xx = xy = yy = lever = 0.0
@@ -66,6 +69,8 @@ def moments(tables, basin, y, rates, first):
     for row in range(rows):
         z, at = plane[places + (nx if nx > 0 else n) + row], row * wide
         a, b, x = o + at, first + at, places + (0 if nx > 0 else row)
+        if nx > 0 and (twice != 0.0 or euler != 0.0):
+            push_cells(plane, basin, y, rates, first, row, own, twice, 0.0, 0.0, euler)
         r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0 = row_sums(
             deep, per_area, level, plane[x : x + wide], plane[basin["area"] + at :], plane[basin["plan"] + at :],
             plane[surface + at :], y[a : a + wide], y[a + n :], y[a + 2 * n :], rates[b:], rates[b + n :],
@@ -80,10 +85,10 @@ def moments(tables, basin, y, rates, first):
 
 
 @njit
-def load_body(tables, basin, b, y, rates, first, out):
+def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
     """Force and torque of what is in a basin on its body with joints held, and its moments along the normal."""
     m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = moments(
-        tables, basin, y, rates, first
+        tables, basin, y, rates, first, own, twice, euler
     )
     plane, at = tables.plane, basin["frame"]
     gx, gy, gz = plane[at + GX], plane[at + GY], -plane[at + GN]

@@ -1,0 +1,41 @@
+"""What pushes the flow of what rides on bodies beside the fluxes, see `frames`. Knows rows of cells; knows no body."""
+
+from fvsolve.basins.frames import PLACES
+from fvsolve.jit import inner, njit
+
+
+@njit
+def push_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
+    """Add to rates of flow 2 W q and depth times a push that is even but for `turn` times the place.
+
+    Depth is what is held per area, `own` the share of its deviation that counts.
+    """
+    n, o, p, places = basin["n"], basin["y"], basin["plan"], int(plane[basin["frame"] + PLACES])
+    for row in range(basin["ny"]):
+        push_cells(plane, basin, y, rates, first, row, own, twice, east, north, turn)
+    for i in range(n if basin["nx"] == 0 else 0):
+        depth = max(plane[p + i] + own * y[o + i], 0.0)
+        rates[first + n + i] += twice * y[o + 2 * n + i] + depth * (east + turn * plane[places + n + i])
+        rates[first + 2 * n + i] += depth * (north - turn * plane[places + i]) - twice * y[o + n + i]
+
+
+@njit
+def push_cells(plane, basin, y, rates, first, row, own, twice, east, north, turn):
+    """The same of a row of cells of a grid."""
+    n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
+    at, level = row * nx, plane[places + nx + row]
+    a, p, to = basin["y"] + at, basin["plan"] + at, first + n + at
+    push_row(
+        plane[places : places + nx], plane[p : p + nx], y[a : a + nx], y[a + n : a + n + nx],
+        y[a + 2 * n : a + 2 * n + nx], own, twice, east + turn * level, north, turn, rates[to : to + nx],
+        rates[to + n : to + n + nx],
+    )  # fmt: skip
+
+
+@inner
+def push_row(x, rest, dh, qx, qy, own, twice, east, north, turn, rate_x, rate_y):
+    """`push_flow` of a row of cells of a grid."""
+    for i in range(rate_x.size):
+        depth = max(rest[i] + own * dh[i], 0.0)
+        rate_x[i] += twice * qy[i] + depth * east
+        rate_y[i] += depth * (north - turn * x[i]) - twice * qx[i]
