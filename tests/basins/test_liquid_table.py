@@ -227,6 +227,21 @@ def test_implicit_steps_agree_with_explicit_ones(holes):
     assert np.abs(found[0] - found[1]).max() < 2e-6 * np.abs(found[1]).max()
 
 
+@pytest.mark.parametrize("wave_speed", [30.0, 120.0, 1000.0])
+def test_walls_that_give_much_leave_pressure_what_it_is(wave_speed):
+    """A slope of pressure pushes as it does between stiff walls, and comes back from the state it makes."""
+    pool = {
+        "type": "basin", "physics": "liquid", "size": [1.0, 0.2], "cells": [10, 2], "pressure": 3e5, "thickness": 0.1,
+        "wave_speed": wave_speed, "start": {"pressure": "1000 * (x - 0.5)"},
+    }  # fmt: skip
+    fluid = {"name": "Water", "temperature": 293.15, "law": "table"}
+    model = fvsolve.build(fvsolve.load(scene({"b": pool}, {}, 1.0, {"scheme": "muscl"}, fluid=fluid)))
+    basin = model.basins[0]
+    rates = basin.own(model.evaluate(0.0, model.start.copy())[0])
+    assert rates[1].reshape(2, 10)[:, 2:-2] == approx(-1000.0, rel=1e-5)
+    assert basin.fields(basin.of(model.start))["pressure"] == approx(3e5 + 1000.0 * (basin.x - 0.5), rel=1e-9)
+
+
 def test_walls_make_no_wave_quicker_than_the_fluids_own():
     with pytest.raises(CaseError, match="nodes.pool.wave_speed: 600 m/s is faster than sound in the fluid, 519"):
         model_of(basin(wave_speed=600.0))

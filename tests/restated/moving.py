@@ -187,6 +187,26 @@ def carried(method: str = "rk4", **more) -> dict:
     return scene(nodes, {}, END, stepped(method, 0.01), probes, 1 / 32) | more
 
 
+def full(method: str = "rk4", law: str = "linear", free: bool = False, **more) -> dict:
+    """A box full of liquid, aslant on a body that is driven about an axis aslant, or hangs on it and swings."""
+    turns = {"angle": 0.3, "rate": 1.5} if free else {"angle": {**ROCK, "period": 0.3}}
+    nodes = {
+        "cradle": body(9.0, [1, 1, 1], {"kind": "revolute", "at": [0.2, 0.1, 0.5], "axis": [0.36, 0.48, 0.8], **turns}),
+        "b": {"type": "basin", "physics": "liquid", "on": "cradle", "at": [-0.5, -0.4, 0.3], "wave_speed": 600.0,
+              "attitude": {"yaw": 0.4, "roll": 1.2}, "size": [1.0, 0.8], "cells": [6, 5], "pressure": 3e5,
+              "thickness": 0.05},
+    }  # fmt: skip
+    probes = [
+        "b.pressure@0.2,0.3",
+        "b.u@0.7,0.4",
+        "b.v@0.7,0.4",
+        "cradle.angle",
+        *(f"cradle.w{axis}" for axis in "xyz"),
+    ]
+    numerics = stepped(method, 1e-4) | {"scheme": "upwind5"}
+    return scene(nodes, {}, 0.01, numerics, probes, 1 / 1024) | {"fluid": dict(LAWS[law])} | more
+
+
 def rocking(method: str = "rk4", sloshing: str = "cells", **more) -> dict:
     """A basin that moves its body, which hangs on a ball and on springs."""
     hull = body(
@@ -256,6 +276,10 @@ SCENES: dict[str, Callable[..., dict]] = {
     "piston table": lambda method="rk4": piston(method, "table"),
     "flume": flume,
     "carried": carried,
+    "full": full,
+    "full log": lambda method="rk4": full(method, "log"),
+    "full free": lambda method="rk4": full(method, free=True),
+    "full table free": lambda method="rk4": full(method, "table", free=True),
     "rocking": rocking,
     "frozen": lambda method="rk4": rocking(method, "frozen"),
     "u-tube free": u_tube,

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers tha
 ROUND, BY_DIFFERENCES = 1e-9, 1e-4
 EACH = ["rk4", "gauss-4", "rodas-4"]
 IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop", "carried", "rocking", "frozen",
-            "u-tube free", "u-tube driven"]  # fmt: skip
+            "full", "full log", "full free", "full table free", "u-tube free", "u-tube driven"]  # fmt: skip
 SWINGS = (".rate", ".angle", ".travel")
 
 
@@ -117,7 +117,7 @@ def test_other_units(name, method):
 
 
 @pytest.mark.parametrize("method", EACH)
-@pytest.mark.parametrize("name", [name for name in IN_SPACE if name not in ("carried", "u-tube driven", "u-tube free")])
+@pytest.mark.parametrize("name", [name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))])
 def test_ends_of_links_swapped(name, method):
     alike(first(name, method), told(motions.swapped(SCENES[name](method))), near(method))
 

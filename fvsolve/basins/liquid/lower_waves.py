@@ -16,13 +16,15 @@ from fvsolve.fluid.laws import TableLaw
 from fvsolve.kernels import records as rec
 
 FINER, LEAST = 4, 512  # intervals of the kernels' tables for each of the fluid's, and at least for all of these
+STRETCH = 2.0  # of ln(rho / rho at rest)
 PANELS = 8  # of the integral, for each of the fluid's
 
 
 class Waves:
     """w = integral of c / rho, c^2 = dp / drho, from rest at a pressure, and what hangs on it.
 
-    It goes as far as the fluid's table and by its length beyond both ends, where compressibility stays.
+    It goes as far as the fluid's table and by its length beyond both ends, where compressibility stays, but no farther
+    than to where walls give by STRETCH: even steps of density must know those about rest.
     density [kg/m3], speed [m/s] : at rest; compliance : what makes the speed `wave_speed` [1/Pa]
     """
 
@@ -46,6 +48,8 @@ class Waves:
         self.speed = wave_speed or self.own_speed
         found = 1.0 / (self.density * self.speed**2) - own
         self.compliance = found if found > 1e-9 * own else 0.0
+        far = STRETCH / self.compliance if self.compliance > 0.0 else math.inf
+        self.ends = max(self.ends[0], pressure - far), min(self.ends[1], pressure + far)
 
     def stretch(self, p):
         """ln(rho / rho at rest)."""
