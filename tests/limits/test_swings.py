@@ -47,7 +47,12 @@ def test_a_swing_that_ssp_rk2_feeds_is_told_with_by_how_much_it_grows():
     wanted = (1.0 + (math.sqrt(STIFF / MASS) * h) ** 4 / 4.0) ** (0.5 * END / h)
     assert 1.05 < wanted < 1.2
     assert grown(result) == pytest.approx(wanted, rel=1e-4) and one.value == pytest.approx(wanted, rel=1e-3)
-    assert one.place in ("m.position", "m.velocity") and one.ok and "0.6366 Hz" in one.text and 'method = "ssp-rk3"' in one.text
+    assert (
+        one.place in ("m.position", "m.velocity")
+        and one.ok
+        and "0.6366 Hz" in one.text
+        and 'method = "ssp-rk3"' in one.text
+    )
 
 
 def test_what_it_asks_for_helps():

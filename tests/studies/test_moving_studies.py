@@ -53,7 +53,9 @@ def test_a_tank_on_a_spring_has_the_pole_of_the_tangent_law():
             "b": {"type": "basin", "on": "cart", "size": [length, 1.0], "cells": [n, 1], "level": depth},
         }  # fmt: skip
         spring = {"type": "spring", "from": "cart", "to": "world.far", "stiffness": stiff, "preload": 0.0}
-        found = poles(scene(nodes, {"spring": spring}, 1.0, {"scheme": "upwind5", "method": "rk4", "step": 0.01}, ["cart.rate"]))
+        found = poles(
+            scene(nodes, {"spring": spring}, 1.0, {"scheme": "upwind5", "method": "rk4", "step": 0.01}, ["cart.rate"])
+        )
         off.append(np.abs(found - 1j * w).min() / w)
     assert off[1] < 5e-5 and off[0] / off[1] > 3.5
 

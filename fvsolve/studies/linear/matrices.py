@@ -84,7 +84,9 @@ def refuse(model, j: int, what: str) -> None:
     """Raise for a state along which there is no derivative."""
     basin = next((one for one in model.basins if model.state_names[j].startswith(f"{one.name}.")), None)
     if basin is not None:
-        text = "fluxes of this basin have a kink so near its state (waves as quick from both sides, cells that fall dry)"
+        text = (
+            "fluxes of this basin have a kink so near its state (waves as quick from both sides, cells that fall dry)"
+        )
         raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {text}; wanted another state")
     why = {
         "slope": "its slope has no end there, as that of a valve at a drop of zero: give the valve "
