@@ -25,7 +25,7 @@ def standing(node: Node, poses: dict[str, Any]) -> Node:
 
 
 def has_height(node: Node, poses: dict[str, Any]) -> bool:
-    """Whether a node has one elevation: none is that of a basin on a body, and of what rides on one that is not known."""
+    """Whether a node has one elevation: a basin on a body has none, nor what rides on one unknown."""
     on = getattr(node, "on", None)
     return on is None or (on in poses and not isinstance(node, Basin))
 

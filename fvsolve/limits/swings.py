@@ -1,6 +1,7 @@
-"""Swings without damping under a Courant number, by methods whose region has nothing of the imaginary axis. Knows no run.
+"""Swings without damping under a Courant number, by methods whose region lacks the imaginary axis. Knows no run.
 
-A Courant number bounds what decays, and waves, whose scheme damps what such methods feed; a body on a spring has neither.
+A Courant number bounds what decays, and waves, whose scheme damps what such methods feed; a body on a spring has
+neither.
 By |R(i w h)|, of ssp-rk2 sqrt(1 + (w h)^4 / 4), it grows at every step, however short. An estimate of the start.
 """
 
@@ -31,8 +32,9 @@ def swings(model, method: str, step: float, span: float) -> list[Notice]:
     grows = f"by {100.0 * (mode.grows - 1.0):.3g} %" if mode.grows < 2.0 else f"{mode.grows:.3g} times"
     size = f"{numerics.courant * mode.limit / step:.3g}"
     text = (f"{mode.place}: a swing at {mode.frequency:.4g} Hz with hardly any damping grows {grows} in the run, at "
-            f"{math.log(mode.grows) / span:.3g} 1/s, with {method} and steps of {step:.4g} s, as the start has it: of the "
-            f"imaginary axis its region has nothing; give numerics.method = \"ssp-rk3\", or numerics.courant = {size}, "
+            f"{math.log(mode.grows) / span:.3g} 1/s, with {method} and steps of {step:.4g} s, as the start has it: of "
+            f"the imaginary axis its region has nothing; give numerics.method = \"ssp-rk3\",
+                or numerics.courant = {size}, "
             "by which it grows by 1 %")  # fmt: skip
     return [Notice("swing", mode.place, text, "courant", mode.grows, SWELLS, mode.grows < GROWS)]
 

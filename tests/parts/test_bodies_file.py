@@ -138,7 +138,8 @@ def test_a_body_at_fault_is_no_fault_of_what_names_it():
     """Bodies that hang on it or on its points, links between points, what rides on it, probes."""
     nodes = {
         **arm(mass=0), "b": body(1, [1, 1, 1], hinge(on="arm.bob")), "c": body(1, [1, 1, 1], hinge(on="arm")),
-        **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p", 1), ("q", -1))},
+        **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p",
+            1), ("q", -1))},
         "pool": {"type": "basin", "on": "arm", "size": [1, 1], "cells": [2, 2], "level": 1.0},
         "ground": {"type": "frame", "points": {"eye": [0, 0, 3]}},
     }  # fmt: skip
