@@ -14,6 +14,7 @@ import numpy as np
 from fvsolve import attitude
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.exact.schedule import value
+from fvsolve.parts.attitude import no_direction
 from fvsolve.parts.body.part import Body
 from fvsolve.units import show
 
@@ -181,7 +182,7 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], found: dict[str, Pos
     """Faults of pins whose two points do not meet at the start."""
     for name, link in links.items():
         points = [point_of(nodes, link.ports[port]) for port in ("from", "to")] if link.kind == "pin" else [None]
-        if None in points or any(one not in (WORLD, *found) for one, _ in points):
+        if None in points or no_direction(link.axis) or any(one not in (WORLD, *found) for one, _ in points):
             continue
         here, there = (found.get(one, AT_REST).at(place) for one, place in points)
         turn = found.get(points[0][0], AT_REST).attitude

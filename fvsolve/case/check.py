@@ -88,7 +88,8 @@ def parts(
 ) -> Found:
     """Faults of elevations, and what each part finds wrong beside the others."""
     poses = bodies.poses(nodes, start)
-    yield from _elevations({name: riding_networks.standing(node, poses) for name, node in nodes.items()}, links)
+    high = {name: node for name, node in nodes.items() if riding_networks.has_height(node, poses)}
+    yield from _elevations({name: riding_networks.standing(node, poses) for name, node in high.items()}, links)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
         if fluid is not None:
@@ -136,13 +137,6 @@ def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
     if has_cells and air is not None and air.cavitation and numerics.scheme not in CAVITY_SCHEMES:
         able = " or ".join(map(show, CAVITY_SCHEMES))
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
-
-
-def heads(asked: dict[tuple, Any], gravity: float) -> Found:
-    """Faults of probes of heads where nothing weighs, by their keys."""
-    for keys, probe in asked.items() if gravity == 0.0 else ():
-        if probe is not None and probe.quantity == "head":
-            yield keys, f"{probe.text}: there is no head where gravity is 0; wanted pressure"
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:

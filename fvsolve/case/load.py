@@ -134,10 +134,6 @@ class _Reader:
                                    for patch in basins.patch_names(meshes[name])}  # fmt: skip
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds), self.compare(kinds)
-        asked = {("output", "probes", n): one for n, one in enumerate(output.probes if output is not None else ())}
-        for table, said in (("expect", expect), ("compare", compare)):
-            asked |= {(table, name): one and one.probe for name, one in said.items()}
-        self.add(check.heads(asked, top["gravity"]))
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0

@@ -19,7 +19,7 @@ from fvsolve.units import show
 Found = Iterator[tuple[tuple, str]]
 
 
-def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], named: Any = ()) -> Found:
+def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], named: Any) -> Found:
     """Faults of a basin that rides on a body."""
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
@@ -45,7 +45,7 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
             yield (*key, "patches", patch), text
 
 
-def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any = ()) -> Found:
+def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any) -> Found:
     """Faults of where something rides."""
     key = ("nodes", name)
     if node.on is None:
@@ -54,14 +54,15 @@ def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any = ())
                 yield (*key, other), "is a place on a body; name that with on"
         return
     if node.on in nodes or node.on not in named:  # else at fault itself
-        yield from (((*key, "on"), text) for text in body_faults(node.on, nodes))
+        yield from (((*key, "on"), text) for text in body_faults(node.on, nodes, named))
     if node.elevation is not None:
         yield (*key, "elevation"), f"it rides on {node.on}; say where with at, in axes of that body"
 
 
-def body_faults(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Faults of the body that something rides on."""
+def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
+    """Faults of the body that something rides on; named : tables of all nodes, of those at fault too."""
     bodies = [one for one, node in nodes.items() if isinstance(node, Body)]
+    bodies += [one for one in named if one not in nodes and getattr(named[one], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
         what = f"is a {nodes[on].kind}" if on in nodes else "is not there"
         yield f"{show(on)} {what}; wanted a body: {listing(bodies) or 'there is none'}{did_you_mean(on, bodies)}"

@@ -24,6 +24,12 @@ def standing(node: Node, poses: dict[str, Any]) -> Node:
     return node.model_copy(update={"elevation": float(pose.at(node.place)[2])})
 
 
+def has_height(node: Node, poses: dict[str, Any]) -> bool:
+    """Whether a node has one elevation: a basin on a body has none, nor what rides on one unknown."""
+    on = getattr(node, "on", None)
+    return on is None or (on in poses and not isinstance(node, Basin))
+
+
 def misfits(nodes: dict[str, Any], links: dict[str, Any], fluid: Any, named: Any) -> Found:
     """Faults of places of a network that ride on bodies, and of links that join them."""
     for name, node in nodes.items():

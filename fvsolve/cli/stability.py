@@ -87,7 +87,7 @@ def pictures(found, folder: Path) -> list[str]:
 
     names = []
     for row in found.rows:
-        if row.frozen:
+        if row.limited:
             continue
         side = found.side(row.scheme)
         known = np.isfinite(row.predicted) and row.predicted > 0.0

@@ -29,7 +29,7 @@ class Mode(NamedTuple):
     """What grows most in the run: its place, by how much, and up to which step it does not [s].
 
     own : of what no cell holds, which may leave the state of the start before it has grown, or be bounded by what
-    bends; followed : whether steps follow it all the same
+    bends; followed : whether steps follow it all the same; frequency : at which it swings [Hz]
     """
 
     place: str
@@ -37,6 +37,7 @@ class Mode(NamedTuple):
     limit: float
     own: bool
     followed: bool
+    frequency: float
 
 
 def lumped_modes(model, method: str, step: float) -> list[Mode]:
@@ -52,8 +53,8 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
     return [mode for mode in found if mode is not None]
 
 
-def quickest(r, modes: Modes, step: float, span: float, own: bool) -> Mode | None:
-    """What grows most of some modes, if any does within the span [s]."""
+def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float = GROWS) -> Mode | None:
+    """What grows most of some modes, if any grows `enough` times within the span [s]."""
     if not modes:
         return None
     s = np.concatenate([one for _, one in modes])
@@ -61,17 +62,18 @@ def quickest(r, modes: Modes, step: float, span: float, own: bool) -> Mode | Non
     def grown(h: float) -> float:
         return times(float(beyond(r, s, h).max()), span / h)
 
-    if grown(step) < GROWS:
+    if grown(step) < enough:
         return None
     high, low = step, 0.5 * step
-    while grown(low) >= GROWS and low > LEAST * step:
+    while grown(low) >= enough and low > LEAST * step:
         high, low = low, 0.5 * low
     for _ in range(FINE):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if grown(middle) < GROWS else (low, middle)
+        low, high = (middle, high) if grown(middle) < enough else (low, middle)
     worst = int(np.argmax(beyond(r, s, step)))
     at = int(np.searchsorted(np.cumsum([one.size for _, one in modes]), worst, side="right"))
-    return Mode(modes[at][0], grown(step), low, own, bool(abs(step * s[worst]) <= FOLLOWED))
+    frequency = abs(float(s[worst].imag)) / (2.0 * math.pi)
+    return Mode(modes[at][0], grown(step), low, own, bool(abs(step * s[worst]) <= FOLLOWED), frequency)
 
 
 def beyond(r, s: np.ndarray, h: float) -> np.ndarray:

@@ -18,6 +18,7 @@ from fvsolve.limits.ends import LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
 from fvsolve.limits.lumped import GROWS, Mode, lumped_modes, times
 from fvsolve.limits.plane import holds_well, plane_limit
+from fvsolve.limits.swings import swings
 from fvsolve.limits.symbol import weights_of
 from fvsolve.schemes import ROOM, SCHEMES
 from fvsolve.steppers import automatic
@@ -58,12 +59,13 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
         h = first_step(model)
         modes = lumped_modes(model, method.name, h) if h > 0.0 else []
+        growing = swings(model, method.name, h, span(model)) if h > 0.0 else []
     except FvsolveError:  # a method whose stability function is not to be had
         return []
     found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
     jumps = any(jump for _, jump in model.breaks)
     modes = [mode for mode in modes if mode.own or not found]  # of cells those that waves bring with them are known
-    return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes]
+    return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes] + growing
 
 
 def first_step(model) -> float:

@@ -11,6 +11,7 @@ CANDIDATES = 16  # cells by the distance of their centres that are tried before 
 RINGS = 2  # of neighbours that are tried
 EXACT = 1e-9  # of a cell's size: how far off weights may be that are right
 SUM_FIRST = 1e4  # how much more the sum of the weights counts than their point, where it lies beyond all centres
+LEAST = 1e-300  # of a squared length
 INWARD = 1e-3  # of the way from the outline to the centre of its cell
 
 
@@ -21,6 +22,7 @@ class MeshPoints:
         from scipy.spatial import cKDTree
 
         self.mesh, self.near = mesh, NEAR * float(np.ptp(mesh.points, axis=0).max())
+        self.low, self.high = mesh.points.min(axis=0) - self.near, mesh.points.max(axis=0) + self.near
         self.tree = cKDTree(mesh.centre)
         order = np.argsort(mesh.cells, axis=None, kind="stable")
         first = np.searchsorted(mesh.cells.ravel()[order], np.arange(len(mesh.points) + 1))
@@ -29,6 +31,8 @@ class MeshPoints:
     def cell(self, x: float, y: float) -> int:
         """The number of the cell that a point lies in, on an edge the lowest; -1 outside and in holes."""
         n = len(self.mesh.cells)
+        if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):  # so far off that distances overflow, or no number
+            return -1
         nearest = np.sort(np.ravel(self.tree.query((x, y), min(CANDIDATES, n))[1]))
         for cells in (nearest, np.arange(n)):
             inside = self._inside(cells, x, y)
@@ -50,7 +54,7 @@ class MeshPoints:
         outer = slice(mesh.inner, None)
         a, b = (mesh.points[mesh.ends[outer, k]] for k in (0, 1))
         along, point = b - a, np.array([x, y])
-        share = np.clip(((point - a) * along).sum(1) / (along * along).sum(1), 0.0, 1.0)
+        share = np.clip(((point - a) * along).sum(1) / np.maximum((along * along).sum(1), LEAST), 0.0, 1.0)
         foot = a + share[:, None] * along
         k = int(np.argmin(np.hypot(*(foot - point).T)))
         found = foot[k] + INWARD * (mesh.centre[mesh.left[outer][k]] - foot[k])

@@ -104,8 +104,9 @@ def linear_offsets(draft, start, row, probe) -> None:
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
         row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
         if probe.quantity == "head":
-            row["scale"] /= weight
-            row["offset"] = row["offset"] / weight + z
+            heavy = weight if weight > 0.0 else np.nan  # where nothing weighs there is none
+            row["scale"] /= heavy
+            row["offset"] = row["offset"] / heavy + z
 
 
 def barotropic_offsets(draft, start, row, probe) -> None:
@@ -124,3 +125,5 @@ def barotropic_offsets(draft, start, row, probe) -> None:
             row["offset"] = draft.node_table[row["index"]]["elevation"]
         else:
             row["offset"] = start.profile_at(int(row["index"]), probe.fraction)[1]
+        if draft.case.gravity == 0.0:
+            row["offset"] = np.nan

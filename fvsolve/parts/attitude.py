@@ -15,6 +15,7 @@ from fvsolve.parts.value import Matrix, Misfit, Quantity, Rows, Setting, Usual
 TURNS = Usual(-6.3, 6.3, "a turn either way")
 TYPED = 1e-6  # what numbers typed with six digits are off by, of 1; beyond it is noted
 LOOSE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between forms; beyond it is a fault
+SHORTEST = 1e-100  # of an axis
 ANGLES = ("roll", "pitch", "yaw")
 
 
@@ -141,8 +142,8 @@ def uneven(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[An
 
 
 def no_direction(given: tuple[float, ...] | None) -> bool:
-    """Whether a vector is given that points nowhere."""
-    return given is not None and math.hypot(*given) == 0.0
+    """Whether a vector is given that points nowhere, or has no square."""
+    return given is not None and math.hypot(*given) < SHORTEST
 
 
 def _no_length(said: dict[str, Any]) -> Iterator[tuple[str, str]]:

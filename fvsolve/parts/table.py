@@ -128,6 +128,8 @@ class Inside(Value):
         self.model, self.about = model, about
 
     def read(self, given: Any, setting: Setting) -> Table:
+        if isinstance(given, list) and len(given) > 1 and all(isinstance(one, dict) for one in given):
+            raise ValueError(f"is a list of {len(given)} tables; wanted one{', ' * bool(self.about)}{self.about}")
         return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:

@@ -19,6 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 LONGEST = 100  # letters of a unit
+MOST = 1e100  # of a quantity [SI]
 _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
@@ -34,6 +35,8 @@ def parse(given: Any, dimension: str) -> Any:
         value, unit = _parse_number(given, dimension), None
     if not math.isfinite(value):
         raise ValueError(f"{show(given)} is not finite; {wanted(dimension)}")
+    if abs(value) > MOST:
+        raise ValueError(f"{show(given)} is beyond {MOST:g} SI, where squares and products end; {wanted(dimension)}")
     if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
         return value, unit is not None and unit.gauge
     if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":

@@ -671,10 +671,6 @@ BAD = {
         "line 32: TOML: a bare name has no blank; write main_valve",
     ),
     "a bare key with a blank": (swap("cells = 200", "wave speed = 3"), "a bare name has no blank; write wave_speed"),
-    "a head where nothing weighs": (
-        swap("schema = 1", "schema = 1\ngravity = 0").replace("gate.pressure", "gate.head"),
-        "output.probes[0]: gate.head: there is no head where gravity is 0; wanted pressure",
-    ),
     # TOML
     "syntax": (swap("end = ", "end "), "line 41: TOML: expected '=' after a key in a key/value pair: "),
     "a key twice": (add("links.main", "cells = 3"), 'TOML: this key is given twice: "cells = 200"'),

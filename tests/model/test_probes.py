@@ -50,3 +50,12 @@ def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
     one, other = found
     for rows in (slice(0, len(PLACES)), slice(len(PLACES), None)):
         assert np.abs(one[rows] - other[rows]).max() < 1e-9 * np.abs(one[rows]).max()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_where_nothing_weighs_there_is_no_head_and_all_else(law):
+    nodes = {"lake": reservoir(1.5e5), "end": {"type": "chamber", "volume": 1.0, "initial_pressure": 1e5}}
+    case = scene(nodes, {"gate": valve("lake", "end", 1e-3)}, 0.1, {"rtol": 1e-6}, ["end.head", "end.pressure"], 0.01)
+    result = fvsolve.run({**case, "gravity": 0.0, "fluid": {**WATER, "law": law}})
+    assert result.ok and np.all(np.isnan(result["end.head"])) and np.ptp(result["end.pressure"]) > 1e3

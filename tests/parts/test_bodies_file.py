@@ -38,6 +38,16 @@ BAD = {
     ),
     "a joint without axis": (arm(joint={"kind": "revolute"}), "nodes.arm.joint: axis is missing"),
     "an axis of zeros": (arm(joint=hinge(axis=[0, 0, 0])), "nodes.arm.joint.axis: is all zeros"),
+    "an axis that is too short": (arm(joint=hinge(axis=[0, 1e-300, 0])), "nodes.arm.joint.axis: is all zeros"),
+    "a place beyond all": (arm(centre_of_mass=[0, 0, 1e300]), "centre_of_mass[2]: 1e+300 is beyond 1e+100 SI, where"),
+    "a place that is none": (arm(points={"bob": [0, 0, float("nan")]}), "nodes.arm.points.bob[2]: nan is not finite"),
+    "a mass below zero": (arm(mass="-3 kg"), 'nodes.arm.mass: "-3 kg" is out of range; wanted a value above 0'),
+    "a mass in words": (arm(mass="heavy"), 'nodes.arm.mass: "heavy" is no number with a unit; wanted a mass'),
+    "a length as a mass": (arm(mass="3 m"), 'nodes.arm.mass: "3 m" is a length; wanted a mass'),
+    "two joints": (
+        arm(joint=[hinge(), {"kind": "ball"}]),
+        "nodes.arm.joint: is a list of 2 tables; wanted one, by which it hangs on another, or on the world",
+    ),
     "a travel of a hinge": (arm(joint=hinge(travel=1)), "nodes.arm.joint.travel: goes with no joint of kind"),
     "a joint of no kind": (arm(joint={"kind": "hinge"}), 'nodes.arm.joint.kind: no joint named "hinge"; say revolute'),
     "a rate along a line": (arm(joint=hinge(rate="1 m/s")), 'nodes.arm.joint.rate: "1 m/s" is a velocity'),
@@ -128,7 +138,8 @@ def test_a_body_at_fault_is_no_fault_of_what_names_it():
     """Bodies that hang on it or on its points, links between points, what rides on it, probes."""
     nodes = {
         **arm(mass=0), "b": body(1, [1, 1, 1], hinge(on="arm.bob")), "c": body(1, [1, 1, 1], hinge(on="arm")),
-        **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p", 1), ("q", -1))},
+        **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p",
+            1), ("q", -1))},
         "pool": {"type": "basin", "on": "arm", "size": [1, 1], "cells": [2, 2], "level": 1.0},
         "ground": {"type": "frame", "points": {"eye": [0, 0, 3]}},
     }  # fmt: skip
@@ -160,3 +171,88 @@ def test_a_case_of_bodies_reads_back_as_itself():
 
     again = fvsolve.load(tomllib.loads(case.resolved()))
     assert again == case
+
+
+ALL = """
+schema = 1
+[fluid]
+name = "user"
+density = 1000
+bulk_modulus = 2e9
+[nodes.ground]
+type = "frame"
+points = { lug = [0, 0, 0], far = [3, 0, 0] }
+[nodes.arm]
+type = "body"
+mass = 0
+inertia = ["1 kg m", 1, 9]
+joint = { kind = "revolute" }
+[nodes.boom]
+type = "body"
+mass = 10
+inertia = [1, 1, 9]
+joint = { kind = "revolute", axis = [0, 2, 0] }
+[nodes.a]
+type = "body"
+mass = 1
+inertia = [1, 1, 1]
+joint = { on = "b", kind = "revolute", axis = [0, 0, 1] }
+[nodes.b]
+type = "body"
+mass = 1
+inertia = [1, 1, 1]
+joint = { on = "a", kind = "revolute", axis = [0, 0, 1] }
+[nodes.c]
+type = "body"
+mass = 1
+inertia = [1, 1, 1]
+joint = { kind = "fixed", attitude = { matrix = [[1, 0, 0], [0, 1, 0], [0, 0, 2]] } }
+[nodes.pool]
+type = "basin"
+size = [1, 1]
+cells = [4, 4]
+level = 0.5
+on = "boon"
+elevation = 3
+[nodes.flume]
+type = "basin"
+size = [1, 1]
+cells = [4, 4]
+level = 0.5
+patches = { lid = { side = "west", travel = { start = 0, duration = 1, value = [0, 1.5] } } }
+[links.lift]
+type = "cylinder"
+ports = { case = "ground.lug", rod = "ground.far" }
+stroke = 1
+area_A = 1e-3
+area_B = 1e-3
+dead_volume_A = 1e-3
+dead_volume_B = 1e-3
+[links.s]
+type = "spring"
+from = "ground.lug"
+to = "boom.eye"
+stiffness = 1
+[numerics]
+end = 2
+step = 0.01
+"""
+TOLD = """all.toml: 11 faults
+  line 11: nodes.arm.mass: 0 is out of range; wanted a value above 0
+  line 12: nodes.arm.inertia[0]: "1 kg m" is a quantity of [kg·m]; wanted a moment of inertia, for example "12 kg m2"
+  line 13: nodes.arm.joint: axis is missing: a revolute joint moves along or about one, for example [0, 1, 0]
+  line 17: nodes.boom.inertia: moments of 1, 1, 9 kg m2 belong to no body: one is above the sum of the other two
+  line 23: nodes.a.joint.on: hangs on itself: a on b on a; close a loop by a pin, and leave one on out
+  line 33: nodes.c.joint.attitude.matrix: is no rotation: R'R is the identity but for 3; wanted columns of length 1 at right angles
+  line 39: nodes.pool.on: "boon" is not there; wanted a body: a, arm, b, boom, c; did you mean "boom"?
+  line 40: nodes.pool.elevation: it rides on boon; say where with at, in axes of that body
+  line 46: nodes.flume.patches.lid.travel: comes 1.5 m inward, and the zone behind it is 1 m wide; wanted less, or a wider zone
+  line 50: links.lift.stroke: the piston starts at 3 m, ground.far less ground.lug; wanted 0 to 1 m
+  line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B"""  # noqa: E501
+
+
+def test_all_that_is_wrong_with_what_moves_is_said_at_once_with_its_lines_and_nothing_else(tmp_path):
+    (tmp_path / "all.toml").write_text(ALL.lstrip())
+    with pytest.raises(CaseError) as caught:
+        fvsolve.load(tmp_path / "all.toml")
+    assert str(caught.value) == TOLD

@@ -49,12 +49,15 @@ def at_a_later_time(case: dict, wait: float) -> dict:
 
 
 TEXT = {
-    "mass": (1e-3, "t"), "inertia": (1e4, "kg cm2"), "centre_of_mass": (1e3, "mm"), "points": (100.0, "cm"), "at": (1e-3, "km"),
+    "mass": (1e-3, "t"), "inertia": (1e4, "kg cm2"), "centre_of_mass": (1e3, "mm"), "points": (100.0, "cm"),
+        "at": (1e-3, "km"),
     "velocity": (3.6, "km/h"), "axis": None, "attitude": (180.0 / math.pi, "deg"), "closed_length": (1e3, "mm"),
     "stroke": (100.0, "cm"), "area_A": (1e4, "cm2"), "area_B": (1e6, "mm2"), "dead_volume_A": (1e3, "l"),
     "dead_volume_B": (1e6, "ml"), "stiffness": (1e-3, "kN/m"), "free_length": (1e3, "mm"), "preload": (1e-3, "kN"),
-    "greatest": (1e3, "mm"), "force": (1e-3, "kN"), "torque": (1e-3, "kN m"), "level": (1e3, "mm"), "zone": (100.0, "cm"),
-    "length": (1e3, "mm"), "diameter": (100.0, "cm"), "initial_position": (1e3, "mm"), "initial_velocity": (3.6, "km/h"),
+    "greatest": (1e3, "mm"), "force": (1e-3, "kN"), "torque": (1e-3, "kN m"), "level": (1e3, "mm"),
+        "zone": (100.0, "cm"),
+    "length": (1e3, "mm"), "diameter": (100.0, "cm"), "initial_position": (1e3, "mm"),
+        "initial_velocity": (3.6, "km/h"),
     "travel": (1e3, "mm"), "rotational_stiffness": (1e-3, "kN m"), "thickness": (1e3, "mm"),
 }  # fmt: skip
 
@@ -86,7 +89,7 @@ def said(value: Any, key: str) -> Any:
 
 
 def swapped(case: dict) -> dict:
-    """Links between points are drawn from their other end; a bushing's damping, which the axes of `from` see, is left."""
+    """Links between points are drawn from their other end; a bushing has no damping, which `from` sees."""
     other = copy.deepcopy(case)
     for link in other["links"].values():
         if link["type"] in ("spring", "damper", "end-stop", "pin", "bushing", "force") and "from" in link:
@@ -137,7 +140,8 @@ def each_attitude(case: dict):
 FORMS = {
     "roll, pitch, yaw": lambda r: dict(zip(("yaw", "pitch", "roll"), r.as_euler("ZYX").tolist(), strict=True)),
     "zyz": lambda r: {"zyz": r.as_euler("ZYZ").tolist()},
-    "axis and angle": lambda r: {"axis": (r.as_rotvec() / max(r.magnitude(), 1e-300) if r.magnitude() else np.array([0, 0, 1.0])).tolist(),
+    "axis and angle": lambda r: {"axis": (r.as_rotvec() / max(r.magnitude(),
+        1e-300) if r.magnitude() else np.array([0, 0, 1.0])).tolist(),
                                  "angle": float(r.magnitude())},
     "Euler parameters": lambda r: {"euler_parameters": np.roll(r.as_quat(), 1).tolist()},
     "Euler parameters, negative": lambda r: {"euler_parameters": (-np.roll(r.as_quat(), 1)).tolist()},

@@ -1,4 +1,4 @@
-"""Scenes with things that move: mechanisms, loops, walls, frames, free tanks, columns. Knows the keys; knows no answer."""
+"""Scenes with things that move: mechanisms, walls, frames, tanks, columns. Knows the keys; knows no answer."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
     """A tree with every kind of joint, a free body, and every kind of link between points."""
     wave = {"mean": 0.1, "amplitude": 0.2, "period": 0.9, "phase": 0.4}
     nodes = {
-        "world": {"type": "frame", "points": {"foot": [0.1, -0.2, 0.3], "lug": [0.5, 0.1, -0.6], "hook": [1.0, 2.0, 3.0]}},
+        "world": {"type": "frame", "points": {"foot": [0.1, -0.2, 0.3], "lug": [0.5, 0.1, -0.6], "hook": [1.0,
+            2.0, 3.0]}},
         "base": body(5.0, [1.0, 1.2, 1.1], {"kind": "revolute", "axis": [0, 0, 1], "angle": wave},
                      points={"top": [0, 0.2, 0.5], "side": [0.4, -0.1, 0.1]}),
         "arm": body(3.0, [0.2, 0.5, 0.4], {"kind": "revolute", "on": "base.top", "axis": [0.6, -0.8, 0], "angle": 0.3,
@@ -54,7 +55,8 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
                      centre_of_mass=[0.02, -0.03, 0.01], points={"nose": [0.3, 0.1, 0.0], "tail": [-0.3, 0.0, 0.1]}),
     }  # fmt: skip
     links = {
-        "lift": {"type": "cylinder", "ports": {"case": "world.lug", "rod": "arm.eye"}, "closed_length": 0.6, "stroke": 1.5,
+        "lift": {"type": "cylinder", "ports": {"case": "world.lug", "rod": "arm.eye"}, "closed_length": 0.6,
+            "stroke": 1.5,
                  "area_A": 1e-4, "area_B": 6e-5, "dead_volume_A": 5e-4, "dead_volume_B": 5e-4, "viscous_friction": 5.0},
         "string": {"type": "spring", "from": "world.hook", "to": "kite.nose", "stiffness": 30.0, "free_length": 1.0},
         "strap": {"type": "spring", "from": "plate.edge", "to": "kite.tail", "stiffness": 20.0, "preload": -2.0},
@@ -105,9 +107,11 @@ def loop(method: str = "rk4", **more) -> dict:
         "world": {"type": "frame", "points": {"hook": [0.5, 0.4, -2.0]}},
         "rig": body(9.0, [1, 1, 1], {"kind": "fixed", "at": [0.3, -0.2, 0.1], **aslant}),
         "one": body(joint={"kind": "revolute", "on": "rig", "axis": [0, 1, 0], "angle": 0.7, "rate": 0.5}, **bar),
-        "two": body(joint={"kind": "revolute", "on": "rig", "at": [1.5, 0, 0], "axis": [0, 1, 0], "angle": 0.7, "rate": 0.5},
+        "two": body(joint={"kind": "revolute", "on": "rig", "at": [1.5, 0, 0], "axis": [0, 1, 0], "angle": 0.7,
+            "rate": 0.5},
                     **bar),
-        "coupler": body(3.0, [0.01, 0.5625, 0.5625], {"kind": "revolute", "on": "one.end", "axis": [0, 1, 0], "angle": -0.7,
+        "coupler": body(3.0, [0.01, 0.5625, 0.5625], {"kind": "revolute", "on": "one.end", "axis": [0, 1, 0],
+            "angle": -0.7,
                         "rate": -0.5}, centre_of_mass=[0.75, 0, 0], points={"end": [1.5, 0, 0], "mid": [0.75, 0, 0.1]}),
     }  # fmt: skip
     links = {
@@ -179,7 +183,8 @@ def carried(method: str = "rk4", **more) -> dict:
     """A basin on a body that is driven about an axis aslant, on another that is driven along a line."""
     nodes = {
         "cart": body(5.0, [1, 1, 1], {"kind": "prismatic", "axis": [0.6, 0.8, 0], "travel": {**ROCK, "period": 0.9}}),
-        "cradle": body(5.0, [1, 1, 1], {"kind": "revolute", "on": "cart", "at": [0.2, 0.1, 0.5], "axis": [0.36, 0.48, 0.8], "angle": ROCK}),
+        "cradle": body(5.0, [1, 1, 1], {"kind": "revolute", "on": "cart", "at": [0.2, 0.1, 0.5], "axis": [0.36,
+            0.48, 0.8], "angle": ROCK}),
         "b": {"type": "basin", "on": "cradle", "at": [-0.5, -0.4, 0.3], "attitude": {"yaw": 0.4, "roll": 0.02},
               "size": [1.0, 0.8], "cells": [6, 5], "level": 0.3},
     }  # fmt: skip
@@ -210,7 +215,8 @@ def full(method: str = "rk4", law: str = "linear", free: bool = False, **more) -
 def rocking(method: str = "rk4", sloshing: str = "cells", **more) -> dict:
     """A basin that moves its body, which hangs on a ball and on springs."""
     hull = body(
-        400.0, [300.0, 400.0, 500.0], {"kind": "ball", "at": [0.1, 0.2, 1.0], "attitude": {"roll": 0.05, "pitch": -0.03, "yaw": 0.4},
+        400.0, [300.0, 400.0, 500.0], {"kind": "ball", "at": [0.1, 0.2, 1.0], "attitude": {"roll": 0.05,
+            "pitch": -0.03, "yaw": 0.4},
         "rate": [0.1, -0.05, 0.2]}, centre_of_mass=[0.05, 0, -0.8], points={"right": [0, 1.0, 0], "left": [0, -1.0, 0]},
     )  # fmt: skip
     pool = {"type": "basin", "on": "hull", "at": [-0.5, -0.4, -0.9], "size": [1.0, 0.8], "cells": [6, 5], "level": 0.25,
@@ -232,7 +238,8 @@ def u_tube(method: str = "rk4", free: bool = True, **more) -> dict:
     """Two tanks and a rigid column between them on a hull that rolls, of itself or as a schedule has it."""
     roll = {"angle": 0.15, "rate": -0.02} if free else {"angle": ROCK}
     nodes = {
-        "hull": body(60e3, [4e5, 8e5, 8e5], {"kind": "revolute", "axis": [1, 0, 0], **roll}, centre_of_mass=[0, 0, -0.8]),
+        "hull": body(60e3, [4e5, 8e5, 8e5], {"kind": "revolute", "axis": [1, 0, 0], **roll}, centre_of_mass=[0,
+            0, -0.8]),
         "port": {"type": "tank", "on": "hull", "at": [0, 4, -1.5], "area": 1.2, "level": 0.8},
         "starboard": {"type": "tank", "on": "hull", "at": [0, -4, -1.5], "area": 1.2, "level": 0.8},
     }  # fmt: skip
@@ -256,7 +263,8 @@ def hose(method: str = "rk4", law: str = "linear", **more) -> dict:
         "gate": {"type": "junction", "on": "rig", "at": [9, 1, 0]},
         "shut": {"type": "chamber", "volume": 0.01, "on": "rig", "at": [9, 1, 0]},
     }  # fmt: skip
-    links = {"pipe": {"type": "pipe", "from": "open", "to": "gate", "length": 9.2, "diameter": 0.1, "wave_speed": 1000.0, "cells": 6},
+    links = {"pipe": {"type": "pipe", "from": "open", "to": "gate", "length": 9.2, "diameter": 0.1,
+        "wave_speed": 1000.0, "cells": 6},
              "valve": {"type": "valve", "from": "gate", "to": "shut", "area": 1e-3}}  # fmt: skip
     probes = ["gate.pressure", "shut.pressure", "pipe.flow@0", "pipe.pressure@0.37", "valve.flow"]
     made = scene(nodes, links, 0.04, stepped(method, 5e-4), probes, 2e-3)

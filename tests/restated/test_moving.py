@@ -199,9 +199,12 @@ def test_a_wall_of_a_mass_is_that_of_a_body_on_a_prismatic_joint(law, method):
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
     """On the axis of masses, and along one aslant in space without weight."""
-    cylinder = {"type": "cylinder", "stroke": 0.5, "area_A": 1e-3, "area_B": 7e-4, "dead_volume_A": 1e-4, "dead_volume_B": 2e-4,
-                "viscous_friction": 30.0, "closed_length": 0.1, "initial_pressure_A": 3e6, "initial_pressure_B": 3.2e6}  # fmt: skip
-    rest = {"spring": {"type": "spring", "stiffness": 5e3, "free_length": 0.2}, "stop": {"type": "end-stop", "greatest": 0.31,
+    cylinder = {"type": "cylinder", "stroke": 0.5, "area_A": 1e-3, "area_B": 7e-4, "dead_volume_A": 1e-4,
+        "dead_volume_B": 2e-4,
+                "viscous_friction": 30.0, "closed_length": 0.1, "initial_pressure_A": 3e6,
+                    "initial_pressure_B": 3.2e6}  # fmt: skip
+    rest = {"spring": {"type": "spring", "stiffness": 5e3, "free_length": 0.2}, "stop": {"type": "end-stop",
+        "greatest": 0.31,
             "stiffness": 1e6, "damping": 1e3}, "brake": {"type": "damper", "damping": 40.0}}  # fmt: skip
     push = {"type": "force", "force": {"mean": 100.0, "amplitude": 500.0, "period": 0.05}}
     probes = [
@@ -220,7 +223,8 @@ def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
         made = scene(nodes, links, 0.1, stepped(method, 5e-4), probes, 1 / 128, gravity=0.0)
         return made | {"fluid": {**OIL, "law": law, **({"air_fraction": 1e-3} if law == "mixture" else {})}}
 
-    one = case({"m": {"type": "mass", "mass": 20.0, "initial_position": 0.3, "initial_velocity": 0.4}, "ground": {"type": "frame"}},
+    one = case({"m": {"type": "mass", "mass": 20.0, "initial_position": 0.3, "initial_velocity": 0.4},
+        "ground": {"type": "frame"}},
                "ground", "m")  # fmt: skip
     way = [0.36, 0.48, 0.8]
     slides = {"kind": "prismatic", "axis": way, "travel": 0.3, "rate": 0.4}
@@ -252,7 +256,8 @@ def test_a_slider_that_is_driven_by_a_power_or_by_its_table(method):
     """x = (1 - t / 2)^2, as a ramp of exponent 2 and as a smooth table: its slope is right to (0.01 s)^2."""
     found, times = [], np.linspace(-1.0, 3.0, 401)
     for travel in ({"start": 0.0, "duration": 2.0, "value": [1.0, 0.0], "exponent": 2},
-                   {"time": times.tolist(), "value": ((1.0 - times / 2.0) ** 2).tolist(), "kind": "smooth"}):  # fmt: skip
+                   {"time": times.tolist(), "value": ((1.0 - times / 2.0) ** 2).tolist(),
+                       "kind": "smooth"}):  # fmt: skip
         nodes = {"cart": body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": travel}),
                  "bob": body(1.0, [0.1, 0.1, 0.1], {"kind": "revolute", "on": "cart", "axis": [0, 1, 0], "angle": 0.3},
                              centre_of_mass=[0, 0, -0.5])}  # fmt: skip

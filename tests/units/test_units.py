@@ -71,7 +71,8 @@ rad/s: radian/second | rpm: revolution/minute | RPM: revolution/minute | N m: ne
 Nm: newton*meter | kN m: kilonewton*meter | kNm: kilonewton*meter | lbf ft: pound_force*foot
 lbf in: pound_force*inch | kg m2: kilogram*meter**2 | kgm2: kilogram*meter**2 | g m2: gram*meter**2
 t m2: metric_ton*meter**2 | kg cm2: kilogram*centimeter**2 | kg mm2: kilogram*millimeter**2
-g cm2: gram*centimeter**2 | g mm2: gram*millimeter**2 | lb in2: pound*inch**2 | slug ft2: slug*foot**2 | deg/s: degree/second | N m s: newton*meter*second | N m s/rad: newton*meter*second
+g cm2: gram*centimeter**2 | g mm2: gram*millimeter**2 | lb in2: pound*inch**2 | slug ft2: slug*foot**2
+deg/s: degree/second | N m s: newton*meter*second | N m s/rad: newton*meter*second
 Nms: newton*meter*second | kN m s: kilonewton*meter*second | N s: newton*second | kg m/s: kilogram*meter/second
 kN s: kilonewton*second | kg m2/s: kilogram*meter**2/second
 lb ft2: pound*foot**2 | C: coulomb | F: farad | K: kelvin | degC: degC | celsius: degC | degF: degF | degR: degR

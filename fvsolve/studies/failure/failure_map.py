@@ -152,8 +152,10 @@ class Trials:
             doubt = found.doubt.trajectory
             if doubt > self.tolerance / 2:
                 raise FvsolveError(
-                    f"the reference is no better than the runs it judges: it may be off by {doubt:.2g} of a probe's "
-                    f"range, the tolerance is {self.tolerance:g}; give --tolerance {4 * doubt:.1g}, or more cells"
+                    "the reference is no better than the runs it judges: it may be off by "
+                    f"{doubt:.2g} of the range of {found.doubt.worst or 'a probe'}, the tolerance is "
+                    f"{self.tolerance:g}; give --tolerance {4 * doubt:.1g}, or more cells; or leave it out of "
+                    "output.probes, if what it shows is rounding"
                 )
             self._references[at] = found
         return self._references[at]

@@ -15,6 +15,7 @@ from fvsolve.studies.linear.slopes import FINER, SMOOTH, STEPS, central, kinks, 
 
 DENSE = 1000  # states up to which A is a full array
 LONGEST, LARGEST = 20.0, 10_000_000  # that C may take [s], entries that it may have
+ROUNDING = 1e-10  # of the quickest rate per deviation: rows below that are what sums have left of their terms
 DIRECTIONS = 3  # at random, along which the whole of A is tried
 
 
@@ -52,6 +53,7 @@ def state_matrix(at: Frozen) -> tuple[Any, np.ndarray, float, np.ndarray]:
     for steps in (STEPS, FINER):
         slopes, sides = entries(at, width, rows, columns, steps)
         size = np.bincount(rows, np.abs(slopes[len(steps) // 2]), n)
+        size = np.maximum(size, ROUNDING * width * np.max(size / width, initial=0.0))
         row_size = np.where(size > 0.0, size, 1.0)[rows]
         values, errors = settled(slopes, row_size, starts)
         bent = kinks(sides, row_size, starts)
@@ -80,6 +82,12 @@ def entries(at: Frozen, width, rows, columns, steps) -> tuple[np.ndarray, np.nda
 
 def refuse(model, j: int, what: str) -> None:
     """Raise for a state along which there is no derivative."""
+    basin = next((one for one in model.basins if model.state_names[j].startswith(f"{one.name}.")), None)
+    if basin is not None:
+        text = (
+            "fluxes of this basin have a kink so near its state (waves as quick from both sides, cells that fall dry)"
+        )
+        raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {text}; wanted another state")
     why = {
         "slope": "its slope has no end there, as that of a valve at a drop of zero: give the valve "
                  "laminar_reynolds, or linearise while it flows (--at)",
@@ -128,7 +136,8 @@ def output_matrix(at: Frozen, outputs: int, steps: np.ndarray) -> tuple[np.ndarr
 def too_large(n: int, outputs: int) -> FvsolveError:
     """What to say of a C that is not found."""
     return FvsolveError(f"C of {n} states and {outputs} outputs is too large, or takes longer than {LONGEST:g} s: ask "
-                        "for fewer --outputs, or give the pipes fewer cells, --set links.NAME.cells=100")  # fmt: skip
+                        "for fewer --outputs, or give pipes or basins fewer cells, --set links.NAME.cells=100 or "
+                        "nodes.NAME.cells=[20,20]")  # fmt: skip
 
 
 def seen(at: Frozen, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:

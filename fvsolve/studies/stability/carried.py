@@ -102,9 +102,9 @@ class TooLarge(FvsolveError):
 
 def too_large(states: int, steps: int) -> str:
     """What to say then."""
-    return (f"{states} states and {steps} steps take longer than {LONGEST:g} s to predict: give the pipes fewer cells, "
-            "--set links.NAME.cells=100 (or numerics.cell_time, where pipes state none; the limit as a Courant number "
-            "changes little), or fewer --steps")  # fmt: skip
+    return (f"{states} states and {steps} steps take longer than {LONGEST:g} s to predict: give pipes or basins fewer "
+            "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or numerics.cell_time, where pipes state "
+            "none; the limit as a Courant number changes little), or fewer --steps")  # fmt: skip
 
 
 def stepping(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np.ndarray]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.schemes import LIMITED
 from fvsolve.studies.linear.frozen import has_limiter
 from fvsolve.studies.stability.carried import TooLarge
 
@@ -16,7 +15,7 @@ GROWS = 1e-9  # of the greatest wave rate or eigenvalue: real parts below are ro
 def notes(row, side, system) -> list[str]:
     """What a reader of the row has to know."""
     found = [*of_the_case(row, side)]
-    if row.frozen or (row.scheme in LIMITED and side.at.model.cells):
+    if row.limited:
         return found + of_a_limiter(row, side.at.model)
     if not np.isfinite(row.predicted):
         return [*found, "no step up to 1e4 / ||J|| fails", *of_a_state_left(row)]

@@ -44,6 +44,11 @@ class StabilityRow:
     notes: tuple[str, ...] = ()
 
     @property
+    def limited(self) -> bool:
+        """Whether it is of a limited scheme: of that nothing is predicted but with weights that stand still."""
+        return bool(self.frozen) or "frozen weights" in self.left_out
+
+    @property
     def difference(self) -> float:
         """measured / predicted - 1; nan where there is none."""
         known = np.isfinite(self.measured) and np.isfinite(self.predicted) and self.predicted > 0.0
