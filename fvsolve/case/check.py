@@ -97,7 +97,7 @@ def parts(
 
     named = nodes if raw is None else _dict(raw.table.get("nodes"))
     yield from bodies.misfits(nodes, named)
-    yield from riding_networks.misfits(nodes, links, fluid, named)
+    yield from riding_networks.misfits(nodes, links, named)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     yield from sloshing.misfits(nodes, lumped, poses)
