@@ -282,8 +282,8 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = [name for (_, name), part in wet.items() if part.elevation is not None]
     for (group, name), part in wet.items():
-        by_head = getattr(part, "head", None) is not None
-        if stated and name not in stated and not by_head:
+        elsewhere = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
+        if stated and name not in stated and not elsewhere:
             yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
     heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in chambers_of(link)}

@@ -46,7 +46,7 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
         on = getattr(nodes.get(name), "on", None)
         return on is not None and (not free or any(free_joints(on, nodes)))
 
-    tanks = {name for name, node in nodes.items() if node.kind == "tank" and riding(name)}
+    tanks = [name for name, node in nodes.items() if node.kind == "tank" and riding(name)]
     for name in tanks:
         for key in ("connection", "height"):
             if getattr(nodes[name], key) is not None:
@@ -62,10 +62,10 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
             yield key, "what leaves here is not felt by its body yet; wanted a valve to a reservoir"
         elif link.kind == "rigid-column":
             for end in ends:
-                if led(end, nodes, links):
+                if end in nodes and led(end, nodes, links):
                     yield key, f"at {end} it meets none but valves and columns, which is not felt yet; {PIPE_THERE}"
         elif link.kind != "pipe" or free:
-            for end in tanks.intersection(ends):
+            for end in dict.fromkeys(end for end in ends if end in tanks):
                 what = "a pipe answers at once" if link.kind == "pipe" else "a valve has no inertia"
                 yield key, f"{what} to {end}, whose own flow has none either; wanted a rigid-column between"
 

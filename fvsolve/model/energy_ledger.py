@@ -36,6 +36,7 @@ class Accounts:
         model, case = slate.model, slate.model.case
         if len(model.tables.rides):
             refuse_unfelt(case)
+            slate.tables.rides["heavy"] = rec.ASKED
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of basins that ride on bodies is not booked where a side is open yet")
         if model.basins and not case.law.linear:
@@ -43,7 +44,6 @@ class Accounts:
         self.power, self.stored = model.functions.energies
         if model.basins and len(model.tables.bodies):  # feel what rides on them, for its work
             slate.tables.basins["heavy"] = 1
-        slate.tables.rides["heavy"] = rec.ASKED
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # of stored energy: rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop

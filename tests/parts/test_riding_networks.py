@@ -1,5 +1,6 @@
 """Networks on bodies: U-tubes that roll, pipes that are turned and accelerated, against closed forms and (70)."""
 
+import meshio
 import numpy as np
 import pytest
 from scipy.integrate import simpson, solve_ivp
@@ -7,6 +8,7 @@ from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.output.fields import read_series
 from fvsolve.studies.energy.energy import energy
 
 HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # of a U-tube: between its arms, of its duct below the axis, of water above that [m]
@@ -441,3 +443,26 @@ def test_a_tank_that_falls_ends_the_run_by_name():
     case["nodes"]["hull"]["joint"] = {"kind": "prismatic", "axis": [0, 0, 1], "travel": slows}
     run = fv.run(case)
     assert not run.ok and "the water in starboard has no weight left" in run.reason
+
+
+def test_pipes_and_basins_are_drawn_where_their_bodies_are(tmp_path):
+    case = u_tube(minor_loss=0.0)
+    case["links"]["duct"] |= {"type": "pipe", "wave_speed": 300.0, "cells": 4}
+    case["nodes"]["pool"] = {"type": "basin", "on": "hull", "at": [1, 2, 3], "size": [2.0, 1.0], "cells": [2, 1],
+                             "level": 0.5}  # fmt: skip
+    case["numerics"] = {"end": 2.0, "scheme": "upwind5", "method": "rk4", "courant": 0.8}
+    case["output"] |= {"fields": 3, "probes": ["hull.angle"]}
+    fv.run(case, out=tmp_path / "run")
+    frames = read_series(tmp_path / "run" / "fields.pvd")
+    y = np.linspace(HALF, -HALF, 5)
+    duct = np.column_stack([np.zeros(5), y, np.full(5, -DEPTH)])
+    corners = np.array([[1.0, 2, 3], [3, 2, 3], [3, 3, 3], [1, 3, 3]])
+    for t, path in frames:
+        angle = roll(t)[0]
+        turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+        truth = (corners if "pool" in path.name else duct) @ turn.T
+        points = meshio.read(path).points
+        if "bodies" not in path.name:
+            for one in truth:
+                assert np.min(np.linalg.norm(points - one, axis=1)) < 1e-9
+    assert {path.name.rpartition("-")[0] for _, path in frames} == {"", "bodies", "pool"}
