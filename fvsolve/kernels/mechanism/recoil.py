@@ -41,7 +41,7 @@ def follow_networks(t, y, dydt, out, handle):
     """Let flow feel what the accelerations of bodies are beyond those with joints held."""
     tables = open_tables(handle)
     pipes, columns, rides = tables.pipes, tables.columns, tables.rides
-    if dydt.size == 0 or not anything_moves(tables):
+    if dydt.size == 0 or tables.freedoms.size == 0:
         return
     load_all(y, dydt, out, tables, ASKED, -1.0, BIAS, SPIN_BIAS)
     for k in range(pipes.size):
@@ -75,12 +75,3 @@ def quicken_by_pipes(t, y, dydt, out, handle):
                 a, b, c, 7 * n)  # fmt: skip
         damping += 2.0 * tables.settings[0]["rho"] * pipe["area"] * pipe["speed"] * ease(tables, 7 * n)
     out[RATE] = max(out[RATE], damping)
-
-
-@njit
-def anything_moves(tables):
-    """Whether forces move any body that something rides on."""
-    for k in range(tables.rides.size):
-        if carrier(tables, tables.rides[k]["body"]) >= 0:
-            return True
-    return False
