@@ -98,7 +98,7 @@ def parts(
 
     named = nodes if raw is None else _dict(raw.table.get("nodes"))
     yield from bodies.misfits(nodes, named)
-    yield from riding_networks.misfits(nodes, links, fluid, named)
+    yield from riding_networks.misfits(nodes, links, named)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     yield from sloshing.misfits(nodes, lumped, poses)
@@ -276,8 +276,8 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = [name for (_, name), part in wet.items() if part.elevation is not None]
     for (group, name), part in wet.items():
-        by_head = getattr(part, "head", None) is not None
-        if stated and name not in stated and not by_head:
+        elsewhere = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
+        if stated and name not in stated and not elsewhere:
             yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
     heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in chambers_of(link)}

@@ -12,7 +12,7 @@ from fvsolve.parts.basin.part import Basin
 from fvsolve.parts.node import Node, Rider
 
 Found = Iterator[tuple[tuple, str]]
-FELT = "rigid columns between tanks alone"
+PIPE_THERE = "wanted a pipe there, or a chamber"
 CLOSE = 1e-6  # of a length: places are typed with a few digits
 
 
@@ -30,39 +30,56 @@ def has_height(node: Node, poses: dict[str, Any]) -> bool:
     return on is None or (on in poses and not isinstance(node, Basin))
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], fluid: Any, named: Any) -> Found:
+def misfits(nodes: dict[str, Any], links: dict[str, Any], named: Any) -> Found:
     """Faults of places of a network that ride on bodies, and of links that join them."""
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, Rider):
             continue
         yield from place_faults(name, node, nodes, named)
-        if node.on is not None and (free := next(free_joints(node.on, nodes), None)) is not None:
-            if fluid is not None and fluid.law != "linear":
-                yield ("fluid", "law"), f'{free} moves freely and carries {name}; wanted "linear", or a driven joint'
-            yield from ((("nodes", name, *key), f"{free} moves freely, and {text}") for key, text in unfelt(node))
         if node.on is not None and getattr(node, "head", None) is not None:
             yield ("nodes", name, "head"), f"it rides on {node.on}, and a head counts from the ground; wanted pressure"
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes))
-        on = next((body for place in ends if (body := getattr(nodes.get(place), "on", None))), None)
-        if on and link.kind != "rigid-column" and (free := next(free_joints(on, nodes), None)) is not None:
-            yield (
-                ("links", name),
-                f"{free} moves freely, and feels {FELT} yet; wanted a rigid-column, or a driven joint",
-            )
+    for place, text in unfelt(nodes, links, free=True):
+        yield place, f"{text}, or a driven joint in place of a free one"
 
 
-def unfelt(node: Rider) -> Found:
-    """What a body that moves freely does not feel of a place."""
-    if node.kind != "tank":
-        yield (), f"feels {FELT} yet; wanted a tank, or a driven joint"
-        return
-    for key in ("connection", "height"):
-        if getattr(node, key) is not None:
-            yield (key,), "does not feel what passes here yet; leave it out, or drive the joint"
-    if hasattr(node.area, "area"):
-        yield ("area",), "feels tanks of one area alone yet; wanted a number, or a driven joint"
+def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Found:
+    """What bodies would not feel of networks on them; of those alone that move freely, where that is asked."""
+
+    def riding(name: str) -> bool:
+        on = getattr(nodes.get(name), "on", None)
+        return on is not None and (not free or any(free_joints(on, nodes)))
+
+    tanks = [name for name, node in nodes.items() if node.kind == "tank" and riding(name)]
+    for name in tanks:
+        for key in ("connection", "height"):
+            if getattr(nodes[name], key) is not None:
+                yield ("nodes", name, key), "what passes here is not felt by its body yet; leave it out"
+        if hasattr(nodes[name].area, "area"):
+            yield ("nodes", name, "area"), "a body feels tanks of one area alone yet; wanted a number"
+    for name, link in links.items():
+        ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
+        if not any(map(riding, ends)):
+            continue
+        key = ("links", name)
+        if link.kind == "leak":
+            yield key, "what leaves here is not felt by its body yet; wanted a valve to a reservoir"
+        elif link.kind == "rigid-column":
+            for end in ends:
+                if end in nodes and led(end, nodes, links):
+                    yield key, f"at {end} it meets none but valves and columns, which is not felt yet; {PIPE_THERE}"
+        elif link.kind != "pipe" or free:
+            for end in dict.fromkeys(end for end in ends if end in tanks):
+                what = "a pipe answers at once" if link.kind == "pipe" else "a valve has no inertia"
+                yield key, f"{what} to {end}, whose own flow has none either; wanted a rigid-column between"
+
+
+def led(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
+    """Whether none but rigid columns and restrictions set the pressure of a place."""
+    kinds = {link.kind for link in links.values() if end in link.ports.values()}
+    return nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds
 
 
 def link_faults(link: Any, ends: list[str], nodes: dict[str, Any]) -> Found:

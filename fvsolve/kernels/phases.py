@@ -79,6 +79,11 @@ READ = {
     ),
 }  # fmt: skip
 MEMORY = {"power": "unsteady.energy: add_power", "stored": "unsteady.energy: add_stored"}
+FREIGHT = {
+    "enter": "mechanism.freight: load_networks", "accelerate": "mechanism.recoil: quicken_by_pipes",
+    "follow": "mechanism.recoil: follow_networks",
+    "power": "mechanism.freight_energy: add_power", "stored": "mechanism.freight_energy: add_stored",
+}  # fmt: skip
 COLUMNS = {"inflow": "columns: column_inflows", "brake": "columns: quickest_column"}
 MEMBERS = {
     "pipes": Pieces(record="observer: record_pipes"),
@@ -107,12 +112,11 @@ MEMBERS = {
     "lines": Pieces(move="mechanism.lines: push_bodies"),
     "rides": Pieces(
         prepare="mechanism.rides: set_rides", store="mechanism.rides: press_tanks",
-        rates="mechanism.rides: push_cells", enter="mechanism.recoil: load_networks",
-        follow="mechanism.recoil: follow_networks",
+        rates="mechanism.rides: push_cells", **FREIGHT,
     ),
     "rides, barotropic": Pieces(
         prepare="mechanism.rides: set_rides", store="mechanism.rides_barotropic: press_tanks_barotropic",
-        rates="mechanism.rides_barotropic: push_cells_barotropic",
+        rates="mechanism.rides_barotropic: push_cells_barotropic", **FREIGHT,
     ),
     "masses": Pieces(
         prepare="masses: chambers", move="masses: finish_masses", observe="masses: observe_masses",

@@ -143,7 +143,7 @@ NODE = np.dtype(
         ("columns", "i8"),  # how many columns these are
         ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
         ("density", "f8"),  # of what a tank holds [kg/m3]
-        ("ride", "i8"),  # of a tank in `rides`; -1 where it stands still
+        ("ride", "i8"),  # in `rides`; -1 where it stands still
     ],
     align=True,
 )
@@ -274,13 +274,14 @@ BUSHING = np.dtype(
     align=True,
 )
 
-RIDE = np.dtype(  # a stretch of a pipe, a column or what a tank holds, on a body and in its axes
+RIDE = np.dtype(  # a stretch of a pipe, a column or what a place holds, on a body and in its axes
     [
         ("body", "i8"),
-        ("start", "f8", (3,)),  # where it begins [m]; of a tank, its bottom
+        ("start", "f8", (3,)),  # where it begins [m]; of a place, that
         ("end", "f8", (3,)),  # where it ends; of a tank, what is above a bottom is along z
         ("swept", "f8", (3,)),  # integral of r x dr along it [m2]
         ("rest", "f8"),  # what gravity does along it at the start [J/kg]
+        ("heavy", "i8"),  # 1 where that body feels it: forces move it; 2 where someone asks what its joint holds
     ],
     align=True,
 )
@@ -395,6 +396,7 @@ LAYOUT = np.dtype(
         ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
         ("ride", "i8"),  # what drives stretches on bodies since the start [J/kg]
+        ("rates", "i8"),  # in `work`: room for rates where `out` alone is asked for and hangs on them; else -1
         ("tank", "i8"),  # of basins that ride on bodies, what their mass is along their normal
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
@@ -410,6 +412,7 @@ GN = 14  # place of g_n among the numbers of a frame, see `basins.frames`
 TANK_OUT = 24  # numbers in `out` of what rides on bodies, see `mechanism.tanks`
 RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # first entries of `out`
 OUT_HEAD = 4
+FELT, ASKED = 1, 2  # how heavy a stretch is: its body feels it; and someone asks what joints hold
 
 PROBE = np.dtype(
     [

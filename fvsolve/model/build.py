@@ -166,6 +166,7 @@ def layout_of(draft: Draft) -> np.ndarray:
     ):  # fmt: skip
         found[name], at = at, at + size
     found["size"] = at
+    found["rates"] = draft.to_work(draft.size) if draft.ride_table["heavy"].any() else -1
     return found
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.case.riding_networks import unfelt
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import lowering_of, rows_in
@@ -34,7 +35,8 @@ class Accounts:
         self.slate, self.model = slate, slate.model
         model, case = slate.model, slate.model.case
         if len(model.tables.rides):
-            raise FvsolveError("the energy of networks that ride on bodies is not booked yet")
+            refuse_unfelt(case)
+            slate.tables.rides["heavy"] = rec.ASKED
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of basins that ride on bodies is not booked where a side is open yet")
         if model.basins and not case.law.linear:
@@ -193,6 +195,13 @@ class Accounts:
         self.model.functions.rhs(t, y, np.zeros(0), out, self.slate.handle)
         self.stored(t, y, np.zeros(0), out, self.slate.handle, rows)
         return self.holding @ rows
+
+
+def refuse_unfelt(case) -> None:
+    """FvsolveError where something rides whose energy is not booked."""
+    found = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
+    if found:
+        raise FvsolveError(f"the energy of this network that rides on a body is not booked; {'; '.join(found)}")
 
 
 def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:

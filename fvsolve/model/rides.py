@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.case import riding_networks
+from fvsolve.case.riding import free_joints
 from fvsolve.kernels import records as rec
+from fvsolve.parts.basin.part import Basin
 
 SMALL = 1e-9  # of what drives a stretch [J/kg], below which it is rounding
 
 
 def lower_rides(draft) -> None:
-    """A row for every cell of a pipe, every rigid column and every tank that rides."""
+    """A row for every cell of a pipe, every stretch of a rigid column and every place that rides."""
     found: list[tuple] = []
     links, places = draft.case.conduits, draft.case.places
     for name, row in [*zip(draft.pipe_names, draft.pipe_table, strict=True),
@@ -30,33 +33,28 @@ def lower_rides(draft) -> None:
             row["rides"] = len(points) - 1
             found += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
     for node, row in zip(places.values(), draft.node_table, strict=True):
-        if row["kind"] == rec.TANK and node.on is not None:
-            row["ride"] = len(found)
-            foot = np.array(node.place)
-            body, start, end, swept, rise = stretch(draft, node.on, np.array([foot, foot + [0.0, 0.0, node.level]]))
-            found.append((body, start, end, swept, -rise))
+        if getattr(node, "on", None) is None or isinstance(node, Basin):
+            continue
+        row["ride"] = len(found)
+        foot, high = np.array(node.place), node.level if row["kind"] == rec.TANK else 0.0
+        body, start, end, swept, rise, heavy = stretch(draft, node.on, np.array([foot, foot + [0.0, 0.0, high]]))
+        found.append((body, start, end, swept, -rise, heavy))
     draft.ride_table = np.array(found, rec.RIDE) if found else np.zeros(0, rec.RIDE)
-    if found:
-        refuse_joints(draft)
+    if found and asked(draft):
+        for place, text in riding_networks.unfelt(draft.case.nodes, draft.case.links):
+            draft.fault(".".join(place), f"{text}, and a probe asks what joints hold")
+
+
+def asked(draft) -> bool:
+    """Whether a probe reads what a joint holds."""
+    return any(probe.quantity.startswith("joint_") for probe in draft.case.probes)
 
 
 def stretch(draft, on: str, points: np.ndarray) -> tuple:
     """A row of `rides`: straight between two points in axes of a body [m]."""
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
-    return draft.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise
-
-
-def refuse_joints(draft) -> None:
-    """Forces of joints that hold what a network weighs are not booked yet."""
-    held = set()
-    for i in {int(one) for one in draft.ride_table["body"]}:
-        while i >= 0:
-            held.add(draft.body_names[i])
-            i = int(draft.body_table[i]["parent"])
-    for k, probe in enumerate(draft.case.probes):
-        if probe.part == "nodes" and probe.name in held and probe.quantity.startswith("joint_"):
-            text = f"{probe.name} carries a network, whose weight and recoil its joint's force lacks yet"
-            draft.fault(f"output.probes[{k}]", f"{text}; wanted none of these")
+    heavy = rec.ASKED if asked(draft) else rec.FELT if any(free_joints(on, draft.case.nodes)) else 0
+    return draft.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise, heavy
 
 
 def driven_at_start(draft, start) -> list[str]:

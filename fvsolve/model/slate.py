@@ -43,6 +43,8 @@ class Slate:
             basins = model.tables.basins.copy()
             self.tables = model.tables._replace(plane=lined(model.tables.plane.size), basins=basins)
             self.tables.plane[:] = model.tables.plane
+        if len(model.tables.rides):  # who asks what joints hold makes it heavy
+            self.tables = self.tables._replace(rides=model.tables.rides.copy())
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes

@@ -258,10 +258,8 @@ class Couplings:
         for basin in self.basins:
             if basin.row["body"] >= 0:
                 trees.setdefault(self.tied(self.bodies[basin.row["body"]]["root"]), []).append(pattern.all_of(basin))
-        for column in self.columns if len(self.rides) else ():
-            if column["ride"] >= 0:
-                found = trees.setdefault(self.tied(self.bodies[self.rides[column["ride"]]["body"]]["root"]), [])
-                found += [states(column["y"]), self.own(column["from_node"]), self.own(column["to_node"])]
+        for ride, cells in self.carried() if len(self.rides) else ():
+            trees.setdefault(self.tied(self.bodies[self.rides[ride]["body"]]["root"]), []).append(cells)
         for root, cells in trees.items():
             own = [self.of_tree(root, what) for what in (0, 1)]
             if own[0].size == 0:
@@ -269,6 +267,17 @@ class Couplings:
             both = states(*cells, own[1])
             felt = [self.own(row[side]) for row in self.pistons if row["line"] >= 0 for side in ("a", "b")]
             yield every(both, states(*cells, *own, *felt))
+
+    def carried(self) -> Iterator[tuple[int, np.ndarray]]:
+        """(row of `rides`, states of what rides there, and those that set its pressures)."""
+        for i, node in enumerate(self.nodes):
+            if node["ride"] >= 0:
+                yield node["ride"], states(self.own(i), self.sets[i])
+        for row in (*self.pipes, *self.columns):
+            if row["ride"] >= 0:
+                own = row["y"] + np.arange(2 * row["cells"]) if "cells" in row.dtype.names else row["y"]
+                felt = (self.sets[row[end]] for end in ("from_node", "to_node"))
+                yield row["ride"], states(own, *felt)
 
     # pipes ------------------------------------------------------------------------------------------------------
 

@@ -18,10 +18,12 @@ PINNED, GAPS, HOLD = (f"{ROOM}.pins: {one}" for one in ("accelerate_pinned", "ga
 WATER = ("basins.frames: set_frames", "basins.frames_flow: turn_fluid")  # what loads bodies beside pushes, at rest
 WALLS = ("basins.walls: press_at_rest",)
 DRIVES = f"{ROOM}.rides: set_rides"
-NETWORKS = (DRIVES, f"{ROOM}.rides: press_tanks", f"{ROOM}.recoil: load_networks")
+LOADS = f"{ROOM}.freight: load_networks"
+NETWORKS = (DRIVES, *(f"{ROOM}.rides: {one}" for one in ("press_tanks", "push_cells", "push_columns")), LOADS)
+NONE = np.zeros(0)
 
 
-def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray) -> None:
+def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
     """Call pieces of the room of mechanisms, and no others, as a right-hand side does."""
     from fvsolve.kernels import calls  # scenes without bodies load none of it
     from fvsolve.kernels.phases import found
@@ -31,7 +33,7 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
         addresses[calls.RHS, k] = calls.addressed(found(HOME, piece), calls.RATES)
     calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
     handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
-    calls.rhs_in_turn(t, y, np.zeros(0), out, handle)
+    calls.rhs_in_turn(t, y, rates, out, handle)
 
 
 def plain(shapes: rec.Written) -> rec.Written:
@@ -62,7 +64,7 @@ class Statics:
         rubber = (RUBBER,) if len(draft.bushing_table) else ()
         self.pushes = (MOTION, LINES, *rubber, *(WATER if rides else ()))
         self.pushes += WALLS if (draft.wall_table["body"] >= 0).any() else ()
-        if len(draft.ride_table) and draft.case.law.linear:
+        if len(draft.ride_table):
             self.pushes += NETWORKS
         if rides:
             self.y, self.tables = (
@@ -73,7 +75,8 @@ class Statics:
 
     def run(self, *pieces: str) -> None:
         """Call pieces of the room of mechanisms as a right-hand side does."""
-        call_pieces((*self.tables, *self.written), pieces, self.t, self.y, self.out)
+        rates = np.zeros(self.draft.size) if LOADS in pieces else NONE
+        call_pieces((*self.tables, *self.written), pieces, self.t, self.y, self.out, rates)
 
     def rates(self) -> np.ndarray:
         """Velocities of all freedoms at the start."""

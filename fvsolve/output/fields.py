@@ -41,6 +41,9 @@ class FieldSeries:
         if model.pipes:
             self.places = places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = geometry(model, places)
+            self.model, self.owner = model, ride(model, self.points)
+        riding = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
+        self.places = places = {**places, **riding}  # in the world, as bodies are
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
         self.basins = {basin.name: (*shape(basin, places[basin.name]), units[basin.name]) for basin in model.basins}
@@ -92,9 +95,17 @@ class FieldSeries:
             return
         data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
         data["pipe"] = [self.pipe]
-        write_frame(self.folder / name, self.points, [("line", self.lines)], data, self.units)
+        write_frame(self.folder / name, self.now(frame), [("line", self.lines)], data, self.units)
         self._list(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
         self.frames += 1
+
+    def now(self, frame: dict) -> np.ndarray:
+        """Points of pipes, those that ride where their bodies are."""
+        if not (self.owner >= 0).any():
+            return self.points
+        from fvsolve.output.skeleton import moved
+
+        return moved(self.model, frame["out"], self.owner, self.points)[0]
 
     def _list(self, line: str) -> None:
         # One write over the closing tags: killed before or after it, the file is whole.
@@ -148,6 +159,29 @@ def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
         lines.append(np.column_stack([chain[:-1], chain[1:]]))
         count += pipe.cells - 1
     return np.concatenate(points), np.concatenate(lines)
+
+
+def ride(model, points: np.ndarray) -> np.ndarray:
+    """Body of each point of `geometry`, -1 for none : int[n]; what rides is put in axes of its body, straight."""
+    places = model.case.places
+    ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
+    owner, at = np.full(len(points), -1), len(ends)
+
+    def body(name: str) -> int:
+        on = getattr(places.get(name), "on", None)
+        return -1 if on is None else model.body_names.index(on)
+
+    for k, name in enumerate(ends):
+        owner[k] = body(name)
+        if owner[k] >= 0:
+            points[k] = places[name].place
+    for pipe in model.pipes:
+        inner = slice(at, at + pipe.cells - 1)
+        owner[inner], at = body(pipe.from_), inner.stop
+        if body(pipe.from_) >= 0:
+            first, last = np.array(places[pipe.from_].place), np.array(places[pipe.to].place)
+            points[inner] = first + np.asarray(pipe.edges[1:-1])[:, None] / pipe.length * (last - first)
+    return owner
 
 
 def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:

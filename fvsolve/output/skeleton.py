@@ -54,12 +54,17 @@ class Skeleton:
 
     def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(points float64[p, 3] [m], speeds of middles of lines float64[l] [m/s]) where bodies are as `out` says."""
-        first, many = int(self.model.layout["body"]), len(self.model.body_names)
-        rows = out[first : first + BODY_OUT * many].reshape(many, BODY_OUT)
-        points, speed = self.place.copy(), np.zeros_like(self.place)
-        for i, row in enumerate(rows):
-            own = self.owner == i
-            arms = self.place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
-            points[own] = row[PLACE : PLACE + 3] + arms
-            speed[own] = row[VELOCITY : VELOCITY + 3] + np.cross(row[SPIN : SPIN + 3], arms)
+        points, speed = moved(self.model, out, self.owner, self.place)
         return points, np.linalg.norm(speed[self.lines].mean(axis=1), axis=1)
+
+
+def moved(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(points, their velocities : float64[p, 3]) in the world of places in axes of their bodies; -1: of the world."""
+    first, many = int(model.layout["body"]), len(model.body_names)
+    points, speed = place.copy(), np.zeros_like(place)
+    for i, row in enumerate(out[first : first + BODY_OUT * many].reshape(many, BODY_OUT)):
+        own = owner == i
+        arms = place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
+        points[own] = row[PLACE : PLACE + 3] + arms
+        speed[own] = row[VELOCITY : VELOCITY + 3] + np.cross(row[SPIN : SPIN + 3], arms)
+    return points, speed

@@ -231,7 +231,8 @@ class Result(Shown):
     def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
             raise RunError(
-                "no frames to draw: the case has no pipes and no basins, [output] fields is 0, or nothing was written"
+                "no frames to draw: the case has no pipes, no basins and no bodies, "
+                "[output] fields is 0, or nothing was written"
             )
         frames = read_series(self.directory / "fields.pvd")
         if not frames:

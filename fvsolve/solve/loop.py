@@ -188,11 +188,14 @@ class Loop:
 
 
 def leap_allowed(model: Model, method: Method) -> bool:
-    """Whether steps can be taken whole: upwind and Euler, pipes alone, no events, no friction or a given factor."""
+    """Whether steps can be taken whole: upwind and Euler, pipes alone, no events, no friction or a given factor.
+
+    Nor may pipes ride: a body drives their cells beside their waves.
+    """
     settings, numerics = model.tables.settings[0], model.case.numerics
     plain = np.isin(model.tables.pipes["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
     return bool(
         model.case.law.linear and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and plain and model.shapes.armed == 0
+        and model.y_size == 2 * model.cells and plain and model.shapes.armed == 0 and not len(model.tables.rides)
     )  # fmt: skip

@@ -212,3 +212,17 @@ def test_a_hull_rolls_with_its_tank_at_the_root_of_the_closed_form(high):
         errors.append(np.abs(result["hull.angle"] - a * np.sin(w * result.t)).max() / a)
     assert errors[1] < errors[0] / 2.5
     assert errors[1] < 1e-2
+
+
+def test_a_joint_holds_nothing_of_the_water_where_it_lets_its_body_move():
+    hung = {"type": "body", "mass": 300.0, "inertia": [80.0, 60.0, 90.0], "centre_of_mass": [0.1, 0.2, -0.5],
+            "joint": {"kind": "ball", "attitude": {"roll": 0.03, "yaw": 0.5}, "rate": [0.02, -0.03, 0.1]}}  # fmt: skip
+    heaves = cart(axis=(0, 0, 1), rate=0.05)
+    held = {"tx ty tz": (hung, tank(8, at=[-0.7, -0.2, -0.4], attitude={"roll": 0.05})), "fz": (heaves, tank(4))}
+    for free, (body, basin) in held.items():
+        probes = [f"cart.joint_{one}{axis}" for one in "ft" for axis in "xyz"]
+        numerics = {"scheme": "muscl", "method": "rk4", "courant": 0.5}
+        result = run(scene({"cart": body, "b": basin}, {}, 0.3, numerics, probes, every=0.01))
+        size = max(np.abs(result[one]).max() for one in probes[:3]) + 1e3
+        for one in free.split():
+            assert np.abs(result[f"cart.joint_{one}"]).max() < 1e-11 * size, one

@@ -1,12 +1,14 @@
 """Networks on bodies: U-tubes that roll, pipes that are turned and accelerated, against closed forms and (70)."""
 
+import meshio
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.output.fields import read_series
 from fvsolve.studies.energy.energy import energy
 
 HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # of a U-tube: between its arms, of its duct below the axis, of water above that [m]
@@ -119,12 +121,12 @@ PIPE = {"type": "pipe", "diameter": 0.1, "wave_speed": 1000.0, "cells": 40}
 LONG, PRESSURE = 20.0, 5e5
 
 
-def line(near, far, joint, law="linear", from_="open", **numerics):
+def line(near, far, joint, law="linear", from_="open", cells=40, length=LONG, **numerics):
     """A frictionless pipe on a driven body, from a reservoir to a dead end."""
     nodes = {"rig": hull(**joint), "open": {"type": "reservoir", "pressure": PRESSURE, "on": "rig", "at": near},
              "shut": {"type": "junction", "on": "rig", "at": far}}  # fmt: skip
     ends = {"from": "open", "to": "shut"} if from_ == "open" else {"from": "shut", "to": "open"}
-    case = scene(nodes, {"pipe": {**PIPE, **ends, "length": LONG}}, 0.32,
+    case = scene(nodes, {"pipe": {**PIPE, **ends, "length": length, "cells": cells}}, 0.32,
                  {"scheme": "upwind5", "method": "rk4", "courant": 0.8, **numerics},
                  ["shut.pressure", "pipe.pressure@0.5", "pipe.flow@0.5"], every=4e-4)  # fmt: skip
     case["fluid"] = {**WATER, "law": law}
@@ -328,13 +330,111 @@ def test_a_route_of_a_column_that_stands_still_is_told():
     assert "its ends ride on none" in said(case)["links.way.route"]
 
 
-def test_what_is_not_booked_yet_is_refused():
-    with pytest.raises(FvsolveError, match="networks that ride"):
-        energy(fv.load(u_tube()))
+def test_steps_that_are_taken_whole_feel_the_body_too():
+    joint = {"kind": "prismatic", "axis": [1, 0, 0],
+             "travel": {"start": 0, "duration": 10, "value": [0, 100.0], "exponent": 2}}  # fmt: skip
+    case = line([0, 0, 0], [LONG, 0, 0], joint, scheme="upwind", method="euler")
+    case["output"]["every"] = 0.04  # so that many steps lie between
+    run = fv.run(case)
+    assert run["shut.pressure"][1] - PRESSURE == pytest.approx(RHO * 2.0 * LONG * 2.0, rel=0.1)
+
+
+# energy and joints ----------
+
+
+def water_energy(angle, spin, rise, flow):
+    """Kinetic and potential energy of the U-tube's water [J], flow [m3/s] from starboard to port, `rise` at port."""
+    c, s = np.cos(angle), np.sin(angle)
+    whole = np.zeros_like(angle)
+    ends = (-HALF, LEVEL - rise), (HALF, LEVEL + rise)
+    parts = [(RHO * area(BORE) * 2 * HALF, (-HALF, -DEPTH), (HALF, -DEPTH))]
+    parts += [(RHO * TANK * high, (y, -DEPTH), (y, -DEPTH + high)) for y, high in ends]
+    for mass, (y, z), (u, w) in parts:
+        square = (y * y + y * u + u * u + z * z + z * w + w * w) / 3.0
+        whole = whole + mass * (0.5 * spin**2 * square + GRAVITY * (s * 0.5 * (y + u) + c * 0.5 * (z + w)))
+    swept = 2 * HALF * DEPTH + HALF * (ends[0][1] + ends[1][1])  # of r x dr from surface to surface
+    return whole + RHO * flow * spin * swept + 0.5 * RHO * flow**2 * 2 * HALF / area(BORE)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_the_energy_of_a_u_tube_that_rolls_is_the_work_of_its_drive_less_friction(law, rate):
+    losses, case = [], u_tube()
+    case["fluid"], case["numerics"] = {**WATER, "law": law}, {"end": 20.0, "method": "rk4", "step": 0.1}
+    for step in (0.1, 0.05):
+        case["numerics"]["step"] = step
+        found = energy(fv.load(case))
+        losses.append(abs(found.step[-1]))
+        assert abs(found.law.get("duct", [0.0])[-1]) < (1e-9 if law == "linear" else 1e-5) * found.through
+    assert losses[1] < 0.1 * losses[0] < 2e-6 * found.through  # of fourth order
+    truth = solve_ivp(lambda t, y: [y[1] / TANK, rate(*roll(t), *y)], (0, 20), [0.0, 0.0], t_eval=found.t, rtol=1e-11,
+                      atol=1e-12, method="DOP853")  # fmt: skip
+    held = water_energy(*roll(found.t)[:2], *truth.y)
+    kept = sum(found.stored[name] for name in ("port", "starboard", "duct"))
+    assert np.ptp(held) > 1e3
+    assert kept == pytest.approx(held - held[0], abs=(1e-5 if law == "linear" else 2e-4) * np.ptp(held))
+    case["output"] |= {"probes": ["hull.joint_tx", "hull.rate"], "every": 0.01}
+    run = fv.run(case)
+    work = simpson(run["hull.joint_tx"] * run["hull.rate"], x=run.t)
+    assert found.supplied["hull"][-1] == pytest.approx(work, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_the_energy_of_a_pipe_between_tanks_that_roll_closes_but_for_its_cells(law):
+    found, case = [], u_tube(minor_loss=0.0)
+    case["links"]["duct"] |= {"type": "pipe", "wave_speed": 300.0}
+    case["fluid"] = {**WATER, "law": law}
+    for cells in (10, 20):
+        case["links"]["duct"]["cells"] = cells
+        case["numerics"] = {"end": 2.0, "scheme": "upwind5", "method": "rk4", "courant": 0.8}
+        found.append(energy(fv.load(case)))
+        assert abs(found[-1].step[-1]) < 1e-9 * found[-1].through
+    lost = [abs(one.scheme["duct"][-1]) for one in found]
+    assert lost[1] < 0.6 * lost[0] < 1e-6 * found[0].through
+    case["output"] |= {"probes": ["hull.joint_tx", "hull.rate"], "every": 0.005}
+    run = fv.run(case)
+    work = simpson(run["hull.joint_tx"] * run["hull.rate"], x=run.t)
+    assert found[1].supplied["hull"][-1] == pytest.approx(work, rel=1e-5)
+
+
+def test_water_that_flows_from_a_place_which_moves_brings_what_moving_it_takes():
+    joint = {
+        "kind": "revolute",
+        "axis": [0, 0, 1],
+        "angle": {"start": 0, "duration": 4, "value": [0, 2], "exponent": 2},
+    }
+    steps = []
+    for courant in (0.8, 0.4):
+        case = line([1, 0, 0], [1 + LONG, 0, 3], joint, cells=10, length=LONG + 1.0, courant=courant)
+        found = energy(fv.load(case))
+        steps.append(abs(found.step[-1]))
+        assert abs(found.scheme["pipe"][-1]) < 1e-5 * found.through
+        assert found.supplied["open"][-1] != 0.0 and found.supplied["rig"][-1] != 0.0
+    assert steps[1] < 0.1 * steps[0] or steps[0] < 1e-9 * found.through
+
+
+UNFELT = {  # what bodies would not feel: change of the U-tube, place of the fault, words
+    "a valve at a tank": (lambda: cut("linear"), "links.gate", "rigid-column between"),
+    "what spills": (lambda: with_tank(height=3.0), "nodes.port.height", "not felt"),
+}
+
+
+def with_tank(**keys):
     case = u_tube()
+    case["nodes"]["port"] |= keys
+    return case
+
+
+@pytest.mark.parametrize("what", UNFELT)
+def test_energy_and_joints_of_what_bodies_would_not_feel_are_refused_by_name(what):
+    make, place, text = UNFELT[what]
+    case = make()
+    with pytest.raises(FvsolveError, match=f"{place}: .*{text}"):
+        energy(fv.load(case))
     case["output"]["probes"] += ["hull.joint_tx"]
-    with pytest.raises(CaseError, match="hull carries a network"):
+    with pytest.raises(CaseError) as caught:
         fv.run(case)
+    (fault,) = (one for one in caught.value.faults if one.place == place)
+    assert text in fault.message and "asks what joints hold" in fault.message
 
 
 def test_a_tank_that_falls_ends_the_run_by_name():
@@ -343,3 +443,26 @@ def test_a_tank_that_falls_ends_the_run_by_name():
     case["nodes"]["hull"]["joint"] = {"kind": "prismatic", "axis": [0, 0, 1], "travel": slows}
     run = fv.run(case)
     assert not run.ok and "the water in starboard has no weight left" in run.reason
+
+
+def test_pipes_and_basins_are_drawn_where_their_bodies_are(tmp_path):
+    case = u_tube(minor_loss=0.0)
+    case["links"]["duct"] |= {"type": "pipe", "wave_speed": 300.0, "cells": 4}
+    case["nodes"]["pool"] = {"type": "basin", "on": "hull", "at": [1, 2, 3], "size": [2.0, 1.0], "cells": [2, 1],
+                             "level": 0.5}  # fmt: skip
+    case["numerics"] = {"end": 2.0, "scheme": "upwind5", "method": "rk4", "courant": 0.8}
+    case["output"] |= {"fields": 3, "probes": ["hull.angle"]}
+    fv.run(case, out=tmp_path / "run")
+    frames = read_series(tmp_path / "run" / "fields.pvd")
+    y = np.linspace(HALF, -HALF, 5)
+    duct = np.column_stack([np.zeros(5), y, np.full(5, -DEPTH)])
+    corners = np.array([[1.0, 2, 3], [3, 2, 3], [3, 3, 3], [1, 3, 3]])
+    for t, path in frames:
+        angle = roll(t)[0]
+        turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+        truth = (corners if "pool" in path.name else duct) @ turn.T
+        points = meshio.read(path).points
+        if "bodies" not in path.name:
+            for one in truth:
+                assert np.min(np.linalg.norm(points - one, axis=1)) < 1e-9
+    assert {path.name.rpartition("-")[0] for _, path in frames} == {"", "bodies", "pool"}

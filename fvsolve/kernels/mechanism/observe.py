@@ -23,6 +23,7 @@ from fvsolve.kernels.mechanism.room import (
     row_of,
     turned,
 )
+from fvsolve.kernels.mechanism.tanks import weighs_more
 from fvsolve.kernels.records import BODY_VALUE, FREE, POINT_VALUE, PRISMATIC, SURFACE_VALUE
 
 BODY_QUANTITIES = (
@@ -103,6 +104,11 @@ def joint_load(out, tables, i):
         tx += lx + hx + (y * c - z * b) - out[t] - (dy * h - dz * g)
         ty += ly + hy + (z * a - x * c) - out[t + 1] - (dz * f - dx * h)
         tz += lz + hz + (x * b - y * a) - out[t + 2] - (dx * g - dy * f)
+        for k in range(tables.basins.size):
+            if tables.basins[k]["body"] == j and tables.basins[k]["heavy"] == 1:
+                f, g, h, p, q, s = weighs_more(out, tables, k)
+                fx, fy, fz = fx - f, fy - g, fz - h
+                tx, ty, tz = tx - p - (dy * h - dz * g), ty - q - (dz * f - dx * h), tz - s - (dx * g - dy * f)
     return fx, fy, fz, tx, ty, tz
 
 

@@ -10,23 +10,24 @@ way. Coriolis forces stand at right angles to it. Of this, what gravity does at 
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, back, cross, dot, put, row_of
+from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, VELOCITY, back, cross, dot, put, row_of
 from fvsolve.kernels.records import NO_WEIGHT, STATUS, TANK, WHERE
 from fvsolve.kernels.tanks import tank_level
 
-GRAVITY, TURN, EULER = 0, 3, 6  # numbers in scratch: g - a_o, W and W' in axes of a body
+GRAVITY, TURN, EULER, DRIFT = 0, 3, 6, 9  # in scratch: g - a_o, W, W' and the origin's velocity, in axes of a body
 THIN = 1e-6  # [m]
 
 
 @njit
-def set_axes(tables, out, i):
-    """g - a_o, W and W' of body i in its own axes, into scratch."""
+def set_axes(tables, out, i, wide, spin):
+    """What body i does in its own axes, into scratch, with the accelerations at out[row + wide] and out[row + spin]."""
     here, own = row_of(tables, i), tables.scratch
-    b, w, e = here + BIAS, here + SPIN, here + SPIN_BIAS
+    b, w, e, v = here + wide, here + SPIN, here + spin, here + VELOCITY
     down = -tables.settings[0]["gravity"]
     put(own, GRAVITY, *back(out, here + ATTITUDE, -out[b], -out[b + 1], down - out[b + 2]))
     put(own, TURN, *back(out, here + ATTITUDE, out[w], out[w + 1], out[w + 2]))
     put(own, EULER, *back(out, here + ATTITUDE, out[e], out[e + 1], out[e + 2]))
+    put(own, DRIFT, *back(out, here + ATTITUDE, out[v], out[v + 1], out[v + 2]))
 
 
 @njit
@@ -52,7 +53,7 @@ def set_rides(t, y, dydt, out, handle):
         ride = rides[k]
         if ride["body"] != last:
             last = ride["body"]
-            set_axes(tables, out, last)
+            set_axes(tables, out, last, BIAS, SPIN_BIAS)
         w = ride["swept"]
         out[at + k] = drive_along(tables.scratch, ride["start"], ride["end"], w[0], w[1], w[2]) - ride["rest"]
 
@@ -60,7 +61,7 @@ def set_rides(t, y, dydt, out, handle):
 @njit
 def weight_under(tables, out, ride, level):
     """What presses on the bottom of a tank [J/kg], filled to a level along its body's z [m]."""
-    set_axes(tables, out, ride["body"])
+    set_axes(tables, out, ride["body"], BIAS, SPIN_BIAS)
     own, r = tables.scratch, ride["start"]
     x, y, z = r[0], r[1], r[2]
     squares = speed_squared(own, x, y, z + level) - speed_squared(own, x, y, z)
@@ -88,6 +89,19 @@ def mark_weightless(tables, out, i, ride, level):
     """Say so where the surface of the tank at node i is pressed no more: its place is behind those of basins."""
     if not weight_under(tables, out, ride, level + THIN) > weight_under(tables, out, ride, level):
         out[STATUS], out[WHERE] = NO_WEIGHT, tables.basins.size + i
+
+
+@njit
+def push_columns(t, y, dydt, out, handle):
+    """d/dt of the flow in rigid columns as their profile has it, but for what drives them since the start."""
+    tables = open_tables(handle)
+    columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["ride"]
+    for k in range(columns.size):
+        column, drive = columns[k], 0.0
+        for m in range(column["rides"] if column["ride"] >= 0 else 0):
+            drive += out[at + column["ride"] + m]
+        drop = out[p + column["from_node"]] - out[p + column["to_node"]] + tables.settings[0]["rho"] * drive
+        dydt[column["y"]] = column["area"] / column["length"] * (drop + column["offset"])
 
 
 @njit

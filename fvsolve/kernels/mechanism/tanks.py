@@ -6,11 +6,12 @@ its body with joints held, in its own axes. A basin that rides on nothing says z
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.mechanism.room import ACCELERATION, ARM, BIAS, SPIN_BIAS, TURNING, dot, row_of
 from fvsolve.kernels.records import TANK_OUT
 
 MOMENTS, EAST, NORTH, NORMAL, ARM_OF, LOAD = 0, 6, 9, 12, 15, 18
 
-__all__ = ["ARM_OF", "EAST", "LOAD", "MOMENTS", "NORMAL", "NORTH", "TANK_OUT", "add_tanks"]
+__all__ = ["ARM_OF", "EAST", "LOAD", "MOMENTS", "NORMAL", "NORTH", "TANK_OUT", "add_tanks", "weighs_more"]
 
 
 @njit
@@ -49,3 +50,28 @@ def along_normal(out, work, tank, s):
         -(out[k] * wx + out[k + 1] * wy + out[k + 2] * wz),
         out[e] * wx + out[e + 1] * wy + out[e + 2] * wz,
     )
+
+
+@njit
+def weighs_more(out, tables, b):
+    """(force, torque about its body's origin) of water in basin b, beside those with joints held, once all moves."""
+    here, tank = row_of(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    r = tank + ARM_OF
+    x, y, z = out[r] - out[here + ARM], out[r + 1] - out[here + ARM + 1], out[r + 2] - out[here + ARM + 2]
+    a, c, w, s = here + ACCELERATION, here + BIAS, here + TURNING, here + SPIN_BIAS
+    p, q, u = out[w] - out[s], out[w + 1] - out[s + 1], out[w + 2] - out[s + 2]
+    ax, ay, az = out[a] - out[c], out[a + 1] - out[c + 1], out[a + 2] - out[c + 2]
+    ax, ay, az = ax + q * z - u * y, ay + u * x - p * z, az + p * y - q * x
+    rises, north = dot(out, tank + NORMAL, ax, ay, az), -dot(out, tank + NORTH, p, q, u)
+    east = dot(out, tank + EAST, p, q, u)
+    m, n, e, k = tank + MOMENTS, tank + NORMAL, tank + EAST, tank + NORTH
+    push = -(out[m] * rises + out[m + 1] * north + out[m + 2] * east)
+    about_x = -(out[m + 2] * rises + out[m + 4] * north + out[m + 5] * east)
+    about_y = out[m + 1] * rises + out[m + 3] * north + out[m + 4] * east
+    fx, fy, fz = push * out[n], push * out[n + 1], push * out[n + 2]
+    return (
+        fx, fy, fz,
+        about_x * out[e] + about_y * out[k] + (y * fz - z * fy),
+        about_x * out[e + 1] + about_y * out[k + 1] + (z * fx - x * fz),
+        about_x * out[e + 2] + about_y * out[k + 2] + (x * fy - y * fx),
+    )  # fmt: skip
