@@ -248,7 +248,7 @@ TOLD = """all.toml: 11 faults
   line 40: nodes.pool.elevation: it rides on boon; say where with at, in axes of that body
   line 46: nodes.flume.patches.lid.travel: comes 1.5 m inward, and the zone behind it is 1 m wide; wanted less, or a wider zone
   line 50: links.lift.stroke: the piston starts at 3 m, ground.far less ground.lug; wanted 0 to 1 m
-  line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B"""  # noqa: E501
+  line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501
 
 
 def test_all_that_is_wrong_with_what_moves_is_said_at_once_with_its_lines_and_nothing_else(tmp_path):
