@@ -98,22 +98,23 @@ def speed() -> None:
         print(f"{many:6d} {inside:10.2f} {own:12.2f} {peers:20.2f} {inside / peers:13.2f} {own / peers:6.2f}")
 
 
-def solved(case: dict, probes: list[str]) -> tuple[np.ndarray, float]:
-    """Rows of probes of a run, and CPU time of its stepping [s]."""
+def solved(case: dict) -> tuple[np.ndarray, float]:
+    """Rows of probes of a run, and CPU time of its steps [s]."""
     import fvsolve
+    from fvsolve.output.memory import MemorySink
+    from fvsolve.solve.solve import initial_state, solve
 
-    wall, busy = perf_counter(), process_time()
-    result = fvsolve.run(case)
-    share = min(1.0, (process_time() - busy) / (perf_counter() - wall))  # less what others took of this core
-    return np.array([result[probe] for probe in probes]), result.summary["seconds"] * share
+    model = fvsolve.build(fvsolve.load(case))
+    sink = MemorySink(model)
+    spent = solve(model, initial_state(model), sink).processor
+    return sink.table()[:, 1:].T, spent
 
 
 def chains() -> None:
     """Errors and times of a chain, at the same steps of the same method."""
-    probes = [f"b{k}.angle" for k in range(len(peers_bodies.CHAIN))]
 
     def own(steps):
-        rows, busy = solved(peers_bodies.chain_case(steps), probes)
+        rows, busy = solved(peers_bodies.chain_case(steps))
         return rows[:, -1], busy
 
     print(
@@ -132,7 +133,7 @@ def arms() -> None:
     """CPU time of an arm on a cylinder at an error, log-log between runs."""
 
     def own(rtol):
-        rows, busy = solved(peers_bodies.arm_case(rtol), ["arm.angle"])
+        rows, busy = solved(peers_bodies.arm_case(rtol))
         return rows[0], busy
 
     times = [
