@@ -178,12 +178,15 @@ def fill(y, out, tables):
 
 @njit
 def factor(tables):
-    """M = L'L in its own place, rows of freedoms from the leaves on; L has no entry that M has not."""
+    """M = L'L in its own place, rows of freedoms from the leaves on; L has no entry that M has not.
+
+    On the diagonal stands 1 over that of L, which is what all who come later divide by.
+    """
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     for j in range(n - 1, -1, -1):
         row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
-        row[depth] = sqrt(row[depth])
-        per = 1.0 / row[depth]
+        per = 1.0 / sqrt(row[depth])
+        row[depth] = per
         for k in range(depth):
             row[k] *= per
         for k in range(depth):
@@ -199,7 +202,7 @@ def halve(tables, at):
     b = work[at : at + n]
     for j in range(n - 1, -1, -1):
         row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
-        z = b[j] / row[depth]
+        z = b[j] * row[depth]
         b[j] = z
         for k in range(depth):
             b[path[k]] -= row[k] * z
@@ -216,7 +219,7 @@ def solve(tables, at):
         x = b[j]
         for k in range(depth):
             x -= row[k] * b[path[k]]
-        b[j] = x / row[depth]
+        b[j] = x * row[depth]
 
 
 @njit
