@@ -13,7 +13,16 @@ network takes the velocity of its place along. In a tank flows what the first ce
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.rides import EULER, GRAVITY, TURN, set_axes
-from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN_BIAS, add_force, add_torque, cross, dot, row_of
+from fvsolve.kernels.mechanism.room import (
+    ATTITUDE,
+    BIAS,
+    SPIN_BIAS,
+    add_force,
+    add_torque,
+    cross,
+    row_of,
+    turned,
+)
 from fvsolve.kernels.records import CHAMBER, FELT, FIXED, JUNCTION, LAW_LINEAR, TANK
 from fvsolve.kernels.tanks import tank_level
 
@@ -24,8 +33,7 @@ NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 @njit(forceinline=True)
 def to_world(out, here, x, y, z):
     """A vector in axes of a body as the world sees it."""
-    r = here + ATTITUDE
-    return dot(out, r, x, y, z), dot(out, r + 3, x, y, z), dot(out, r + 6, x, y, z)
+    return turned(out, here + ATTITUDE, (x, y, z), 0)
 
 
 @njit(forceinline=True)

@@ -14,43 +14,28 @@ from fvsolve.kernels.mechanism.freight import (
     turned_way,
     way_of,
 )
-from fvsolve.kernels.mechanism.room import ARM, cross, row_of
+from fvsolve.kernels.mechanism.room import ARM, carrier, cross, given, path_of, row_of
 from fvsolve.kernels.records import CHAMBER, LAW_LINEAR, TANK
-
-
-@njit
-def carrier(tables, i):
-    """The body nearest to body i on the way to its root that forces move; -1 for none."""
-    while i >= 0 and tables.bodies[i]["freedoms"] == 0:
-        i = tables.bodies[i]["parent"]
-    return i
-
-
-@njit(forceinline=True)
-def given(work, s, x, y, z):
-    """Velocity at (x, y, z) from o that a freedom gives, its S at scratch[s]."""
-    u, v, w = cross(work, s, x, y, z)
-    return work[s + 3] + u, work[s + 4] + v, work[s + 5] + w
 
 
 @njit
 def add_line(out, tables, i, line):
     """Add a line of fluid (r, t, m) on body i to M: velocities are even along it."""
     r, t, m = line
-    work, n, here, own = tables.scratch, tables.freedoms.size, row_of(tables, i), carrier(tables, i)
+    work, n, here = tables.scratch, tables.freedoms.size, row_of(tables, i)
+    path, many = path_of(tables, carrier(tables, i))
     x, y, z = to_world(out, here, r[0], r[1], r[2])
     x, y, z = x + out[here + ARM], y + out[here + ARM + 1], z + out[here + ARM + 2]
     tx, ty, tz = to_world(out, here, t[0], t[1], t[2])
-    last = tables.freedoms[tables.bodies[own]["freedom"] + tables.bodies[own]["freedoms"] - 1]
-    for p in range(last["depth"] + 1):
-        j = tables.integers[last["path"] + p]
+    for p in range(many):
+        j = tables.integers[path + p]
         u, v, w = given(work, 6 * j, x, y, z)
         a, b, c = cross(work, 6 * j, tx, ty, tz)
         ux, uy, uz = m[0] * u + m[1] * a, m[0] * v + m[1] * b, m[0] * w + m[1] * c
         ax, ay, az = m[1] * u + m[2] * a, m[1] * v + m[2] * b, m[1] * w + m[2] * c
         row = 8 * n + tables.freedoms[j]["row"]
         for q in range(p + 1):
-            s = 6 * tables.integers[last["path"] + q]
+            s = 6 * tables.integers[path + q]
             u, v, w = given(work, s, x, y, z)
             a, b, c = cross(work, s, tx, ty, tz)
             work[row + q] += u * ux + v * uy + w * uz + (a * ax + b * ay + c * az)
@@ -69,13 +54,13 @@ def along_way(out, work, here, s, way):
 @njit
 def let_slide(out, tables, i, way, slides):
     """Take off M what slides along a way on body i, by mass over length squared [kg/m2]."""
-    work, n, here, own = tables.scratch, tables.freedoms.size, row_of(tables, i), carrier(tables, i)
-    last = tables.freedoms[tables.bodies[own]["freedom"] + tables.bodies[own]["freedoms"] - 1]
-    for p in range(last["depth"] + 1):
-        j = tables.integers[last["path"] + p]
+    work, n, here = tables.scratch, tables.freedoms.size, row_of(tables, i)
+    path, many = path_of(tables, carrier(tables, i))
+    for p in range(many):
+        j = tables.integers[path + p]
         row, one = 8 * n + tables.freedoms[j]["row"], along_way(out, work, here, 6 * j, way)
         for q in range(p + 1):
-            other = along_way(out, work, here, 6 * tables.integers[last["path"] + q], way)
+            other = along_way(out, work, here, 6 * tables.integers[path + q], way)
             work[row + q] -= slides * one * other
 
 

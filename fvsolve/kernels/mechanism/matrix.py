@@ -26,7 +26,9 @@ from fvsolve.kernels.mechanism.room import (
     STREAM,
     TORQUE,
     TURNING,
+    carrier,
     cross,
+    path_of,
     put,
     row_of,
     turned,
@@ -295,14 +297,12 @@ def lean_at(out, tables, i, px, py, pz, x, y, z, at):
 @njit
 def lean_by(tables, i, tx, ty, tz, fx, fy, fz, at):
     """The same of a torque about o and a force on body i."""
-    work, freedoms, paths = tables.scratch, tables.freedoms, tables.integers
-    while i >= 0 and tables.bodies[i]["freedoms"] == 0:
-        i = tables.bodies[i]["parent"]
+    work, i = tables.scratch, carrier(tables, i)
     if i < 0:
         return
-    last = freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
-    for k in range(last["depth"] + 1):
-        j = paths[last["path"] + k]
+    path, many = path_of(tables, i)
+    for k in range(many):
+        j = tables.integers[path + k]
         s = 6 * j
         turn = work[s] * tx + work[s + 1] * ty + work[s + 2] * tz
         work[at + j] += turn + (work[s + 3] * fx + work[s + 4] * fy + work[s + 5] * fz)

@@ -7,9 +7,18 @@ all that is carried less what slides (`laden`); then flow feels the acceleration
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.freight import load_all, mass_per_length, pipe_line, to_world, turned_way, way_of
-from fvsolve.kernels.mechanism.laden import carrier
 from fvsolve.kernels.mechanism.matrix import ease, lean_at
-from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, BIAS, PLACE, SPIN_BIAS, TURNING, back, row_of
+from fvsolve.kernels.mechanism.room import (
+    ACCELERATION,
+    ATTITUDE,
+    BIAS,
+    PLACE,
+    SPIN_BIAS,
+    TURNING,
+    back,
+    carrier,
+    row_of,
+)
 from fvsolve.kernels.records import ASKED, LAW_LINEAR, RATE
 
 

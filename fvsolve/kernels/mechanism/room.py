@@ -28,6 +28,21 @@ def row_of(tables, i):
     return tables.layout[0]["body"] + BODY_OUT * i
 
 
+@njit
+def carrier(tables, i):
+    """The body nearest to body i on the way to its root that forces move; -1 for none."""
+    while i >= 0 and tables.bodies[i]["freedoms"] == 0:
+        i = tables.bodies[i]["parent"]
+    return i
+
+
+@njit(forceinline=True)
+def path_of(tables, i):
+    """Where in `integers` the freedoms that move body i stand, from the root on, and how many; i : a `carrier`."""
+    last = tables.freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
+    return last["path"], last["depth"] + 1
+
+
 @njit(forceinline=True)
 def dot(a, i, x, y, z):
     """Product of the vector at a[i] and another."""
@@ -38,6 +53,13 @@ def dot(a, i, x, y, z):
 def cross(a, i, x, y, z):
     """Vector product of the vector at a[i] and another (34)."""
     return a[i + 1] * z - a[i + 2] * y, a[i + 2] * x - a[i] * z, a[i] * y - a[i + 1] * x
+
+
+@njit(forceinline=True)
+def given(work, s, x, y, z):
+    """Velocity at (x, y, z) from o that a freedom gives, its S at scratch[s]."""
+    u, v, w = cross(work, s, x, y, z)
+    return work[s + 3] + u, work[s + 4] + v, work[s + 5] + w
 
 
 @njit(forceinline=True)

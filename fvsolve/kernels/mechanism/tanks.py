@@ -6,7 +6,18 @@ its body with joints held, in its own axes. A basin that rides on nothing says z
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.mechanism.room import ACCELERATION, ARM, BIAS, SPIN_BIAS, TURNING, dot, row_of
+from fvsolve.kernels.mechanism.room import (
+    ACCELERATION,
+    ARM,
+    BIAS,
+    SPIN_BIAS,
+    TURNING,
+    carrier,
+    dot,
+    given,
+    path_of,
+    row_of,
+)
 from fvsolve.kernels.records import TANK_OUT
 
 MOMENTS, EAST, NORTH, NORMAL, ARM_OF, LOAD = 0, 6, 9, 12, 15, 18
@@ -19,14 +30,11 @@ def add_tanks(out, tables):
     """Add J' N J to M in `scratch`, J the accelerations along the normal that freedoms give: n . (a + alpha x r)."""
     work, freedoms, paths, n = tables.scratch, tables.freedoms, tables.integers, tables.freedoms.size
     for b in range(tables.basins.size):
-        i, tank = tables.basins[b]["body"], tables.layout[0]["tank"] + TANK_OUT * b
-        while i >= 0 and tables.bodies[i]["freedoms"] == 0:
-            i = tables.bodies[i]["parent"]
+        i, tank = carrier(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
         if i < 0:
             continue
-        last = freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
-        path, depth = last["path"], last["depth"]
-        for p in range(depth + 1):
+        path, many = path_of(tables, i)
+        for p in range(many):
             j = paths[path + p]
             row, (a, c, d) = 8 * n + freedoms[j]["row"], along_normal(out, work, tank, 6 * j)
             m = tank + MOMENTS
@@ -42,8 +50,7 @@ def add_tanks(out, tables):
 def along_normal(out, work, tank, s):
     """What a freedom gives along the normal at 1, x and y of a tank, its S at scratch[s]."""
     wx, wy, wz = work[s], work[s + 1], work[s + 2]
-    x, y, z = out[tank + ARM_OF], out[tank + ARM_OF + 1], out[tank + ARM_OF + 2]
-    u, v, w = work[s + 3] + wy * z - wz * y, work[s + 4] + wz * x - wx * z, work[s + 5] + wx * y - wy * x
+    u, v, w = given(work, s, out[tank + ARM_OF], out[tank + ARM_OF + 1], out[tank + ARM_OF + 2])
     n, e, k = tank + NORMAL, tank + EAST, tank + NORTH
     return (
         out[n] * u + out[n + 1] * v + out[n + 2] * w,
