@@ -102,6 +102,7 @@ def parts(
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     yield from sloshing.misfits(nodes, lumped, poses)
+    yield from sloshing.weightless(nodes, gravity)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():

@@ -122,7 +122,9 @@ class _Reader:
         for name, node in self.group("nodes").items():  # of those at fault too
             kinds["nodes"] |= dict.fromkeys(check.points_of(name, node), BodyPoint)
         for name, kind in [*kinds["nodes"].items()]:
-            if name in self.lumped:
+            if name in self.lumped and not parts["nodes"][name].own.sloshes:
+                kinds["nodes"][name] = None  # at fault itself
+            elif name in self.lumped:
                 kinds["nodes"][name] = basins.Pool(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
             elif kind is Basin and name not in meshes:
                 kinds["nodes"][name] = None  # at fault itself

@@ -108,7 +108,7 @@ def _quantity(
     known = {**along, **own, **getattr(kind, "fields", {})}
     article = "an" if kind.kind[0] in "aeiou" else "a"
     if quantity not in known:
-        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
+        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "its water is one with its body"
         raise ValueError(f"{name} is {article} {kind.kind}, without {show(quantity)}; {has}")
     if place is None:
         if quantity not in own:

@@ -187,6 +187,18 @@ def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]
                 yield (*key, "sloshing"), text + 'nothing; wanted "cells" or "frozen"'
 
 
+def weightless(nodes: dict[str, Any], gravity: float | None) -> Found:
+    """A fault of no gravity where water stands by it, or swings."""
+    for name, basin in nodes.items():
+        if gravity == 0.0 and getattr(getattr(basin, "own", None), "sloshes", False):
+            if not (basin.on and basin.sloshing == "frozen"):
+                yield (
+                    ("gravity",),
+                    f'the water in {name} stands by it; wanted more than 0, or sloshing = "frozen" on a body',
+                )
+                return
+
+
 def left_out(key: tuple, basin: Any) -> Found:
     """Faults of keys that modes have no place for."""
     for what in sorted(basin.start.model_fields_set) if basin.start is not None else ():
@@ -196,7 +208,7 @@ def left_out(key: tuple, basin: Any) -> Found:
             yield (*key, "patches", patch, "boundary"), "modes are of closed tanks; wanted a wall"
     for what in ("manning", "factor"):
         if getattr(basin, what) is not None:
-            yield (*key, what), "modes have no friction; leave it out, or give their bodies damping"
+            yield (*key, what), "modes have no friction; leave it out"
 
 
 def turn_of(basin: Any) -> np.ndarray:
@@ -241,17 +253,22 @@ def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity
 
 def reading(
     basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float
-) -> tuple[list[SloshingMode], list]:
-    """The modes, and what the surface at a point is of their travels, and of all others per slope of what pushes them.
+) -> tuple[list[SloshingMode], list[float]]:
+    """The modes, and by how much the travel of each raises the surface at a point.
 
-    Others are where they would rest: (x, y) from the middle less what the modes that are followed have of it there.
+    Those that are left out would rest where they are pushed to, as the last one that is followed all but does: it
+    carries them along, so that what stands stands even.
     """
     outline, every = outline_of(mesh), made(basin, mesh, density, gravity)
     rises = [surface(outline, one, x, y) for one in every]
     rest = (np.array([x, y]) - outline.middle).tolist()
     for one, rise in zip(every, rises, strict=True):
         rest[one.along] -= gravity * rise / one.square
-    return every, [*rest, *rises]
+    last = len(every) - 2
+    return every, [
+        *rises[:last],
+        *(rises[k] + rest[every[k].along] * every[k].square / gravity for k in (last, last + 1)),
+    ]
 
 
 def slider(name: str, mode: SloshingMode) -> str:

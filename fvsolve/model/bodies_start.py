@@ -113,9 +113,10 @@ def moves(draft, accelerations: np.ndarray) -> list[str]:
     found = []
     for name, row in zip(draft.body_names, draft.body_table, strict=True):
         pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
-        if (fast := np.linalg.norm(pose.spin)) > 0.0:
+        stated = name in draft.case.nodes  # of water in modes only what it begins to do
+        if stated and (fast := np.linalg.norm(pose.spin)) > 0.0:
             found.append(f"body {name} turns at {fast:.4g} rad/s")
-        if (fast := np.linalg.norm(pose.velocity)) > 0.0:
+        if stated and (fast := np.linalg.norm(pose.velocity)) > 0.0:
             found.append(f"body {name} moves at {fast:.4g} m/s")
         slides = 0 if row["joint"] in (rec.REVOLUTE, rec.BALL) else 3 if row["joint"] == rec.FREE else 1
         for part, unit in ((own[:slides], "m/s2"), (own[slides:], "rad/s2")):

@@ -69,12 +69,10 @@ def lower_surface(draft, row, probe) -> None:
     case, basin = draft.case, draft.case.nodes[probe.name]
     about = basin, case.lumped[probe.name]
     every, shares = sloshing.reading(*about, *probe.point, case.properties.density, case.gravity)
-    turn, depth = sloshing.turn_of(basin), sloshing.depth_of(basin)
-    top = np.array(basin.at or (0.0, 0.0, 0.0)) + turn @ (*sloshing.outline_of(about[1]).middle, basin.level)
-    row["kind"], row["index"], row["offset"] = rec.SURFACE_VALUE, draft.body_names.index(basin.on), depth
+    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(basin)
     row["cell"], row["count"], row["weights"] = len(draft.integers), len(every), len(draft.floats)
     draft.integers += [draft.body_names.index(sloshing.slider(probe.name, one)) for one in every]
-    draft.floats += [*top, *turn[:, 0], *turn[:, 1], *shares]
+    draft.floats += shares
 
 
 def probe_offsets(draft, start) -> None:

@@ -40,7 +40,8 @@ class Soundness:
         """At a state: keep the pace of basins; why the run has to stop, or nothing."""
         for basin in self.moving:
             self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.pace(y)[0])
-        self.swings.look(t, y)
+        if stops := self.swings.look(t, y):
+            return stops
         ratio = np.abs(y) / self.largest
         if not np.any(ratio > 1.0):
             return ""

@@ -1,50 +1,107 @@
-"""How high water in modes rises: they are of waves that are small beside its depth. Knows modes; knows no steps."""
+"""What water that rides cannot feel: in modes that it rises high, or that its body falls. Knows tanks; knows no steps."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fvsolve.case import sloshing
+from fvsolve.case.riding import free_joints
 from fvsolve.errors import Notice
 
 SMALL = 0.2  # share of the depth up to which a wave is small
+LIGHT = 0.1  # share of its weight that water may gain or lose by its body's motion, unfelt by its waves
+WEIGHTLESS = "the water in {name} has no weight left at t = {t:.6g} s; wanted a body that falls less fast"
+RISE, LOSS = slice(0, 2), slice(2, 4)
 
 
 class Swings:
-    """The greatest rise of water in modes, tank by tank.
+    """How high water in modes rises, and by how much bodies that forces move take the weight of water away.
 
-    kept : float64[tanks, 2]  its share of the depth and when that was
+    Modes swing under gravity, cells under what driven joints make of it; what a free body adds is in no wave.
+    kept : float64[tanks, 4]  greatest rise as a share of the depth and when, greatest share of weight and when
     """
 
     def __init__(self, model) -> None:
-        case, self.tanks = model.case, []
-        for name, mesh in case.lumped.items():
+        self.model, self.tanks = model, []
+        case = model.case
+        for name, mesh in {**case.meshes, **case.lumped}.items():
             basin = case.nodes[name]
-            if basin.sloshing != "modes":
-                continue
-            every = sloshing.made(basin, mesh, case.properties.density, case.gravity)
-            rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, one))] for one in every]
-            lifts = np.zeros((2, len(every)))
-            lifts[[one.along for one in every], range(len(every))] = [one.rise for one in every]
-            lifts /= sloshing.depth_of(basin)
-            at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
-            self.tanks.append((name, np.array(at), start, lifts, sloshing.outline_of(mesh).is_round))
-        self.kept = np.zeros((len(self.tanks), 2))
+            modal = basin.on is not None and basin.sloshing == "modes"
+            free = basin.on is not None and basin.own.sloshes and any(free_joints(basin.on, case.nodes))
+            if modal or (free and not basin.lumped):
+                middle = np.array([*mesh.centre.mean(axis=0), 0.0])
+                place = np.array(basin.at or (0.0, 0.0, 0.0)) + sloshing.turn_of(basin) @ middle
+                about = model.body_names.index(basin.on), place, sloshing.turn_of(basin)[:, 2]
+                self.tanks.append((name, modal, about, *(rises(model, name) if modal else ())))
+        self.kept = np.zeros((len(self.tanks), 4))
 
-    def look(self, t: float, y: np.ndarray) -> None:
-        """At a state."""
-        for (_, at, start, lifts, is_round), kept in zip(self.tanks, self.kept, strict=True):
-            along, across = np.abs(lifts @ (start + y[at]))
-            rise = float(np.hypot(along, across)) if is_round else float(along + across)
-            if rise > kept[0]:
-                kept[:] = rise, t
+    def look(self, t: float, y: np.ndarray) -> str:
+        """At a state; why the run has to stop, or nothing."""
+        if not self.tanks:
+            return ""
+        out = self.model.evaluate(t, y)[1]
+        for (name, modal, about, *lifting), kept in zip(self.tanks, self.kept, strict=True):
+            if modal:
+                keep(kept[RISE], rise(y, *lifting), t)
+            felt, meant = self.weight(out, *about, modal)
+            if not felt > 0.0 and np.isfinite(felt):
+                return f"stopped: {WEIGHTLESS.format(name=name, t=t)}"
+            keep(kept[LOSS], abs(felt / meant - 1.0), t)
+        return ""
+
+    def weight(
+        self, out: np.ndarray, i: int, place: np.ndarray, normal: np.ndarray, modal: bool
+    ) -> tuple[float, float]:
+        """What water weighs along the normal of its bed, and what its waves swing by [m/s2]."""
+        from fvsolve.kernels.mechanism import room
+        from fvsolve.kernels.records import BODY_OUT
+
+        row = out[int(self.model.layout["body"]) + BODY_OUT * i :][:BODY_OUT]
+        turn, gravity = row[room.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
+        spin, arm, up = row[room.SPIN :][:3], turn @ place, turn @ normal
+        down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
+        felt, held = (
+            up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
+            for a, b in ((room.ACCELERATION, room.TURNING), (room.BIAS, room.SPIN_BIAS))
+        )
+        return float(felt), gravity if modal else float(held)
 
     def notices(self) -> list[Notice]:
-        """Waves that were not small."""
+        """Waves that were not small, and weight that they did not feel."""
         found = []
-        for (name, *_), (rise, t) in zip(self.tanks, self.kept.tolist(), strict=True):
-            if rise > SMALL:
-                text = f"{name}: at {t:.4g} s its water rises by {rise:.2g} of its depth, and modes are linear; "
+        for (name, *_), (high, when, lost, then) in zip(self.tanks, self.kept.tolist(), strict=True):
+            if high > SMALL:
+                text = f"{name}: at {when:.4g} s its water rises by {high:.2g} of its depth, and modes are linear; "
                 text += 'sloshing = "cells" knows great waves where water is shallow'
-                found.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", rise, SMALL))
+                found.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", high, SMALL))
+            if lost > LIGHT:
+                text = (
+                    f"{name}: at {then:.4g} s its body's rise or fall changes what its water weighs by {lost:.2g} of "
+                )
+                text += "that, which its waves do not feel: they swing as if it did not"
+                found.append(Notice("weight", f"nodes.{name}", text, None, lost, LIGHT))
         return found
+
+
+def rises(model, name: str) -> tuple:
+    """Of water in modes: its states, their values at the start, by what share of the depth each lifts it, its shape."""
+    case = model.case
+    basin, mesh = case.nodes[name], case.lumped[name]
+    every = sloshing.made(basin, mesh, case.properties.density, case.gravity)
+    rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, one))] for one in every]
+    lifts = np.zeros((2, len(every)))
+    lifts[[one.along for one in every], range(len(every))] = [one.rise for one in every]
+    at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
+    return np.array(at), start, lifts / sloshing.depth_of(basin), sloshing.outline_of(mesh).is_round
+
+
+def rise(y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is_round: bool) -> float:
+    """How far water rises at most, as a share of its depth."""
+    along, across = np.abs(lifts @ (start + y[at]))
+    return float(np.hypot(along, across)) if is_round else float(along + across)
+
+
+def keep(kept: np.ndarray, value: float, t: float) -> None:
+    """Note what is greater than before."""
+    if value > kept[0]:
+        kept[:] = value, t

@@ -224,19 +224,12 @@ def point_value(out, tables, k, which):
 
 
 @njit
-def surface_value(y, out, tables, probe):
-    """Depth of water in modes: at rest, by what each mode raises it, and others that follow what pushes them."""
-    floats, bodies, at = tables.floats, tables.bodies, probe["weights"]
-    here, gravity = row_of(tables, probe["index"]), tables.settings[0]["gravity"]
-    x, y0, z = turned(out, here + ATTITUDE, floats, at)
-    a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y0, z)
+def surface_value(y, tables, probe):
+    """Depth of water in modes: at rest, and by what their travels raise it."""
     found = probe["offset"]
-    for k in range(2):
-        u, v, w = turned(out, here + ATTITUDE, floats, at + 3 + 3 * k)
-        found -= floats[at + 9 + k] * (a * u + b * v + (c + gravity) * w) / gravity
     for k in range(probe["count"]):
-        body = bodies[tables.integers[probe["cell"] + k]]
-        found += floats[at + 11 + k] * (body["start"][0] + y[body["y"]])
+        body = tables.bodies[tables.integers[probe["cell"] + k]]
+        found += tables.floats[probe["weights"] + k] * (body["start"][0] + y[body["y"]])
     return found
 
 
@@ -251,4 +244,4 @@ def observe_bodies(t, y, out, handle, values):
         elif probes[k]["kind"] == POINT_VALUE:
             values[k] = point_value(out, tables, probes[k]["index"], probes[k]["side"])
         elif probes[k]["kind"] == SURFACE_VALUE:
-            values[k] = surface_value(y, out, tables, probes[k])
+            values[k] = surface_value(y, tables, probes[k])
