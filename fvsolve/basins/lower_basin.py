@@ -391,7 +391,12 @@ class BasinRows:
         row["ring"], row["faces"], behind_faces = len(draft.integers), own.size, self.mesh.left[own]
         draft.integers += [*numbers.tolist(), *behind_faces.tolist()]
         length = self.mesh.length[own]
-        row["sizes"] = draft.to_plane(np.array([self.mesh.area[cells].sum(), length.sum()]))
+        sizes = [self.mesh.area[cells].sum(), length.sum()]
+        if self.deep and self.part.on is not None:
+            from fvsolve.basins.lower_frames import place_in_frame
+
+            sizes += place_in_frame(draft, self, patch)
+        row["sizes"] = draft.to_plane(np.array(sizes))
         per_area = [length / self.mesh.area[behind_faces]] * (2 if self.moves else 1)
         row["normals"] = draft.to_plane(np.array([*self.mesh.normal[own].T, *per_area]))
         stated = self.part.patches.get(patch)

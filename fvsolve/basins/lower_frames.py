@@ -7,8 +7,7 @@ import numpy as np
 from fvsolve.basins.faces import BLOCK, blocks
 from fvsolve.basins.frames import FRAME, LEVEL, PHI, PLACES, SURFACE
 from fvsolve.case.riding import carriers, free_joints
-
-ENOUGH = 200  # halvings
+from fvsolve.case.riding_patches import level_over
 
 
 def attitude_of(part) -> np.ndarray:
@@ -66,6 +65,13 @@ def places_of_sides(basin) -> np.ndarray:
     return basin.mesh.middle[np.where(face >= 0, face, ~face)].T
 
 
+def place_in_frame(draft, basin, patch: str) -> list[float]:
+    """Where a patch is in the axes that kernels follow, over the level at rest [m], and its profile's weight [J/kg]."""
+    place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
+    own = attitude_of(part).T @ (np.array(place.at) - np.array(part.place))
+    return [*(own[:2] - middle_of(basin)).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
+
+
 def potential_at_start(basin) -> np.ndarray:
     """What gravity lifts cells by above their basin's middle, as its body stands at the start [J/kg]."""
     pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
@@ -80,16 +86,11 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
     """
     part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
     down = (turn @ attitude_of(part)).T @ np.array([0.0, 0.0, -1.0])
-    ground = basin.bed - part.level + (down[0] * basin.x + down[1] * basin.y) / down[2]
-    area, volume = basin.mesh.area, float(np.sum(basin.mesh.area * basin.depth))
-    if not np.ptp(ground - (basin.bed - part.level)) > 0.0:
+    drawn, tilt = basin.bed - part.level, (down[0] * basin.x + down[1] * basin.y) / down[2]
+    if not np.ptp(drawn + tilt - drawn) > 0.0:
         return basin.depth
-    low, high = float(ground.min()), float(ground.max()) + volume / float(area.sum())
-    for _ in range(ENOUGH):
-        middle = 0.5 * (low + high)
-        full = float(np.sum(area * np.maximum(middle - ground, 0.0))) > volume
-        low, high = (low, middle) if full else (middle, high)
-    return np.maximum(0.5 * (low + high) - ground, 0.0)
+    volume = float(np.sum(basin.mesh.area * basin.depth))
+    return np.maximum(level_over(drawn, tilt, basin.mesh.area, volume) - (drawn + tilt), 0.0)
 
 
 def corners(basin, points: np.ndarray, out: np.ndarray, layout) -> np.ndarray:

@@ -15,8 +15,9 @@ WALLS = Pieces(
     observe="walls: observe_walls", power="walls: wall_power",
 )  # fmt: skip
 SIDES = Pieces(home=HOME, see="moving_meshes: see_meshes", prepare="moving_meshes: drive_sides")
-FRAMES = Pieces(
-    home=HOME, prepare="frames: set_frames", enter="frames_flow: turn_fluid", follow="frames_flow: follow_bodies",
+FRAMES = Pieces(home=HOME, prepare="frames: set_frames")  # before what patches say
+TURNING = Pieces(
+    home=HOME, enter="frames_flow: turn_fluid", follow="frames_flow: follow_bodies",
     power="frames_energy: add_power", stored="frames_energy: add_stored",
 )  # fmt: skip
 VALUES = Pieces(home=HOME, leave="carried: patch_values", observe="carried: observe_values")
@@ -31,6 +32,7 @@ CARRIED = (VALUES, MIXED, GRIDS, FIFTH, SPREAD, MESHES, SETTLED)  # in order, wh
 def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
     """What runs in basins beside scalars; valves : whether there are any in the network."""
     shared = [ALL] if basins and basins[0].case.law.linear else [ALL, DENSE] if basins else []
+    shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
     moving = [WALLS] if any(basin.moves for basin in basins) else []
     moving += [SIDES] if any(basin.moves and not basin.is_grid for basin in basins) else []
     return tuple(dict.fromkeys([*shared, *(one for basin in basins for one in basin.pieces(valves)), *moving]))

@@ -3,6 +3,13 @@
 from fvsolve.basins.behind import through_patch
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import GN
+
+
+@njit(forceinline=True)
+def weight_of(st, plane, basin):
+    """Gravity along the normal of a basin [m/s2], which on a body is what it feels there; see `basins.frames`."""
+    return st["gravity"] if basin["frame"] < 0 else plane[basin["frame"] + GN]
 
 
 @njit(forceinline=True)

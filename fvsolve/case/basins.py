@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 
 from fvsolve.case import riding, walls
 from fvsolve.case.cells import means, samples
+from fvsolve.case.riding_patches import on_body
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, listing
@@ -141,13 +143,25 @@ def place_kind(basin: Basin, patch: str) -> type[Place]:
     return MovingWall if stated is not None and stated.moves else Place
 
 
-def places(name: str, basin: Basin, mesh: Mesh) -> dict[str, Place]:
-    """Patches as places, at rest."""
+def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, Place]:
+    """Patches as places, at rest; pose : of the body that it rides on, without which none says what it is under."""
     found = {}
     for patch in patch_names(mesh):
         rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), behind(mesh, patch), mesh.area)
+        if basin.on is not None:
+            rest = on_body(basin, mesh, patch, rest, pose)
         kind = place_kind(basin, patch)
         found[f"{name}.{patch}"] = kind.model_construct(position=None, basin=name, patch=patch, **rest)
+    return found
+
+
+def riding_places(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, Place]:
+    """Patches of basins that ride, where they are on bodies; none of a basin whose formulas are at fault."""
+    found: dict[str, Place] = {}
+    for name, mesh in meshes.items():
+        if nodes[name].on is not None:
+            with suppress(ValueError):
+                found |= places(name, nodes[name], mesh)
     return found
 
 
@@ -174,7 +188,7 @@ def misfits(
         if fluid is not None and not own.goes(fluid.law):
             wanted = named(lambda law, own=own: own.goes(law.name))
             yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.described}; wanted {wanted}"
-        yield from riding.misfits(name, basin, nodes, joined, all_nodes)
+        yield from riding.misfits(name, basin, nodes, all_nodes)
         if name not in meshes:
             continue
         known = patch_names(meshes[name])

@@ -100,7 +100,7 @@ class Case(Shown):
         found = {}
         for name, node in self.nodes.items():
             if name in self.meshes:
-                found |= basins.places(name, node, self.meshes[name])
+                found |= basins.places(name, node, self.meshes[name], self.poses.get(node.on))
             elif node.domain == "hydraulic":
                 found |= riding_networks.standing(node, self.poses).inner(name)[0]
         for name, link in self.links.items():

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import bodies, riding_networks, sloshing
+from fvsolve.case import basins, bodies, riding_networks, sloshing
 from fvsolve.case.bodies import WORLD
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
@@ -84,6 +84,7 @@ def parts(
     fluid: Any,
     raw: Raw | None,
     start: float,
+    meshes: dict[str, Any],
     lumped: dict[str, Any],
 ) -> Found:
     """Faults of elevations, and what each part finds wrong beside the others."""
@@ -98,7 +99,7 @@ def parts(
 
     named = nodes if raw is None else _dict(raw.table.get("nodes"))
     yield from bodies.misfits(nodes, named)
-    yield from riding_networks.misfits(nodes, links, named)
+    yield from riding_networks.misfits(nodes, links, basins.riding_places(nodes, meshes), named)
     yield from bodies.one_place(nodes, links, poses)
     yield from bodies.open_pins(nodes, links, poses)
     yield from sloshing.misfits(nodes, lumped, poses)

@@ -139,7 +139,7 @@ class _Reader:
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0
-        self.add(check.parts(*parts.values(), *about, start, self.lumped))
+        self.add(check.parts(*parts.values(), *about, start, meshes, self.lumped))
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             self.add(check.cavities(numerics, has_cells, properties))

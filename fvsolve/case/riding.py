@@ -19,7 +19,7 @@ from fvsolve.units import show
 Found = Iterator[tuple[tuple, str]]
 
 
-def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], named: Any) -> Found:
+def misfits(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Found:
     """Faults of a basin that rides on a body."""
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
@@ -40,9 +40,6 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], joined: set[str], name
         if opened is not None and free is not None and not basin.lumped:
             text = f"{free} moves freely, and would have to feel what leaves here; wanted a wall, or a driven joint"
             yield (*key, "patches", patch, opened), text
-        if f"{name}.{patch}" in joined:
-            text = "a link joins here, and the basin rides on a body: between these goes a hose, which there is not yet"
-            yield (*key, "patches", patch), text
 
 
 def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any) -> Found:

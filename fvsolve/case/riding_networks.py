@@ -10,10 +10,11 @@ import numpy as np
 from fvsolve.case.riding import free_joints, place_faults
 from fvsolve.parts.basin.part import Basin
 from fvsolve.parts.node import Node, Rider
+from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
 PIPE_THERE = "wanted a pipe there, or a chamber"
-CLOSE = 1e-6  # of a length: places are typed with a few digits
+CLOSE = 1e-6  # of a length, and of no way [m]: places are typed with a few digits
 
 
 def standing(node: Node, poses: dict[str, Any]) -> Node:
@@ -30,8 +31,8 @@ def has_height(node: Node, poses: dict[str, Any]) -> bool:
     return on is None or (on in poses and not isinstance(node, Basin))
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], named: Any) -> Found:
-    """Faults of places of a network that ride on bodies, and of links that join them."""
+def misfits(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Found:
+    """Faults of places of a network that ride on bodies, and of links that join them; patches : of basins that do."""
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, Rider):
             continue
@@ -40,7 +41,7 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], named: Any) -> Found:
             yield ("nodes", name, "head"), f"it rides on {node.on}, and a head counts from the ground; wanted pressure"
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
-        yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes))
+        yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes, patches))
     for place, text in unfelt(nodes, links, free=True):
         yield place, f"{text}, or a driven joint in place of a free one"
 
@@ -49,7 +50,7 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
     """What bodies would not feel of networks on them; of those alone that move freely, where that is asked."""
 
     def riding(name: str) -> bool:
-        on = getattr(nodes.get(name), "on", None)
+        on = getattr(whose(name, nodes), "on", None)
         return on is not None and (not free or any(free_joints(on, nodes)))
 
     tanks = [name for name, node in nodes.items() if node.kind == "tank" and riding(name)]
@@ -64,6 +65,8 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
         if not any(map(riding, ends)):
             continue
         key = ("links", name)
+        for end in dict.fromkeys(end for end in ends if isinstance(whose(end, nodes), Basin)):
+            yield key, f"what passes {end} is not felt by its body yet; wanted a tank in place of the basin"
         if link.kind == "leak":
             yield key, "what leaves here is not felt by its body yet; wanted a valve to a reservoir"
         elif link.kind == "rigid-column":
@@ -82,9 +85,14 @@ def led(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
     return nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds
 
 
-def link_faults(link: Any, ends: list[str], nodes: dict[str, Any]) -> Found:
+def whose(place: str, nodes: dict[str, Any]) -> Any:
+    """The node that a place is, or the basin whose patch it is."""
+    return nodes.get(place, nodes.get(place.rpartition(".")[0]))
+
+
+def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Found:
     """Faults of a link between places of which one or more ride."""
-    stand = [nodes.get(place) for place in ends]
+    stand = [whose(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
     if not any(on):
         if getattr(link, "route", None):
@@ -95,13 +103,33 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any]) -> Found:
         said = " and ".join(f"{end}, on {body}" if body else f"{end}, which stands still" for end, body in each)
         yield (), f"joins {said}: between these goes a hose, which there is not yet"
         return
-    if any(isinstance(node, Basin) for node in stand):
-        return  # said of its patch
+    unable = [*dict.fromkeys(said for end, node in zip(ends, stand, strict=True) for said in shut(end, node))]
+    yield from (((), text) for text in unable)
+    where = [patches.get(end, node) for end, node in zip(ends, stand, strict=True)]
+    if unable or any(isinstance(node, Basin) for node in where):
+        return  # at fault itself
     length = getattr(link, "length", None)
-    points = np.array([stand[0].place, *getattr(link, "route", []), stand[-1].place])
+    points = np.array([where[0].place, *getattr(link, "route", []), where[-1].place])
     way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    if length is None and way > 0.0:
-        text = f"its ends lie {way:g} m apart, and a {link.kind} has no way between; wanted both at one place"
-        yield (), f"{text}, and a pipe or rigid-column to the next"
+    if length is None and way > CLOSE:
+        text = f"its ends lie {way:g} m apart{said_of(ends, patches)}, and a {link.kind} has no way between"
+        yield (), f"{text}; wanted both at one place, and a pipe or rigid-column to the next"
     elif length is not None and way > length * (1.0 + CLOSE):
-        yield ("length",), f"{length:g} m is too short: its way on {on[0]} is {way:g} m long"
+        yield ("length",), f"{length:g} m is too short: its way on {on[0]} is {way:g} m long{said_of(ends, patches)}"
+
+
+def shut(end: str, node: Any) -> Iterator[str]:
+    """Why nothing can join a patch of a basin that rides, if so."""
+    if not isinstance(node, Basin):
+        return
+    if not node.own.docks:
+        what = f"of a basin that rides, which physics {show(node.physics)} does not go with yet"
+        yield f"joins {end} {what}; wanted a free surface, or a tank"
+    elif node.lumped:
+        yield f'joins {end}, behind which there are no cells; wanted sloshing = "cells"'
+
+
+def said_of(ends: list[str], patches: dict[str, Any]) -> str:
+    """Where patches are that nobody stated."""
+    found = [f"{end} at [{', '.join(f'{one:.7g}' for one in patches[end].at)}]" for end in ends if end in patches]
+    return f" ({' and '.join(found)})" if found else ""

@@ -34,8 +34,8 @@ class Accounts:
     def __init__(self, slate: Slate) -> None:
         self.slate, self.model = slate, slate.model
         model, case = slate.model, slate.model.case
+        refuse_unfelt(case)
         if len(model.tables.rides):
-            refuse_unfelt(case)
             slate.tables.rides["heavy"] = rec.ASKED
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of basins that ride on bodies is not booked where a side is open yet")

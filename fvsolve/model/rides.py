@@ -7,7 +7,6 @@ import numpy as np
 from fvsolve.case import riding_networks
 from fvsolve.case.riding import free_joints
 from fvsolve.kernels import records as rec
-from fvsolve.parts.basin.part import Basin
 
 SMALL = 1e-9  # of what drives a stretch [J/kg], below which it is rounding
 
@@ -33,14 +32,14 @@ def lower_rides(draft) -> None:
             row["rides"] = len(points) - 1
             found += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
     for node, row in zip(places.values(), draft.node_table, strict=True):
-        if getattr(node, "on", None) is None or isinstance(node, Basin):
+        if getattr(node, "on", None) is None or row["kind"] == rec.PATCH:
             continue
         row["ride"] = len(found)
         foot, high = np.array(node.place), node.level if row["kind"] == rec.TANK else 0.0
         body, start, end, swept, rise, heavy = stretch(draft, node.on, np.array([foot, foot + [0.0, 0.0, high]]))
         found.append((body, start, end, swept, -rise, heavy))
     draft.ride_table = np.array(found, rec.RIDE) if found else np.zeros(0, rec.RIDE)
-    if found and asked(draft):
+    if asked(draft):
         for place, text in riding_networks.unfelt(draft.case.nodes, draft.case.links):
             draft.fault(".".join(place), f"{text}, and a probe asks what joints hold")
 

@@ -11,7 +11,7 @@ from fvsolve.basins.free_surface.lower_dispersion import Watch, deep, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.lower_pieces import FRAMES, MARKED
+from fvsolve.basins.lower_pieces import MARKED, TURNING
 from fvsolve.case.cells import means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
@@ -63,7 +63,7 @@ class FreeSurfaceRows(BasinRows):
         yield Pieces(home=HOME, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}")
         yield WATER
         if self.part.on is not None:
-            yield FRAMES
+            yield TURNING
         if self.moves:
             yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED

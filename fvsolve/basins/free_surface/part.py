@@ -28,6 +28,7 @@ class FreeSurface(Physics, name="free-surface"):
     moves: ClassVar[bool] = True
     rides: ClassVar[bool] = True
     sloshes: ClassVar[bool] = True
+    docks: ClassVar[bool] = True
     described: ClassVar[str] = "a free surface, whose water has one density"
     steep: ClassVar[bool] = True
 

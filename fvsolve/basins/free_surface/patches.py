@@ -13,13 +13,14 @@ from fvsolve.basins.behind import (
     weight,
     weight_out,
 )
+from fvsolve.basins.frames import potential
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
-from fvsolve.basins.patches import give_way
+from fvsolve.basins.patches import give_way, weight_of
 from fvsolve.basins.stretch import seen_of, stretched
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import PATCH, RATE
+from fvsolve.kernels.records import GN, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
 
 MINE = kind_of(__package__)
@@ -30,7 +31,7 @@ def water_behind(tables, patch, y):
     """(rise of the surface, depth, volume, sum of area times weight squared) of the cells behind a patch.
 
     Cells count by their area times `weight_out`, so that a dry bank is no water; the volume is the sum. The rise is
-    from the surface at rest, where all is dry from the lowest bed.
+    from the surface at rest, where all is dry from the lowest bed; in a basin that rides from the level, phi with it.
     """
     basin, plane = tables.basins[patch["basin"]], tables.plane
     n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
@@ -39,7 +40,7 @@ def water_behind(tables, patch, y):
         bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
         if bed < low:
             low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
-    rest, rise, depth, volume, squares = max(low, 0.0), 0.0, 0.0, 0.0, 0.0
+    rest, rise, depth, volume, squares = max(low, 0.0) if basin["frame"] < 0 else 0.0, 0.0, 0.0, 0.0, 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
         h = depth_behind(plane, basin, i, y)
@@ -53,20 +54,36 @@ def water_behind(tables, patch, y):
 
 
 @njit
+def weight_beyond(plane, basin, patch, rise, depth):
+    """What water weighs on the place of a patch that rides, less that of the profile [J/kg], as it rests in its frame.
+
+    A surface of one potential stands over each place as phi has it there; a place that is bare or dry bears nothing.
+    """
+    at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential(plane, basin["frame"], 1.0)
+    x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
+    phi = x * (fx + xx * x + xy * y) + y * (fy + yy * y)
+    return to_be_had(depth) * max(plane[basin["frame"] + GN] * (rise - z) - phi, 0.0) - profile
+
+
+@njit
 def patch_pressures(t, y, dydt, out, handle):
     """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
     tables = open_tables(handle)
     st, layout = tables.settings[0], tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
-        if tables.basins[patch["basin"]]["kind"] != MINE:
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] != MINE:
             continue
-        node, seen = tables.nodes[patch["node"]], seen_of(tables.basins[patch["basin"]], tables.seen, y)
+        node, seen = tables.nodes[patch["node"]], seen_of(basin, tables.seen, y)
         stored, depth, volume, squares = water_behind(tables, patch, seen)
         area = area_of(tables, patch)
-        slope, content = st["rho"] * st["gravity"], st["rho"] * area
+        slope, content = st["rho"] * weight_of(st, tables.plane, basin), st["rho"] * area
         spread = area * squares / (volume * volume) if volume > HARDLY * area else 1.0
-        out[layout["pressure"] + patch["node"]] = slope * stored
+        pressure = slope * stored
+        if basin["frame"] >= 0:
+            pressure = st["rho"] * weight_beyond(tables.plane, basin, patch, stored, depth)
+        out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["had"] + node["row"]] = to_be_had(depth)
         out[layout["stiffness"] + node["row"]] = slope * spread / content
@@ -111,7 +128,9 @@ def pass_patch(tables, patch, asked, y, dydt, out):
         share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
         along_x, along_y = plane[at + m], plane[at + many + m]
         u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
-        give_way(plane, patch, m, (abs(u) + sqrt(st["gravity"] * h)) * out_per_width, dydt, i + n, i + 2 * n)
+        give_way(
+            plane, patch, m, (abs(u) + sqrt(weight_of(st, plane, basin) * h)) * out_per_width, dydt, i + n, i + 2 * n
+        )
         if out_per_width > 0.0:  # water that leaves takes along what it has across
             across, taken = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * many + m]
             dydt[i + n] += out_per_width * taken * across * along_y

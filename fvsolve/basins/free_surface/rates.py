@@ -3,11 +3,11 @@
 from fvsolve.basins.free_surface import faces, grid
 from fvsolve.basins.free_surface.friction import FASTEST, add_friction
 from fvsolve.basins.kinds import kind_of
-from fvsolve.basins.patches import book_open, wanted
+from fvsolve.basins.patches import book_open, wanted, weight_of
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import GN, NO_DRAG, RATE
+from fvsolve.kernels.records import NO_DRAG, RATE
 
 MINE = kind_of(__package__)
 
@@ -24,12 +24,6 @@ def through_faces(kx, ky, flow_x, flow_y):
         wide = 1.0 / kx[i]
         for j in range(ky.size + 1):
             flow_y[j * nx + i] *= wide
-
-
-@njit(forceinline=True)
-def weight_of(st, plane, basin):
-    """Gravity along the normal of a basin [m/s2], which on a body is what it feels there; see `basins.frames`."""
-    return st["gravity"] if basin["frame"] < 0 else plane[basin["frame"] + GN]
 
 
 @njit

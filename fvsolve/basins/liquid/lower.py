@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.liquid.observe import PRESSURE
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.lower_pieces import FRAMES, MARKED
+from fvsolve.basins.lower_pieces import MARKED, TURNING
 from fvsolve.kernels.phases import Pieces
 
 HOME = __package__
@@ -49,7 +49,7 @@ class LiquidRows(BasinRows):
         yield Pieces(home=HOME, rates=self.rates())
         yield LIQUID
         if self.part.on is not None:
-            yield FRAMES
+            yield TURNING
         if self.moves:
             yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED

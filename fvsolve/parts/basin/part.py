@@ -144,7 +144,7 @@ class StartOfFields(Table):
     """What a basin starts from where that is not rest: the keys that its physics has."""
 
 
-class Place(Node):
+class Place(Rider):
     """A patch as a place: pressure in the cells behind it, flow into them."""
 
     fixes_pressure: ClassVar[bool] = True
@@ -173,7 +173,8 @@ class Physics(Table):
     dimensions; starts : keys of `start`
     laws : of density that it goes with, all if left out; described : what other laws do not go with, in words
     joined : whether links may join its patches; a given velocity passes others
-    moves : whether its walls may move; rides : whether it may ride on bodies, sloshes : by other ways than by cells
+    moves : whether its walls may move; rides : whether it may ride on bodies, sloshes : by other ways than by cells,
+    docks : with links at its patches
     carries : whether it carries scalars; echoes : whether its boundary may have an impedance
     steep : whether its fronts steepen into jumps that keep, and smooth flow in the plane is of second order at most
     """
@@ -189,6 +190,7 @@ class Physics(Table):
     moves: ClassVar[bool] = False
     rides: ClassVar[bool] = False
     sloshes: ClassVar[bool] = False
+    docks: ClassVar[bool] = False
     carries: ClassVar[bool] = True
     echoes: ClassVar[bool] = False
     steep: ClassVar[bool] = False

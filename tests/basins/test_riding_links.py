@@ -1,0 +1,300 @@
+"""Links at patches of basins that ride: what rests in a frame rests, and what swings does so as one column has it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from model.test_sparsity import stray
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+from truth.meshes import write
+from truth.plain import boundary, triangles
+from truth.scenes import AMBIENT, GRAVITY, RHO, scene
+
+import fvsolve as fv
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.studies.energy.energy import energy
+
+SOLID = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
+SIZE, CELLS, LEVEL = (2.0, 1.0), (8, 4), 0.4
+BORE, WAY = 0.2, 1.0  # of what joins two basins [m]
+COLUMN = {"type": "rigid-column", "diameter": BORE}
+PIPE = {"type": "pipe", "diameter": BORE, "wave_speed": 1000.0, "cells": 10}
+FLOW = {"rigid-column": "duct.flow", "pipe": "duct.flow@0"}
+TILT = {"roll": "4 deg", "pitch": "-3 deg", "yaw": "20 deg"}
+
+
+def hull(**joint):
+    """A body whose joint is driven, or holds it."""
+    return {**SOLID, "joint": joint}
+
+
+def basin(at, side, folder=None, **more):
+    """A basin of SIZE, whose patch `gap` is amid one of its sides; a mesh of triangles where there is a folder."""
+    more = {"level": LEVEL, **more}
+    if folder is None:
+        span = {"span": [0.25, 0.75]} if side in ("west", "east") else {"span": [0.75, 1.25]}
+        shape = {"size": SIZE, "cells": CELLS, "patches": {"gap": {"side": side, **span}}}
+    else:
+        points, cells = triangles(SIZE, 0.25)
+        ends = boundary(cells)
+        middle = points[ends].mean(axis=1)
+        behind = np.abs(middle[:, 0] - {"west": 0.0, "east": SIZE[0]}[side]) < 1e-9
+        behind &= np.abs(middle[:, 1] - 0.5) < 0.25
+        file = folder / f"{side}.msh"
+        write(file, points, cells.tolist(), {"gap": ends[behind]})
+        shape = {"mesh": {"file": str(file)}}
+    return {"type": "basin", "on": "hull", "at": list(at), **shape, **more}
+
+
+def twins(joint, link, swap=False, turned=False, folder=None, start=None, end=1.0, numerics=None):
+    """Two basins behind each other along x, east of the first joined to west of the second.
+
+    turned : the second is drawn with its x the other way; start : of a surface over x, y of the body
+    """
+    far = SIZE[0] + WAY
+    given = [{} if start is None else {"start": {"level": start(f"(x + ({x}))", "y")}} for x in (0.0, far)]
+    second = {"at": (far, 0.0, 0.0), "side": "west"}
+    if turned:
+        second = {"at": (far + SIZE[0], SIZE[1], 0.0), "side": "east", "attitude": {"yaw": "180 deg"}}
+        if start is not None:
+            given[1] = {"start": {"level": start(f"({far + SIZE[0]} - x)", f"({SIZE[1]} - y)")}}
+    nodes = {"hull": hull(**joint), "a": basin((0, 0, 0), "east", folder, **given[0]),
+             "b": basin(folder=folder, **second, **given[1])}  # fmt: skip
+    ends = ("b.gap", "a.gap") if swap else ("a.gap", "b.gap")
+    links = {"duct": {**link, "from": ends[0], "to": ends[1], "length": WAY}}
+    numerics = {"initial": "rest", "scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}
+    numerics = {key: one for key, one in numerics.items() if one is not None}
+    return scene(nodes, links, end, numerics, [FLOW[link["type"]]], every=end / 20)
+
+
+def spin(rate):
+    return {"kind": "revolute", "axis": [0, 0, 1], "angle": {"time": [0.0, 100.0], "value": [0.0, 100.0 * rate]}}
+
+
+SLOWS = 0.3  # [m/s2], along -x
+RATE = 1.0  # [rad/s], about an axis beside both
+
+
+FRAMES = {  # joint, and the surface that rests in its frame
+    "slows down": (
+        {"kind": "prismatic", "axis": [1, 0, 0],
+         "travel": {"start": 0.0, "duration": 10.0, "value": [0.0, 50.0 * SLOWS], "exponent": 2}},
+        lambda x, y: f"{LEVEL} + {SLOWS / GRAVITY} * ({x} - 2.5)",
+    ),
+    "turns": (spin(RATE), lambda x, y: f"0.2 + {RATE**2 / (2 * GRAVITY)} * ({x}**2 + {y}**2)"),
+}  # fmt: skip
+WAYS = {
+    "as drawn": {}, "column back": {"swap": True}, "turned": {"turned": True}, "mesh": {"folder": True},
+    "weno5": {"numerics": {"scheme": "weno5"}},
+    "implicit": {"numerics": {"method": "gauss-4", "courant": None, "step": 0.1}},
+}  # fmt: skip
+
+
+def rests(case, loose=1e-13):
+    """Whether nothing moves from where it starts; states of pipes are in kg/s as well, under 1 m of water."""
+    model = fv.build(fv.load(case))
+    last = fv.advance(model, fv.initial_state(model), case["numerics"]["end"]).y
+    assert np.abs(last - model.start).max() < loose
+    return model
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("frame", FRAMES)
+def test_basins_that_a_riding_column_joins_rest_where_a_surface_rests_in_their_frame(frame, way, tmp_path):
+    (joint, start), more = FRAMES[frame], {"link": COLUMN, **WAYS[way]}
+    if "folder" in more:
+        more["folder"] = tmp_path
+    model = rests(twins(joint, start=start, **more), 1e-8 if way == "implicit" else 1e-11)
+    assert all(np.ptp(one.of(model.start)[0]) > 0.01 for one in model.basins)
+
+
+@pytest.mark.parametrize("link", [COLUMN, PIPE], ids=["column", "pipe"])
+@pytest.mark.parametrize("way", [{}, {"swap": True}, {"turned": True}, {"folder": True}, {"held": False}])
+def test_basins_that_a_riding_link_joins_rest_on_one_level_in_the_world(way, link, tmp_path):
+    """Held aslant by the body, or by their own axes; each holds what makes one surface of both."""
+    down = Rotation.from_euler("ZYX", [20, -3, 4], degrees=True).inv().apply([0, 0, -1])
+    more = {key: tmp_path if key == "folder" else one for key, one in way.items() if key != "held"}
+    case = twins({"kind": "fixed", "attitude": TILT}, link, **more)
+    case["nodes"]["b"]["level"] = LEVEL - down[0] / down[2] * (SIZE[0] + WAY)
+    if way == {"held": False}:  # one turn after the other
+        case["nodes"]["frame"] = hull(kind="fixed", attitude=TILT)
+        case["nodes"]["hull"]["joint"] = {"kind": "fixed", "on": "frame"}
+    model = rests(case, 1e-9)
+    a, b = (model.elevation[f"{one}.gap"] + model.case.places[f"{one}.gap"].depth for one in "ab")
+    assert a == pytest.approx(b, abs=1e-12)
+
+
+HALF, DEEP, HIGH, DUCT, LOSS = 4.0, 1.5, 0.8, 0.6, 3.0  # of a U-tube, one of whose arms is a basin [m]
+WIDE, LONG = 0.3, 4.0  # of that basin, across and along the axis of roll
+AREA, BED = WIDE * LONG, 0.1  # [m2]; of its bed above the tank's bottom [m]
+SWING = {"mean": 0.0, "amplitude": 0.05, "period": 7.0}
+SWAY = {"mean": 0.0, "amplitude": 0.3, "period": 7.0}
+
+
+def half_u(joint, grid=(1, 1), swap=False, turned=False, later=False, **link):
+    """A basin to port, y = -HALF amid it, and a tank to starboard; turned : the basin's x and y the other way."""
+    north = -HALF + 0.5 * WIDE
+    at, way = (-0.5 * LONG, north - WIDE, BED - DEEP), {}
+    if turned:
+        at, way = (0.5 * LONG, north, BED - DEEP), {"attitude": {"yaw": "180 deg"}}
+    gap = {"gap": {"side": "south" if turned else "north"}}
+    arm = {"type": "basin", "on": "hull", "at": list(at), "size": [LONG, WIDE], "cells": list(grid),
+           "level": HIGH - BED, "patches": gap, **way}  # fmt: skip
+    far = {"type": "tank", "on": "hull", "at": [0, HALF, -DEEP], "area": AREA, "level": HIGH}
+    arms = {"port": arm, "far": far}
+    ends = ("far", "port.gap") if swap else ("port.gap", "far")
+    nodes = {"hull": hull(**joint)} | (dict(reversed(arms.items())) if later else arms)
+    duct = {"type": "rigid-column", "from": ends[0], "to": ends[1], "length": 2 * HALF, "diameter": DUCT,
+            "minor_loss": LOSS}  # fmt: skip
+    numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
+    return scene(nodes, {"duct": duct | link}, 10.0, numerics, ["far.level"], every=0.1)
+
+
+def rolls(t):
+    """G_y and G_z at the axis, f' and f'' of a hull that rolls."""
+    w = 2 * math.pi / SWING["period"]
+    f = SWING["amplitude"] * math.sin(w * t)
+    turn, quicker = SWING["amplitude"] * w * math.cos(w * t), -w * w * f
+    return -GRAVITY * math.sin(f), -GRAVITY * math.cos(f), turn, quicker
+
+
+def sways(t):
+    """The same of one that sways."""
+    w = 2 * math.pi / SWAY["period"]
+    return SWAY["amplitude"] * w * w * math.sin(w * t), -GRAVITY, 0.0, 0.0
+
+
+def column_rate(t, state, force):
+    """Of the flow to starboard [m3/s] and the level there: what drives water along the bed, the duct and up the tank.
+
+    Along a way from r1 to r2 a hull that turns drives by G . (r2 - r1) - f'' (y1 z2 - z1 y2) + f'^2 (r2^2 - r1^2) / 2;
+    the surface in the basin lies at right angles to what it feels.
+    """
+    q, level = state
+    gy, gz, turn, quicker = force(t)
+    rise = level - HIGH
+
+    def along(y1, z1, y2, z2):
+        square = y2 * y2 + z2 * z2 - y1 * y1 - z1 * z1
+        return gy * (y2 - y1) + gz * (z2 - z1) - quicker * (y1 * z2 - z1 * y2) + 0.5 * turn**2 * square
+
+    bed, face = BED - DEEP, -HALF + 0.5 * WIDE
+    weight = -(gz + quicker * HALF + turn**2 * bed)  # at y = -HALF on the bed
+    drive = weight * (HIGH - BED - rise) + along(-HALF, bed, face, bed) + along(face, bed, HALF, -DEEP)
+    drive += along(HALF, -DEEP, HALF, -DEEP + level)
+    bore = 0.25 * math.pi * DUCT**2
+    return [bore / (2 * HALF) * (drive - 0.5 * LOSS * abs(q) * q / bore**2), q / AREA]
+
+
+JOINTS = {
+    "rolls": ({"kind": "revolute", "axis": [1, 0, 0], "angle": SWING}, rolls),
+    "sways": ({"kind": "prismatic", "axis": [0, 1, 0], "travel": SWAY}, sways),
+}
+DRAWN = {"as drawn": {}, "the duct to port": {"swap": True}, "turned": {"turned": True}, "tank first": {"later": True}}
+
+
+QUICK = {"of many cells": {"grid": (2, 4)}, "a pipe": {"type": "pipe", "wave_speed": 200.0, "cells": 8}}
+
+
+@pytest.mark.parametrize("drawn", [*DRAWN, *QUICK])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_basin_and_a_tank_swing_as_one_column_of_water_does(joint, drawn):
+    """A basin of one cell is such an arm; one of many, and a pipe, as far as their waves are quick."""
+    moves, force = JOINTS[joint]
+    result = fv.run(half_u(moves, **(DRAWN | QUICK)[drawn]))
+    t = result.t
+    truth = solve_ivp(column_rate, (0, 10), [0.0, HIGH], t_eval=t, args=(force,), rtol=1e-11, atol=1e-12)
+    rise = truth.y[1] - HIGH
+    assert np.ptp(rise) > 0.1
+    close = (1e-2 if drawn in QUICK else 1e-5) * np.ptp(rise)
+    assert result["far.level"] - HIGH == pytest.approx(rise, abs=close)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12 and result.marks == []
+
+
+@pytest.mark.parametrize("link", [{}, QUICK["a pipe"]], ids=["column", "pipe"])
+def test_rates_hang_on_the_states_that_the_pattern_of_implicit_methods_has(link):
+    model = fv.build(fv.load(half_u(JOINTS["rolls"][0], grid=(4, 4), **link)))
+    y = model.start + 0.01 * model.scale * np.random.default_rng(0).normal(size=model.y_size)
+    assert stray(model, 1.0, y) < 1e-7
+
+
+# valves, faults ----------
+
+
+def test_a_valve_between_basins_that_touch_lets_them_come_to_one_level_in_the_world():
+    joint = {"kind": "fixed", "attitude": {"pitch": "4 deg"}}
+    case = twins(joint, COLUMN, end=20.0)
+    case["links"] = {"gate": {"type": "valve", "from": "a.gap", "to": "b.gap", "area": 0.1}}
+    case["nodes"]["b"]["at"] = [SIZE[0], 0.0, 0.0]
+    case["output"]["probes"] = ["a.gap.head", "b.gap.head", "gate.flow"]
+    result = fv.run(case)
+    heads = np.array([result["a.gap.head"], result["b.gap.head"]])
+    assert abs(heads[0, 0] - heads[1, 0]) == pytest.approx(SIZE[0] * math.sin(math.radians(4.0)), rel=1e-3)
+    assert heads[0, -1] == pytest.approx(heads[1, -1], abs=5e-3)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+STANDS = {"type": "basin", "size": [1, 1], "cells": [2, 2], "level": 1.0, "elevation": 0.0,
+          "patches": {"gap": {"side": "west"}}}  # fmt: skip
+FAULTS = {  # text: (keys of nodes, of the link)
+    "joins a.gap, on hull and b.gap, which stands still: between these goes a hose": ({"b": STANDS}, {}),
+    "joins a.gap, on hull and b.gap, on deck: between these goes a hose": (
+        {"deck": hull(kind="fixed", on="hull"), "b": basin((0, 0, 0), "west") | {"on": "deck"}}, {}),
+    "0.9 m is too short: its way on hull is 1 m long (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0])": (
+        {}, {"length": 0.9}),
+    "its ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no way between": (
+        {}, {"type": "valve", "area": 0.1, "length": None, "diameter": None}),
+    'joins a.gap, behind which there are no cells; wanted sloshing = "cells"': ({"a": {"sloshing": "frozen"}}, {}),
+    'joins a.gap of a basin that rides, which physics "liquid" does not go with yet': (
+        {"a": {"physics": "liquid", "pressure": 2e5, "thickness": 0.1, "level": None}}, {}),
+    "what passes a.gap is not felt by its body yet; wanted a tank in place of the basin, or a driven joint": (
+        {"hull": hull(kind="revolute", axis=[1, 0, 0])}, {}),
+}  # fmt: skip
+
+
+def changed(case, nodes, link):
+    """A case with other keys, those of None left out; what has a type is another part."""
+    for name, keys in nodes.items():
+        case["nodes"][name] = keys if "type" in keys else case["nodes"][name] | keys
+    case["links"]["duct"] |= link
+    for table in (case["nodes"], case["links"]):
+        for name, part in table.items():
+            table[name] = {key: one for key, one in part.items() if one is not None}
+    return case
+
+
+@pytest.mark.parametrize("text", FAULTS)
+def test_links_that_cannot_be_are_refused_by_name(text):
+    with pytest.raises(CaseError) as found:
+        fv.load(changed(twins({"kind": "fixed"}, COLUMN), *FAULTS[text]))
+    assert text in str(found.value)
+
+
+@pytest.mark.parametrize("link", [COLUMN, {"type": "valve", "diameter": BORE, "length": None}], ids=["column", "valve"])
+def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_that_rides(link):
+    case = changed(twins({"kind": "fixed"}, COLUMN), {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}}, {})
+    case["links"]["duct"] = changed({"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link)["links"]["duct"]
+    with pytest.raises(FvsolveError, match="not booked; links.duct: what passes a.gap is not felt by its body yet"):
+        energy(case)
+    case["output"]["probes"] = ["hull.joint_fx"]
+    with pytest.raises(CaseError, match="what passes a.gap is not felt .* a probe asks what joints hold"):
+        fv.build(fv.load(case))
+
+
+def test_a_patch_tells_the_pressure_on_the_bed_amid_its_faces():
+    """In a box that slows down, aslant over a bed that rises: rho g times the surface there over the bed."""
+    joint, _ = FRAMES["slows down"]
+    bed = {"bed": "0.1 * x", "start": {"level": f"{LEVEL} + {SLOWS / GRAVITY} * x"}}
+    case = twins(joint, COLUMN)
+    case["nodes"]["a"] |= bed
+    del case["nodes"]["b"], case["links"]["duct"]
+    case["nodes"]["far"] = {"type": "tank", "on": "hull", "at": [3, 0.5, 0], "area": 1.0, "level": 0.1}
+    case["links"]["duct"] = {**COLUMN, "from": "a.gap", "to": "far", "length": 2.0}
+    case["output"]["probes"] = ["a.gap.pressure"]
+    case["numerics"]["end"] = 1e-3
+    behind = 0.1 * (SIZE[0] - 0.5 * SIZE[0] / CELLS[0])  # of the bed
+    deep = LEVEL + SLOWS / GRAVITY * SIZE[0] - behind
+    assert fv.run(case)["a.gap.pressure"][-1] == pytest.approx(AMBIENT + RHO * GRAVITY * deep, rel=1e-6)
