@@ -1,4 +1,4 @@
-"""What water that rides cannot feel: in modes that it rises high, or that its body falls. Knows tanks; knows no steps."""
+"""What waves of water that rides do not feel: that they rise high, or that a body falls. Knows tanks; no steps."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from fvsolve.errors import Notice
 SMALL = 0.2  # share of the depth up to which a wave is small
 LIGHT = 0.1  # share of its weight that water may gain or lose by its body's motion, unfelt by its waves
 WEIGHTLESS = "the water in {name} has no weight left at t = {t:.6g} s; wanted a body that falls less fast"
+NONE = 1e-6  # share of its weight that is rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
 
@@ -44,7 +45,7 @@ class Swings:
             if modal:
                 keep(kept[RISE], rise(y, *lifting), t)
             felt, meant = self.weight(out, *about, modal)
-            if not felt > 0.0 and np.isfinite(felt):
+            if felt <= NONE * meant:
                 return f"stopped: {WEIGHTLESS.format(name=name, t=t)}"
             keep(kept[LOSS], abs(felt / meant - 1.0), t)
         return ""

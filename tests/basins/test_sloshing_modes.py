@@ -226,6 +226,34 @@ def test_check_says_when_shallow_water_is_not_the_rung_and_a_run_when_modes_are_
     assert told[0].place == "nodes.b" and told[0].value > 0.2 and told[0].text.startswith("b: at ")
 
 
+@pytest.mark.parametrize("sloshing", ["modes", "cells"])
+def test_a_body_that_falls_freely_ends_by_name_for_its_water_has_no_weight_left(sloshing):
+    numerics = {"method": "ssp-rk3", "courant": 0.5} if sloshing == "cells" else {}
+    result = run(case_of(hull({"kind": "free"}), tank(at=[-1, -0.5, 0], sloshing=sloshing), 0.5, numerics))
+    assert not result.ok and "the water in b has no weight left" in result.reason
+    still = run(case_of(hull({"kind": "free"}), tank(at=[-1, -0.5, 0], sloshing="frozen"), 0.5))
+    assert still.ok
+
+
+def test_weight_that_a_lift_adds_is_told_of_modes_which_do_not_feel_it():
+    told = []
+    for share in (0.05, 0.5):
+        travel = {"start": -2.0, "duration": 4.0, "value": [0.0, -8.0 * share * GRAVITY], "exponent": 2}
+        body = hull({"kind": "prismatic", "axis": [0, 0, 1], "travel": travel})
+        told.append([one for one in run(case_of(body, tank(), 1.0)).warnings if one.kind == "weight"])
+    assert not told[0] and len(told[1]) == 1
+    assert told[1][0].value == pytest.approx(0.5, rel=1e-6) and told[1][0].place == "nodes.b"
+
+
+def test_depth_is_level_at_the_start_however_suddenly_its_body_is_let_go():
+    body = hull({"kind": "revolute", "axis": [0, 1, 0], "angle": 0.05, "stiffness": 1e6})
+    probes = ["b.depth@0.05,0.5", "b.depth@1.95,0.5"]
+    result = run(case_of(body, tank(at=[-1.0, -0.5, 0.2]), 0.02, {"step": 1e-3}, probes))
+    for name, x in zip(probes, (-0.95, 0.95), strict=True):
+        assert result[name][0] == pytest.approx(DEPTH + x * math.sin(0.05), abs=1e-12)
+        assert np.abs(np.diff(result[name])).max() < 0.02
+
+
 # bad input ----------
 
 
@@ -253,3 +281,16 @@ def test_what_modes_do_not_know_is_named(change, place, said):
 def test_only_depth_is_read_of_water_in_modes():
     with pytest.raises(CaseError, match='b is a basin, without "u"; it has depth'):
         load(case_of(hull({"kind": "fixed"}), tank(), probes=["b.u@1,0.5"]))
+
+
+def test_without_gravity_no_water_stands():
+    for rung in ("modes", "cells"):
+        with pytest.raises(CaseError) as error:
+            load(case_of(hull({"kind": "fixed"}), tank(sloshing=rung), gravity=0.0))
+        assert [fault.place for fault in error.value.faults] == ["gravity"]
+    load(case_of(hull({"kind": "fixed"}), tank(sloshing="frozen"), gravity=0.0))
+
+
+def test_nothing_is_read_of_frozen_water():
+    with pytest.raises(CaseError, match='b is a basin, without "depth"; its water is one with its body'):
+        load(case_of(hull({"kind": "fixed"}), tank(sloshing="frozen"), probes=["b.depth@1,0.5"]))
