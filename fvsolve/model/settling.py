@@ -72,7 +72,7 @@ def settled(case, draft) -> tuple[Any, list[Notice]]:
     draft.check()
     case = replace(case, found=nodes_at(at, found.y))
     nodes, about = case.nodes | case.found, (case.ambient_pressure, case.gravity, None, None)
-    for keys, text in check.parts(nodes, case.links, *about, at.t, case.lumped):
+    for keys, text in check.parts(nodes, case.links, *about, at.t, case.meshes, case.lumped):
         draft.fault(".".join(map(str, keys)), f"where forces balance {text}")
     draft.check()
     return case, [*told(case), *unstable(at, found)]
