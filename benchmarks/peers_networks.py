@@ -1,7 +1,8 @@
 """EPANET's Net3 left alone for 20 s: CPU time and drift of fvsolve and rthym-moc, which reads the same file.
 
 Both take 1438.656 m/s (4720 ft/s, rthym-moc's rigid pipe). rthym-moc cuts every pipe at its wave speed times its step;
-fvsolve's step follows its shortest cell, so it is met twice: at the same step, and at the same length of cells.
+with cells fvsolve's step follows the shortest, 2.5 ms long here, so it is met twice: at the same step, and at the same
+length of cells. Delay lines keep true lengths at any step.
 """
 
 import tomllib
@@ -23,6 +24,7 @@ from fvsolve.model.build import build
 NET = Path(wntr.__file__).parent / "library" / "networks" / "Net3.inp"
 SPEED, END, REPEATS = 4720 * 0.3048, 20.0, 3
 SETTINGS = [("upwind", "euler"), ("muscl", "ssp-rk2"), ("upwind5", "rk4")]
+SHORTEST = 2.5e-3 * SPEED  # pipe among cells [m]
 
 
 def rthym(dt):
@@ -40,10 +42,10 @@ def rthym(dt):
     return best, drift.max(), np.median(drift), len(found["time"])
 
 
-def ours(cell_time, scheme, method):
-    """The same, and the step [s]."""
-    table = tomllib.loads(import_network(NET, wave_speed=SPEED).text)
-    table["numerics"] |= {"end": END, "cell_time": cell_time, "scheme": scheme, "method": method}
+def ours(shortest, **numerics):
+    """The same, and the number of cells."""
+    table = tomllib.loads(import_network(NET, wave_speed=SPEED, shortest=shortest).text)
+    table["numerics"] |= {"end": END, **numerics}
     names = [name for name, node in table["nodes"].items() if node["type"] == "junction"]
     table["output"] = {"every": 0.5, "fields": 0, "probes": [f"nodes.{name}.head" for name in names]}
     model = build(load(table))
@@ -65,9 +67,10 @@ def main():
     print(f"{'':36} {'step [ms]':>9} {'CPU [s]':>8} {'us/step':>9} {'drift [m]':>10} {'median':>10} cells")
     for cell_time in (0.01, 0.02):
         for scheme, method in SETTINGS:
-            found = ours(cell_time, scheme, method)
+            found = ours(SHORTEST, line="cells", cell_time=cell_time, scheme=scheme, method=method)
             row(f"fvsolve {scheme} {method}, {1e3 * cell_time:g} ms cells", *found)
         row("rthym-moc at that step", *rthym(END / found[3]))
+        row(f"fvsolve delay lines, {1e3 * cell_time:g} ms steps", *ours(0.0, line="delay", step=cell_time)[:4])
         row("rthym-moc at that length of cells", *rthym(cell_time))
 
 

@@ -27,17 +27,21 @@ EVERY = 0.02  # [s] between the rows that are compared
 GOALS = {
     "smooth": ((1e-3, 500), (1e-4, 10_000)),
     "ramp": ((1e-3, 2), (1e-4, 500)),
-    "instant": ((1e-2, "none"), (3e-3, "none")),
+    "instant": ((1e-2, 1), (3e-3, 1)),
 }
 PEER_STEPS = {"three": 8e-3 / 2.0 ** np.arange(8), "nine": 8e-3 / 2.0 ** np.arange(7)}  # [s]
 UPWIND5 = dict(scheme="upwind5", method="rk4", courant=0.9)
 UPWIND = dict(scheme="upwind", method="euler", courant=1.0)
 MUSCL = dict(scheme="muscl", limiter="van-leer", method="ssp-rk3", courant=0.9)
-SCHEMES = {  # closure: (numerics, cell times [s]), those that do best and one to compare
+DELAY = [dict(line="delay", method="euler", courant=1.0, accuracy=share) for share in (1e-2, 2e-2, 5e-2)]
+SCHEMES = {  # closure: (numerics, cell times [s], of delay lines steps), those that do best and one to compare
     "smooth": ((UPWIND5, 0.04 / 2 ** (0.5 * np.arange(8))), (UPWIND, 0.01 / 2.0 ** np.arange(5))),
     "ramp": ((UPWIND, 0.01 / 2.0 ** np.arange(6)), (UPWIND5, 0.02 / 2.0 ** np.arange(5))),
     "instant": ((UPWIND, 0.01 / 2.0 ** np.arange(6)), (MUSCL, 0.02 / 2.0 ** np.arange(5))),
 }
+LINES = 0.16 / 2.0 ** np.arange(6)  # [s]
+for closure in SCHEMES:
+    SCHEMES[closure] += tuple((numerics, LINES) for numerics in (DELAY if closure == "instant" else DELAY[:1]))
 
 
 @dataclass

@@ -1,57 +1,109 @@
-"""Whole-process time of `fvsolve run` on the main case, from a cold cache and from a warm one.
+"""Whole-process time of `fvsolve run` on the main case: to the answer, and to whole pictures; cold, by a store, warm.
 
-    python benchmarks/start_up.py [--times 5] [CASE]
+    python benchmarks/start_up.py [--times 5] [--beside CHECKOUT] [CASE]
 
-Cold is a new cache folder: kernels are compiled and CoolProp is asked. Warm is every run after that.
+Cold is a new cache folder: kernels are compiled and CoolProp is asked. With a store is the first run from a copy of
+what `fvsolve warm` leaves, without numba's own cache. Warm is every run after that. `--beside` takes turns with another
+checkout, of an earlier version, and prints ratios. The answer is there when the terminal says how the run ended, the
+pictures when the process has.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import resource
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-CASE = Path(__file__).resolve().parent.parent / "cases" / "valve-closure.toml"
-GOALS = {"cold": 15.0, "warm": 1.5}  # [s]
-IMPORTS = "import numpy, numba"  # the floor: what no program on numba can do without
+HERE = Path(__file__).resolve().parent.parent
+CASE = HERE / "cases" / "valve-closure.toml"
+GOALS = {"cold": 15.0, "store": 3.0, "warm": 0.7}  # [s] of the whole on a quiet machine
+RATIO = 0.5  # of an earlier version's, warm
+IMPORTS = "import numpy, numba"  # the floor of what loads numba
+ENDS = b"finished at "
 
 
-def seconds(command: list[str], cache: Path) -> float:
+def seconds(command: list[str], cache: Path, package: Path = HERE) -> float:
     """Wall time of one process [s]; raises where it fails."""
-    environment = os.environ | {"FVSOLVE_CACHE": str(cache)}
+    return measured(command, cache, package)[1]
+
+
+def measured(command: list[str], cache: Path, package: Path = HERE) -> tuple[float, float, float]:
+    """(wall time to the answer, to the end of the process, CPU time of all its processes) [s]."""
+    environment = os.environ | {"FVSOLVE_CACHE": str(cache), "PYTHONPATH": str(package), "PYTHONUNBUFFERED": "1"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # byte code is kept, as it is on a user's machine
-    start = time.perf_counter()
-    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stdin=subprocess.DEVNULL)
-    return time.perf_counter() - start
+    before, start, answer = busy(), time.perf_counter(), float("nan")
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL) as process:
+        for line in process.stdout:
+            if line.startswith(ENDS):
+                answer = time.perf_counter() - start
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return answer, time.perf_counter() - start, busy() - before
 
 
-def measure(case: Path, times: int) -> dict[str, list[float]]:
-    """Wall times [s] of cold runs (each with a cache of its own), warm runs and the imports alone."""
+def busy() -> float:
+    """CPU time of all processes that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def measure(case: Path, times: int, packages: dict[str, Path]) -> dict[tuple[str, str], list[tuple]]:
+    """(version, start) -> what was measured of each run, versions in turn."""
+    found: dict[tuple[str, str], list[tuple]] = {}
     with tempfile.TemporaryDirectory(prefix="fvsolve-start-up-") as folder:
-        out = Path(folder) / "run"
-        run = [sys.executable, "-m", "fvsolve", "run", str(case), "--out", str(out), "--force"]
-        colds = [seconds(run, Path(folder) / f"cache-{i}") for i in range(max(1, times // 3))]
-        warms = [seconds(run, Path(folder) / "cache-0") for _ in range(times)]
-        floors = [seconds([sys.executable, "-c", IMPORTS], Path(folder) / "cache-0") for _ in range(times)]
-    return {"cold": colds, "warm": warms, "imports alone": floors}
+        top = Path(folder)
+
+        def go(version: str, start: str, cache: Path) -> None:
+            run = [sys.executable, "-P", "-m", "fvsolve", "run", str(case), "--out", str(top / version), "--force"]
+            found.setdefault((version, start), []).append(measured(run, cache, packages[version]))
+
+        for i in range(max(1, times // 3)):
+            for version in packages:
+                go(version, "cold", top / f"{version}-{i}")
+        for i in range(max(1, times // 3)):
+            shutil.copytree(
+                top / "this-0" / "code", top / f"store-{i}" / "code", ignore=shutil.ignore_patterns("*.nb?")
+            )
+            go("this", "store", top / f"store-{i}")
+        for _ in range(times):
+            for version in packages:
+                go(version, "warm", top / f"{version}-0")
+        for _ in range(times):
+            floor = measured([sys.executable, "-c", IMPORTS], top / "this-0")
+            found.setdefault(("this", "imports of numpy and numba alone"), []).append(floor)
+    return found
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("case", nargs="?", type=Path, default=CASE)
     parser.add_argument("--times", type=int, default=5)
+    parser.add_argument("--beside", type=Path, help="a checkout of another version")
     arguments = parser.parse_args()
-    print(f"fvsolve run {arguments.case.name}, whole process\n")
-    print("| start | best [s] | worst [s] | runs | goal [s] | |\n|---|---|---|---|---|---|")
-    for start, walls in measure(arguments.case, arguments.times).items():
-        goal = GOALS.get(start)
-        verdict = "" if goal is None else "met" if min(walls) <= goal else f"missed by {min(walls) / goal:.2f} times"
+    packages = {"this": HERE} | ({"other": arguments.beside.resolve()} if arguments.beside else {})
+    print(f"fvsolve run {arguments.case.name}, whole process, least of the runs [s]\n")
+    print("| version | start | answer | whole | CPU | runs | goal | |\n|---|---|---|---|---|---|---|---|")
+    found = measure(arguments.case, arguments.times, packages)
+    least = {key: [min(column) for column in zip(*runs, strict=True)] for key, runs in found.items()}
+    for (version, start), (answer, whole, cpu) in least.items():
+        goal = GOALS.get(start) if version == "this" else None
+        verdict = "" if goal is None else "met" if whole <= goal else f"missed by {whole / goal:.2f} times"
         stated = "" if goal is None else f"{goal:g}"
-        print(f"| {start} | {min(walls):.2f} | {max(walls):.2f} | {len(walls)} | {stated} | {verdict} |")
+        runs = len(found[version, start])
+        print(f"| {version} | {start} | {answer:.2f} | {whole:.2f} | {cpu:.2f} | {runs} | {stated} | {verdict} |")
+    if arguments.beside:
+        parts = [a / b for a, b in zip(least["this", "warm"], least["other", "warm"], strict=True)]
+        verdict = "met" if parts[1] <= RATIO else f"missed by {parts[1] / RATIO:.2f} times"
+        told = ", ".join(
+            f"{part:.2f} of its {what}" for part, what in zip(parts, ("answer", "whole", "CPU"), strict=True)
+        )
+        print(f"\nwarm, beside the other version: {told}; goal {RATIO:g} of the whole: {verdict}")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ _HOMES = {
     "run": "run",
     "solve": "solve",
     "tableau": "steppers.tableau",
+    "vary": "model",
 }
 
 __version__ = "0.1.0"

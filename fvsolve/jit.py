@@ -2,7 +2,8 @@
 
 Numba looks only at the file that holds a jitted function, so an edit in *another* file that it calls
 would go unnoticed and the old machine code would run. Here every function is cached in a folder named
-by the hash of every source that compiled code can depend on, and site-packages stays clean.
+by the hash of every source that compiled code can depend on, within it by the machine, and site-packages stays clean.
+What is called, by Python or by address, is kept a second time where numba is not needed to load it (`store`).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import importlib
 import os
 import pickle
 import shutil
@@ -22,7 +24,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = ["add_sources", "argument", "beside", "cache_folder", "inner", "njit", "once", "source_hash"]
+import numpy as np
+
+from fvsolve import store
+from fvsolve.store import Code
+
+__all__ = ["Intrinsic", "add_sources", "beside", "cache_folder", "inner", "njit", "once", "source_hash"]
 
 ROOM = 65536  # bytes that a folder must take to be one for caches
 DIGEST = hashlib.sha256().digest_size
@@ -31,11 +38,13 @@ KEPT = 3  # generations of compiled code kept beside the present one
 PACKAGE = Path(__file__).resolve().parent
 # What compiled code can depend on: the rooms that compile and, by contract, all they may import; of parts the laws, of
 # basins all but declarations and what lowers them.
-ROOMS = ("kernels", "steppers", "jit", "units", "errors")
+ROOMS = ("kernels", "steppers", "jit", "store", "units", "errors")
 PYTHON = ("part", "lower")  # what names of files of basins begin with that compile nothing
 OUTSIDE: dict[Path, str] = {}  # folders whose sources may be compiled and cached too, and where below the code folder
 MAKING = threading.RLock()  # held while compiled functions are made
+LOADED: dict[str, bytes] = {}  # machine code that numba has taken from its cache, by the function's symbol
 SETTING = threading.Lock()  # held while numba is told of a folder
+COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 @functools.cache
@@ -81,12 +90,172 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
     """
     if function is None:
         return functools.partial(njit, **options)
-    if _disabled():
+    if not COMPILING:
         return function
-    home = Path(function.__code__.co_filename).resolve()
-    folder = "" if home in _sources() else next((OUTSIDE[f] for f in home.parents if f in OUTSIDE), None)
-    options = {"error_model": "numpy", "cache": folder is not None, "_nrt": False, "nogil": True} | options
-    return _dispatcher()(function, folder=folder or "", **options)
+    return Function(function, {"error_model": "numpy", "_nrt": False, "nogil": True} | options)
+
+
+class Function:
+    """A function that compiled code calls, and Python too; its machine code comes from the store, else from numba.
+
+    `.py_func` is the plain one; numba, loaded only where something is to be compiled, sees its dispatcher (`.numba`).
+    """
+
+    def __init__(self, function: Callable, options: dict[str, Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func, self.options = function, options
+        self.targetoptions = {"nopython": True, "boundscheck": None} | options  # which numba looks for by that name
+        self.__code__, self.__defaults__ = function.__code__, function.__defaults__
+        self.codes: dict[str, Code] = {}  # by kinds of arguments, behind a dot without doors
+        self.declared: Declared | None = None
+
+    @functools.cached_property
+    def folder(self) -> str | None:
+        """Below the code folder, where its machine code is kept; None where no hash sees its source."""
+        home = Path(self.__code__.co_filename).resolve()
+        return "" if home in _sources() else next((OUTSIDE[f] for f in home.parents if f in OUTSIDE), None)
+
+    @functools.cached_property
+    def numba(self):
+        """Numba's own function."""
+        with MAKING:
+            return _dispatcher()(self.py_func, self.folder is not None, self.folder or "", **self.targetoptions)
+
+    @property
+    def _numba_type_(self):
+        return self.numba._numba_type_
+
+    def __reduce__(self):
+        if "<" in self.__qualname__:
+            return Function, (self.py_func, self.options)
+        return _named, (self.__module__, self.__qualname__)
+
+    def declare(self, letters: str, kinds: Callable[[str], tuple]) -> Declared:
+        """Compile for arguments of these kinds, and for no others that Python gives.
+
+        kinds(letters) : numba's types of them
+        """
+        if self.declared is None:
+            self.declared = Declared(self, letters, self.code(letters, lambda: kinds(letters)))
+        return self.declared
+
+    def address(self, letters: str, kinds: Callable[[str], tuple]) -> int:
+        """Where compiled code finds it, compiled for arguments of these kinds."""
+        return self.code(letters, lambda: kinds(letters), doors=False).address
+
+    def __call__(self, *given: Any) -> Any:
+        if self.declared is not None:
+            return self.declared(*given)
+        try:
+            letters = "".join(map(letter_of, given))
+        except KeyError:  # of a kind that has no letter
+            return self.numba(*given)
+        return self.code(letters, lambda: tuple(map(_numba().typeof, given))).python(*given)
+
+    def code(self, letters: str, kinds: Callable[[], tuple], doors: bool = True) -> Code:
+        """Its machine code for arguments of these kinds, with doors for Python and C or for compiled code alone."""
+        key = letters if doors else f".{letters}"
+        if key not in self.codes:
+            with MAKING:
+                if key not in self.codes:
+                    self.codes[key] = self._kept(key) or self._compiled(key, kinds(), doors)
+        return self.codes[key]
+
+    def _kept(self, key: str) -> Code | None:
+        path = self._path(key)
+        return None if path is None else store.read(path, self._who(key))
+
+    def _compiled(self, key: str, kinds: tuple, doors: bool) -> Code:
+        compiler = self.numba if doors else self.numba.within
+        compiler.compile(kinds)
+        compiled = compiler.overloads[kinds]
+        if (path := self._path(key)) is not None:
+            try:
+                loaded = LOADED.pop(compiled.fndesc.llvm_func_name, None)
+                store.write(path, self._who(key), compiled, loaded or compiled.library._get_compiled_object(), doors)
+            except OSError as error:
+                _cannot_keep(error.strerror or str(error))
+        return code_of(compiled, doors)
+
+    def _path(self, key: str) -> Path | None:
+        """The file of the store; None of what is made anew by each call of a function, and has no name of its own."""
+        if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.LINKS:
+            return None
+        digest = hashlib.sha256(self._who(key).encode()).hexdigest()[:12]
+        return code_folder() / self.folder / f"{self.__name__}-{digest}{store.SUFFIX}"
+
+    def _who(self, key: str) -> str:
+        options = " ".join(f"{name}={value}" for name, value in sorted(self.options.items()))
+        return f"{self.__module__}.{self.__qualname__} line {self.__code__.co_firstlineno} {options} ({key})"
+
+
+def _named(module: str, name: str) -> Any:
+    """What a module has by a name."""
+    return getattr(importlib.import_module(module), name)
+
+
+def code_of(compiled, doors: bool = True) -> Code:
+    """What numba has compiled, as it is called."""
+    find, names = compiled.library.get_pointer_to_function, compiled.fndesc
+    pointer = find(names.llvm_cfunc_wrapper_name) if doors else 0
+    return Code(find(names.llvm_func_name), pointer, compiled.entry_point if doors else None, compiled)
+
+
+class Declared:
+    """A compiled function of one signature, as Python calls it and as compiled code takes it as an argument.
+
+    `.address` is where C finds it. What it raises there is lost: such functions say what went wrong by what they write.
+    """
+
+    def __init__(self, function: Any, letters: str, code: Code) -> None:
+        self.function, self.code, self.address, self.python = function, code, code.pointer, code.python
+        self.arrays = [(i, letter) for i, letter in enumerate(letters) if letter in ARRAYS]
+
+    def __call__(self, *given: Any) -> Any:
+        for i, letter in self.arrays:  # which machine code does not look at
+            found = letter_of(given[i]) if type(given[i]) is np.ndarray else type(given[i]).__name__
+            if found != letter:
+                wanted = "{} of {} axes".format(*ARRAYS[letter])
+                raise TypeError(f"argument {i} is {found}; wanted an array by rows, to be written, of {wanted}")
+        return self.python(*given)
+
+
+@functools.cache
+def plain_kinds() -> dict:
+    """Letter -> numba's type of a number, or of an array of numbers."""
+    types = _numba().types
+    kinds = {"t": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}
+    return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
+
+
+def declared(function: Callable, letters: str, kinds: Callable[[str], tuple]) -> Callable:
+    """A function compiled for arguments of these kinds and no others; itself where JIT is off."""
+    return function.declare(letters, kinds) if isinstance(function, Function) else function
+
+
+LETTERS = {float: "t", np.float64: "t", int: "i", np.int64: "i", bool: "b", np.bool_: "b", complex: "c"}
+ARRAYS = {"v": ("float64", 1), "w": ("float64", 2), "h": ("int64", 1), "s": ("int64", 2), "z": ("complex128", 1)}
+LETTER = {(np.dtype(kind).char, axes): letter for letter, (kind, axes) in ARRAYS.items()}
+WRITTEN, COLUMNS = 0x501, 2  # flags of arrays: contiguous by rows, aligned, to be written; contiguous by columns
+
+
+def letter_of(given: Any) -> str:
+    """The kind of an argument, as `kernels.calls` spells it, in brackets where it has no letter there; KeyError."""
+    if type(given) is not np.ndarray:
+        if isinstance(given, tuple):
+            return f"({type(given).__qualname__} {''.join(map(letter_of, given))})"
+        return f"[{_spelt(given.dtype)}]" if type(given) is np.void else LETTERS[type(given)]
+    kind, flags = given.dtype, given.flags.num
+    if flags & WRITTEN == WRITTEN and (letter := LETTER.get((kind.char, given.ndim))) is not None:
+        return letter
+    return f"[{_spelt(kind)} {given.ndim} {flags & (WRITTEN | COLUMNS)}]"
+
+
+@functools.cache
+def _spelt(kind: np.dtype) -> str:
+    """A dtype in a few letters; records by their fields and where they lie."""
+    said = f"{kind.descr} {kind.itemsize} {kind.alignment}" if kind.names else ""
+    return hashlib.sha256(said.encode()).hexdigest()[:12] if said else kind.str
 
 
 def once(function: Callable) -> Callable:
@@ -106,50 +275,51 @@ def inner(function: Callable) -> Callable:
     return njit(function, forceinline=True)
 
 
-class Argument:
-    """A compiled function of one signature as compiled code takes it as an argument.
+class Intrinsic:
+    """`numba.extending.intrinsic`, made where compiled code first asks for it: until then numba is not loaded."""
 
-    Numba would ask a dispatcher for its type and address at every call, which takes 40 microseconds a function.
-    What it raises is lost: such functions say what went wrong by what they write.
-    """
+    def __init__(self, define: Callable) -> None:
+        functools.update_wrapper(self, define)
+        self.define = define
 
-    def __init__(self, function: Any) -> None:
-        from numba import types
+    def __reduce__(self):
+        return _named, (self.__module__, self.__qualname__)
 
-        (compiled,) = function.overloads.values()
-        self.function = function
-        self.address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
-        self._numba_type_ = types.FunctionType(compiled.signature)
+    @functools.cached_property
+    def _numba_type_(self):
+        from numba.core.typing.templates import builtin_registry
+        from numba.extending import intrinsic
 
-    def __wrapper_address__(self) -> int:
-        return self.address
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self.function(*arguments)
-
-
-def argument(function: Callable) -> Callable:
-    """The same function, quick to pass to compiled code; itself where JIT is off."""
-    return Argument(function) if hasattr(function, "overloads") else function
+        made = intrinsic(self.define)
+        return next(kind for value, kind in reversed(builtin_registry.globals) if value is made)
 
 
 def cold() -> bool:
     """Whether nothing of this version has been compiled on this machine yet."""
-    return not _disabled() and not any(_code_folder().rglob("*.nbi"))
+    return COMPILING and not any(code_folder().glob(f"*{store.SUFFIX}"))
 
 
-def _disabled() -> bool:
-    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+def elsewhere() -> str:
+    """What compiled code lies in the cache and is of no use here, in words; "" of none."""
+    own = code_folder()
+    there = {path.parent for path in cache_folder().glob(f"code/*/*/*{store.SUFFIX}")}
+    machines = sorted(path.name for path in there if path.parent == own.parent and path != own)
+    others = sorted({path.parent.name for path in there} - {own.parent.name})
+    if machines:
+        return f"{own.parent} holds code for {', '.join(machines)}, and this machine is {own.name}"
+    if others:
+        return f"{own.parent.parent} holds code of other sources, {', '.join(others)}, and these are {own.parent.name}"
+    return ""
 
 
 @contextlib.contextmanager
 def beside(code: str, cached: str):
     """While the body compiles, a second process runs `code` to compile something else, so a cold start takes half.
 
-    cached : name of a cache file, with wildcards; where one lies in the code folder nothing is left to do.
+    cached : a function that it compiles; where the store has it nothing is left to do.
     Whatever the second process fails to leave there, the caller compiles itself.
     """
-    if _disabled() or (os.cpu_count() or 1) < 2 or any(_code_folder().rglob(cached)):
+    if not COMPILING or (os.cpu_count() or 1) < 2 or any(code_folder().glob(f"{cached}-*{store.SUFFIX}")):
         yield
         return
     path = os.pathsep.join([str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -172,7 +342,7 @@ def _sources() -> tuple[Path, ...]:
 
 @functools.cache
 def _numba():
-    """Numba itself, imported at the first decoration, its notice about first-class functions silenced."""
+    """Numba itself, imported where something is to be compiled, its notice about first-class functions silenced."""
     import numba
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
@@ -194,12 +364,12 @@ def _dispatcher() -> type:
 
     class Dispatcher(CPUDispatcher):
         def __init__(self, function: Callable, cache: bool, folder: str = "", **options: Any) -> None:
-            super().__init__(function, targetoptions={"nopython": True, "boundscheck": None} | options)
+            super().__init__(function, targetoptions=options)
             self.cache, self.folder, self.options = cache, folder, options
             if cache:
                 with SETTING:
                     before = numba.config.CACHE_DIR
-                    numba.config.CACHE_DIR = str(_code_folder() / folder)
+                    numba.config.CACHE_DIR = str(code_folder() / folder)
                     try:
                         self.enable_caching()
                     finally:
@@ -239,7 +409,9 @@ def _kept_file() -> type:
             digest, data = (found := Path(self._data_path(name)).read_bytes())[:DIGEST], found[DIGEST:]
             if hashlib.sha256(data).digest() != digest:
                 raise OSError(f"{name} is damaged")  # for numba to compile anew
-            return pickle.loads(data)
+            found = pickle.loads(data)
+            (_, _, (LOADED[found[1].llvm_func_name], _)), *_ = found  # which LLVM takes and gives no more
+            return found
 
         def _save_data(self, name: str, data: Any) -> None:
             data = dumps(data)
@@ -262,13 +434,16 @@ def _cannot_keep(why: str) -> None:
 
 
 @functools.cache
-def _code_folder() -> Path:
-    """This generation's folder of compiled code; the oldest of the others are deleted."""
+def code_folder() -> Path:
+    """The folder of code of these sources for this machine; of other sources the oldest are deleted."""
     folder = cache_folder() / "code" / source_hash()
-    folder.mkdir(parents=True, exist_ok=True)
+    own = folder / store.target()["name"]
+    own.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(OSError):  # a full disk is told where code is to be kept
+        store.describe(own)
     os.utime(folder)
     _prune(folder)
-    return folder
+    return own
 
 
 def _prune(present: Path) -> None:

@@ -53,11 +53,17 @@ class Shown:
         return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
 
 
+def save(figure, path) -> None:
+    """Write a figure; a .png drawn once, where `savefig` draws a figure with a layout twice, to the same bytes."""
+    write = figure.canvas.print_png if str(path).endswith(".png") else figure.savefig
+    write(path)
+
+
 def kept(figure, path):
     """A figure, also written to `path` where one is given; FvsolveError where that cannot be."""
     try:
         if path is not None:
-            figure.savefig(path)
+            save(figure, path)
     except (OSError, ValueError) as error:  # no such folder, no such kind of picture
         from fvsolve.errors import FvsolveError
 

@@ -107,7 +107,7 @@ def union(n: int, pairs) -> list[int]:
 
     def root(i: int) -> int:
         while label[i] != i:
-            i = label[i]
+            label[i] = i = label[label[i]]
         return i
 
     for i, j in pairs:
@@ -166,20 +166,23 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
         return
     p_scale, f_scale = scale
     most, change, at = np.inf, np.zeros(0), {i: k for k, i in enumerate(balances, start=len(rows))}
+    columns = [_columns(column, e, edges[e]) for e in rows]
+    ends = [(at[i], e, sign, column.get(("flow", e), -1)) for e, edge in enumerate(edges)
+            for i, sign in ((edge.i, -1.0), (edge.j, 1.0)) if i in at and not edge.shut]  # fmt: skip
+    to, of, signs, felt = (np.array(part) for part in zip(*ends, strict=True)) if ends else (np.zeros(0, int),) * 4
+    i = [k for k, row in enumerate(columns) for c in row if c >= 0]
+    j = [c for row in columns for c in row if c >= 0]
+    last = range(len(rows) + len(balances), len(rows) + len(balances) + len(anchors))
+    i = np.concatenate((i, to[felt >= 0], last)).astype(int)
+    j = np.concatenate((j, felt[felt >= 0], [column["node", anchor] for anchor in anchors])).astype(int)
+    constant = np.concatenate((signs[felt >= 0], np.ones(len(anchors))))
     for sweep in range(200):
-        entries, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
+        found, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
         for k, e in enumerate(rows):
-            right[k] = _edge_row(entries, column, k, e, edges[e], result, scale)
+            right[k] = _edge_row(found, columns[k], e, edges[e], result, scale)
         right[len(rows) : len(rows) + len(balances)] = demand[balances] / f_scale
-        for e, edge in enumerate(edges):
-            for i, sign in ((edge.i, -1.0), (edge.j, 1.0)):
-                if i in at and not edge.shut:
-                    right[at[i]] -= sign * result.flow[e] / f_scale
-                    if ("flow", e) in column:
-                        entries.append((at[i], column["flow", e], sign))
-        for k, i in enumerate(anchors, start=len(rows) + len(balances)):
-            entries.append((k, column["node", i], 1.0))
-        change = _solve(entries, right, len(column), result)
+        np.subtract.at(right, to, signs * result.flow[of] / f_scale)
+        change = _solve(i, j, np.concatenate((found, constant)), right, len(column), result)
         if not np.all(np.isfinite(change)):  # what was found last is the best there is
             result.converged = False
             return
@@ -193,31 +196,41 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
     result.converged = bool(np.max(np.abs(change), initial=0.0) < 1e-9)
 
 
-def _edge_row(entries, column, k, e, edge, result, scale) -> float:
-    """Write row k, alpha dM - beta d(drop) = gamma of one edge, in scaled unknowns; returns its right-hand side."""
+def _columns(column, e, edge) -> tuple[int, ...]:
+    """Columns of one edge's row in the order of its values, -1 for what is no unknown."""
     if edge.holds is not None:
-        entries.append((k, column["node", edge.holds[0]], 1.0))
+        return (column["node", edge.holds[0]],)
+    flow = column.get(("flow", e), -1)
+    sensed = -1 if flow < 0 else column.get(("node", edge.senses), -1)
+    return sensed, flow, column.get(("node", edge.i), -1), column.get(("node", edge.j), -1)
+
+
+def _edge_row(found, columns, e, edge, result, scale) -> float:
+    """Add the values of row alpha dM - beta d(drop) = gamma of one edge, in scaled unknowns; returns its right side."""
+    if edge.holds is not None:
+        found.append(1.0)
         return (edge.holds[1] - result.potential[edge.holds[0]]) / scale[0]
-    drop = result.potential[edge.i] - result.potential[edge.j]
-    if ("flow", e) in column:
+    flow, drop = result.flow[e], result.potential[edge.i] - result.potential[edge.j]
+    sensed, own, start, end = columns
+    if own >= 0:
         if edge.senses < 0:
-            alpha, beta, gamma = edge.row(result.flow[e], drop)
+            alpha, beta, gamma = edge.row(flow, drop)
         else:
-            alpha, beta, gamma, lift = edge.row(result.flow[e], drop, result.potential[edge.senses])
-            if ("node", edge.senses) in column:
-                entries.append((k, column["node", edge.senses], -lift))
-        entries.append((k, column["flow", e], alpha * scale[1] / scale[0]))
+            alpha, beta, gamma, lift = edge.row(flow, drop, result.potential[edge.senses])
+            if sensed >= 0:
+                found.append(-lift)
+        found.append(alpha * scale[1] / scale[0])
     else:
-        beta, gamma = 1.0, drop - edge.drop(result.flow[e])
-    for node, sign in ((edge.i, -1.0), (edge.j, 1.0)):
-        if ("node", node) in column:
-            entries.append((k, column["node", node], sign * beta))
+        beta, gamma = 1.0, drop - edge.drop(flow)
+    if start >= 0:
+        found.append(-beta)
+    if end >= 0:
+        found.append(beta)
     return gamma / scale[0]
 
 
-def _solve(entries, right, size, result):
+def _solve(i, j, values, right, size, result):
     """Least-norm solution of the Newton system; remembers whether it had to choose."""
-    i, j, values = (np.array(part) for part in zip(*entries, strict=True))
     if not (np.all(np.isfinite(values)) and np.all(np.isfinite(right))):
         return np.full(size, np.nan)
     if max(len(right), size) > DENSE:

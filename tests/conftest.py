@@ -29,6 +29,14 @@ def fvs(monkeypatch, capsys):
     return call
 
 
+@pytest.fixture(scope="session")
+def cluster():
+    """Two processes of Dask's."""
+    distributed = pytest.importorskip("distributed", reason="Dask is an extra")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
+        yield made
+
+
 @pytest.fixture(autouse=True)
 def alone(request):
     """In any order: a test's methods go with it; folder, environment and its module's tables stay as they were."""

@@ -27,6 +27,13 @@ def put_values(s, depth, c):
 
 
 @njit
+def near_values(nx, ny, begin, stop, s, depth, c):
+    """Values of cells of rows `begin` to `stop` and of three beside them."""
+    a, z = nx * max(begin - 3, 0), nx * min(stop + 3, ny)
+    put_values(s[a:z], depth[a:z], c[a:z])
+
+
+@njit
 def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
     """The greatest rate |u| kx + |v| ky of a grid [1/s], u and v from the greater flows on either side of a cell.
 
@@ -57,9 +64,10 @@ def advection_work(scheme, nx, ny):
 
 
 @njit
-def grid_advection(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, s, work, rate):
+def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, depth, outside, s, work, rate):
     """Rates of the amounts `s` that factor times the flows carry, by muscl or, any other scheme, by upwind.
 
+    They are those of rows `begin` to `stop`, for which two rows beside these are looked at too.
     kx : float64[nx], ky : float64[ny]  1 / widths and heights [1/m]; factor : on all flows, of either sign
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  through the faces, row by row, per depth [m2/s] or,
     with depths, whole [m3/s]
@@ -68,9 +76,9 @@ def grid_advection(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, dept
     """
     c, rest, first = s, work[nx * ny :], scheme if scheme == MUSCL else UPWIND
     if depth.size > 0:
-        put_values(s, depth, work[: nx * ny])
+        near_values(nx, ny, begin, stop, s, depth, work)
         c = work[: nx * ny]
-    second_order_rates(first, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate)
+    second_order_rates(first, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate)
 
 
 @njit

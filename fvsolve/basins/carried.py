@@ -6,6 +6,7 @@ Amounts are per area, s = depth c; a basin with a given velocity has depth 1.
 from math import cos, pi
 
 from fvsolve.basins.advection import THIN
+from fvsolve.basins.bands import cells_near
 from fvsolve.basins.behind import counted, is_given, weight
 from fvsolve.basins.diffusion import add_decay
 from fvsolve.basins.stretch import seen_of
@@ -83,7 +84,8 @@ def made_ready(t, tables, b, y):
     n, o, at, seen = basin["n"], basin["y"], basin["plan"], seen_of(basin, tables.seen, y)
     if basin["deep"] == 1:
         depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], seen[o : o + n]
-        for i in range(n):
+        first, stop = cells_near(tables, b)
+        for i in range(first, stop):
             depth[i] = max(rest[i] + change[i], 0.0)
     for p in range(patches.size):
         for q in range(tables.scalars.size if patches[p]["basin"] == b else 0):

@@ -38,6 +38,7 @@ def carry_on_grids(t, y, dydt, out, handle):
         if not on_grid(basin):
             continue
         made_ready(t, tables, b, y)
+        begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
         kx, ky, flow_x, flow_y, depth, work = parts(tables, basin)
         seen = seen_of(basin, tables.seen, y)
         quick = basin["unsplit"] * basin["fastest"]  # at full speed: while it turns back it gets quicker in a step
@@ -46,7 +47,8 @@ def carry_on_grids(t, y, dydt, out, handle):
             n, ring = basin["n"], basin["outside"] + q * basin["outer"]
             at = basin["carried"] + q * n
             grid_advection(
-                basin["scheme"], basin["limiter"], kx.size, ky.size, kx, ky, turned(t, basin), flow_x, flow_y, depth,
+                basin["scheme"], basin["limiter"], kx.size, ky.size, begin, stop, kx, ky, turned(t, basin), flow_x,
+                flow_y, depth,
                 tables.work[ring : ring + basin["outer"]], seen[at : at + n], work, dydt[at : at + n],
             )  # fmt: skip
 
@@ -83,13 +85,14 @@ def spread_on_grids(t, y, dydt, out, handle):
         if not on_grid(basin):
             continue
         kx, ky, flow_x, flow_y, depth, work = parts(tables, basin)
+        begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
         seen = seen_of(basin, tables.seen, y)
         for q in range(tables.scalars.size):
             n, ring, spreads = basin["n"], basin["outside"] + q * basin["outer"], tables.scalars[q]["diffusivity"]
             at = basin["carried"] + q * n
             if spreads > 0.0:
                 quick = grid_diffusion(
-                    kx.size, ky.size, kx, ky, spreads, turned(t, basin), flow_x, flow_y, depth,
+                    kx.size, ky.size, begin, stop, kx, ky, spreads, turned(t, basin), flow_x, flow_y, depth,
                     tables.work[ring : ring + basin["outer"]], seen[at : at + n], work, dydt[at : at + n],
                 )  # fmt: skip
                 still = basin["unsplit"] * basin["fastest"] + tables.scalars[q]["decay"]

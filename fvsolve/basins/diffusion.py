@@ -3,7 +3,7 @@
 s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
 """
 
-from fvsolve.basins.advection import THIN, put_values
+from fvsolve.basins.advection import THIN, near_values
 from fvsolve.jit import inner, njit
 
 
@@ -43,8 +43,10 @@ def diffusion_work(nx, ny):
 
 
 @njit
-def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
+def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
     """Add the rates of diffusion [m2/s], and return the greatest rate 2 D (kx^2 + ky^2) of a cell [1/s].
+
+    Of cells of rows `begin` to `stop`.
 
     No flux at the boundary but where factor times a given flow comes in: there the value `outside` holds on the face.
     (That of water, with depths, may hardly move there: a value held at one sign and not at the other would be a jump.)
@@ -52,7 +54,7 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
     """
     c, rest = s, work[nx * ny :]
     if depth.size > 0:
-        put_values(s, depth, work[: nx * ny])
+        near_values(nx, ny, begin, stop, s, depth, work)
         c = work[: nx * ny]
     p, wx, rest = rest[: nx + 2], rest[nx + 2 : 2 * nx + 3], rest[2 * nx + 3 :]
     rows, beyond, top = rest[: 2 * nx], rest[2 * nx : 4 * nx], rest[4 * nx : 5 * nx]
@@ -61,7 +63,7 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
     for i in range(nx):
         below[i], rows[i] = outside[2 * ny + i], ky[0] * held if factor * flow_y[i] > 0.0 else 0.0
         above[i], top[i] = outside[2 * ny + nx + i], 0.0
-    for j in range(ny):
+    for j in range(max(begin - 1, 0), stop):
         a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
         h, hn = depth[a:], depth[z:]
         inner_p, row, inner_w = p[1:], c[a:], wx[1:nx]
@@ -80,7 +82,8 @@ def grid_diffusion(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, o
         else:
             for i in range(nx):
                 wn[i] = ky[j] * held if factor * flow_y[z + i] < 0.0 else 0.0
-        spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
+        if j >= begin:
+            spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
     for i in range(nx):
         most = max(most, top[i])
     return most

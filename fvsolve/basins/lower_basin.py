@@ -40,6 +40,7 @@ class BasinRows:
     deep: ClassVar[bool] = False  # whether its first quantity is a depth, over that in `plan`, that holds scalars
     given: ClassVar[bool] = False  # whether flows through its faces are those of a given velocity
     far_ends: ClassVar[bool] = True  # whether waves leave it on a polynomial of five cells
+    banded: ClassVar[bool] = False  # whether rows of a grid of its cells can be stepped apart
     gathers: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls) -> None:
@@ -151,6 +152,23 @@ class BasinRows:
     def reach(self) -> int:
         """Cells either way that the rates of one look at."""
         return SCHEMES[self.scheme].reach.behind
+
+    @property
+    def whole(self) -> str:
+        """Why its rows cannot be shared out among threads, "" where they can."""
+        if not self.is_grid:
+            return "its mesh is no full rectangle"
+        if self.moves:
+            return "its walls move"
+        if self.part.on is not None:
+            return "it rides on a body"
+        if self.scalars and self.fifth:
+            return f"{self.scheme} carries scalars"
+        if self.scalars and self.opening is not None:
+            return f"its boundary {self.opening} is open and scalars pass it"
+        if fading := [name for name in self.scalars if self.case.scalars[name].decay > 0.0]:
+            return f"{listing(fading)} decays"
+        return "" if self.banded else f"rows of {self.part.physics} are not shared out"
 
     @property
     def fifth(self) -> bool:

@@ -10,30 +10,20 @@ from fvsolve.case.riding import carriers, free_joints
 from fvsolve.case.riding_patches import level_over
 
 
-def attitude_of(part) -> np.ndarray:
-    """How a basin stands in the axes of its body : float64[3, 3]."""
-    return np.eye(3) if part.attitude is None else part.attitude.rotation
-
-
-def middle_of(basin) -> np.ndarray:
-    """Where the axes that kernels follow have their origin, in those of the basin [m] : float64[2].
-
-    What columns feel along the normal is taken there, and the mirrors of walls know no Euler force beyond it: at the
-    middle that errs least, and alike wherever a basin's own corner is drawn.
-    """
-    return basin.mesh.area @ basin.mesh.centre / basin.mesh.area.sum()
-
-
 def lower_frame(draft, basin, row) -> None:
-    """Reserve what is known of its axes, and keep the surface as drawn."""
-    part, grid, middle = basin.part, basin.mesh.grid, middle_of(basin)
+    """Reserve what is known of its axes, and keep the surface as drawn.
+
+    The axes that kernels follow have their origin in the middle: what columns feel along the normal is taken there, and
+    the mirrors of walls know no Euler force beyond it, so that this errs least, and alike wherever a corner is drawn.
+    """
+    part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]
     if basin.is_grid:
         lines = [one - at for one, at in zip((grid.x, grid.y), middle, strict=True)]
         places = [0.5 * (one[1:] + one[:-1]) for one in lines]
     numbers = np.zeros(FRAME)
-    numbers[:3] = np.array(part.at or (0.0, 0.0, 0.0)) + attitude_of(part)[:, :2] @ middle
-    numbers[3:12] = attitude_of(part).ravel()
+    numbers[:3] = np.array(part.place) + part.turn[:, :2] @ middle
+    numbers[3:12] = part.turn.ravel()
     if basin.deep:
         numbers[LEVEL] = part.level
         numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
@@ -68,15 +58,15 @@ def places_of_sides(basin) -> np.ndarray:
 def place_in_frame(draft, basin, patch: str) -> list[float]:
     """Where a patch is in the axes that kernels follow, over the level at rest [m], and its profile's weight [J/kg]."""
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
-    own = attitude_of(part).T @ (np.array(place.at) - np.array(part.place))
-    return [*(own[:2] - middle_of(basin)).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
+    own = part.turn.T @ (np.array(place.at) - np.array(part.place))
+    return [*(own[:2] - basin.mesh.centroid).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
 
 
 def potential_at_start(basin) -> np.ndarray:
     """What gravity lifts cells by above their basin's middle, as its body stands at the start [J/kg]."""
     pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
-    up = (pose.attitude @ attitude_of(basin.part)).T @ np.array([0.0, 0.0, gravity])
-    return (basin.mesh.centre - middle_of(basin)) @ up[:2]
+    up = (pose.attitude @ basin.part.turn).T @ np.array([0.0, 0.0, gravity])
+    return (basin.mesh.centre - basin.mesh.centroid) @ up[:2]
 
 
 def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
@@ -85,7 +75,7 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
     attitude : R of its body, that of the start if left out
     """
     part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
-    down = (turn @ attitude_of(part)).T @ np.array([0.0, 0.0, -1.0])
+    down = (turn @ part.turn).T @ np.array([0.0, 0.0, -1.0])
     drawn, tilt = basin.bed - part.level, (down[0] * basin.x + down[1] * basin.y) / down[2]
     if not np.ptp(drawn + tilt - drawn) > 0.0:
         return basin.depth
@@ -100,5 +90,5 @@ def corners(basin, points: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
 
     first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
     turn = out[first + ATTITUDE :][:9].reshape(3, 3)
-    at = np.array(basin.part.at or (0.0, 0.0, 0.0))
-    return out[first + PLACE :][:3] + (at + points @ attitude_of(basin.part).T) @ turn.T
+    at = np.array(basin.part.place)
+    return out[first + PLACE :][:3] + (at + points @ basin.part.turn.T) @ turn.T

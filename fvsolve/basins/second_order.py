@@ -101,7 +101,9 @@ def second_order_work(nx, ny):
 
 
 @njit
-def second_order_rates(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, outside, c, work, rate):
+def second_order_rates(
+    scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, outside, c, work, rate
+):  # fmt: skip
     """Rates of cells of values c by upwind or muscl; arguments as of `grid_advection`."""
     below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
     rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]
@@ -110,12 +112,13 @@ def second_order_rates(scheme, limiter, nx, ny, kx, ky, factor, flow_x, flow_y, 
         rows[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
         north[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
         below[i], above[i] = 2.0 * rows[i] - c[i], 2.0 * north[i] - c[last + i]
-    for j in range(-1, ny):  # values along a row are had a row ahead: they are in memory when they are read
-        if j < ny - 1:
+    first = max(begin - 1, 0)  # whose own rate may be wrong, but for values at its northern faces
+    for j in range(first - 1, stop):  # values along a row are had a row ahead: they are in memory when they are read
+        if j < stop - 1:
             k = j + 1
             fx, qx = flow_x[k * (nx + 1) :], rest[(k % 2) * (nx + 2) :]
             row_values(scheme, limiter, nx, factor, fx, c[k * nx :], outside[k], outside[ny + k], qx)
-        if j >= 0:
+        if j >= first:
             a, z = j * nx, (j + 1) * nx
             b = c[a - nx : a] if j > 0 else below
             d = c[z : z + nx] if j < ny - 1 else north

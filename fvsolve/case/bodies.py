@@ -163,6 +163,11 @@ def ahead(nodes: dict[str, Any], found: dict[str, Pose], first: str, second: str
     return float(np.linalg.norm(there - here))
 
 
+def point_inertia(mass: float, r: np.ndarray) -> np.ndarray:
+    """What a mass at r from an origin has of inertia about it : float64[3, 3] [kg m2]."""
+    return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
+
+
 def one_place(nodes: dict[str, Any], links: dict[str, Any], found: dict[str, Pose]) -> Found:
     """Faults of links along a line between two points that lie in one place at the start: it has no direction."""
     for name, link in links.items():

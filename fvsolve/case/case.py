@@ -55,6 +55,7 @@ class Case(Shown):
     folder: Path | None = field(repr=False)
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is masses on its body
+    read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (what stands there, the same read)
     found: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses where their forces balance
 
     picture = "fvsolve.draw.objects:case_figure"
@@ -181,8 +182,10 @@ class Case(Shown):
 
     def wave_speed(self, name: str) -> float:
         """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho), 1/K = 1/beta + diameter / (E wall)."""
-        pipes = {one: link for one, link in self.links.items() if link.kind == "pipe"}
-        return wave_speed(self._known(name, pipes, "pipe"), self.properties)
+        link = self.links.get(name) if isinstance(name, str) else None
+        if link is None or link.kind != "pipe":
+            link = self._known(name, {one: pipe for one, pipe in self.links.items() if pipe.kind == "pipe"}, "pipe")
+        return wave_speed(link, self.properties)
 
     def _known(self, name: str, known: dict[str, Any], what: str) -> Any:
         if not isinstance(name, str) or name not in known:

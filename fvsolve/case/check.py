@@ -276,7 +276,7 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
 def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
     wet = {("nodes", name): node for name, node in nodes.items() if node.domain == "hydraulic"}
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
-    stated = [name for (_, name), part in wet.items() if part.elevation is not None]
+    stated = dict.fromkeys(name for (_, name), part in wet.items() if part.elevation is not None)
     for (group, name), part in wet.items():
         elsewhere = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
         if stated and name not in stated and not elsewhere:

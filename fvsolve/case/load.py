@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from fvsolve.case import basins, bodies, check, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.probe import Probe, default_probes, read_probe
-from fvsolve.case.raw import Raw, override, read_raw
+from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
@@ -60,19 +61,20 @@ TOP = {
 
 
 @door(set=TABLE)
-def load(source: str | Path | Mapping[str, Any] | Case, set: Mapping[str, Any] | None = None) -> Case:
+def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, Any] | None = None) -> Case:
     """The case of a TOML file, the name of a shipped one, a dict shaped like a file, or a case, `set` overriding keys.
 
     Numbers come out in SI, pressures absolute [Pa]. Raises CaseError with every fault: line, key path, what
     was found, what was wanted and the nearest valid name.
     """
-    if isinstance(source, Case):
-        if not set:
-            return source
-        raw = Raw(read_raw(source.raw).table, source.name, source.path, source.folder)
-    else:
-        raw = read_raw(named(source))
-    return _Reader(raw, set or {}).case()
+    if isinstance(source, Raw):
+        return _Reader(replace(source, table=read_raw(source.table).table, overridden=[]), set or {}).case()
+    if not isinstance(source, Case):
+        return _Reader(read_raw(named(source)), set or {}).case()
+    if not set:
+        return source
+    table = opened(source.raw, [dotted(str(key)) for key in set])
+    return _Reader(Raw(table, source.name, source.path, source.folder), set, source).case()
 
 
 def named(source: Any) -> Any:
@@ -97,15 +99,18 @@ def _alternatives() -> list[tuple[str, ...]]:
 class _Reader:
     """One reading of one case: gathers faults on the way, in the order of dependence."""
 
-    def __init__(self, raw: Raw, settings: Mapping[str, Any]):
-        self.raw = raw
+    def __init__(self, raw: Raw, settings: Mapping[str, Any], before: Case | None = None):
+        self.raw, self.before = raw, before
         self.faults: list[Fault] = override(raw, settings, _alternatives())
         self.setting = Setting(folder=raw.folder)
+        self.read: dict[tuple, tuple[Any, Any]] = {}  # place -> (what stands there, what it was read as)
         self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
 
     def case(self) -> Case:
         top = self.top()
-        fluid, properties = self.fluid()
+        if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
+            self.before = None  # all that is gauge is other
+        fluid, properties = self.kept(("fluid",), self.raw.table.get("fluid"), self.fluid)
         self.setting.signals = self.group("signals")
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
@@ -175,6 +180,7 @@ class _Reader:
             folder=self.raw.folder,
             meshes=meshes,
             lumped=self.lumped,
+            read=self.read,
             **top,
         )
         return made if named is None else self.exact(made)
@@ -187,6 +193,21 @@ class _Reader:
             return replace(made, exact=None)
         self.add(found)
         self.stop()
+        return made
+
+    def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
+        """What a place was read as in the case before, if the very same stands there; else what `make` reads.
+
+        Kept for the next is what is without faults and needs no file and no signal, which may change by themselves.
+        """
+        before = None if self.before is None else self.before.read.get(place)
+        if before is not None and before[0] is given:
+            self.read[place] = before
+            return before[1]
+        known = self.setting.asked, len(self.faults)
+        made = make()
+        if known == (self.setting.asked, len(self.faults)):
+            self.read[place] = given, made
         return made
 
     def stop(self) -> None:
@@ -227,8 +248,10 @@ class _Reader:
             if name in GROUPS:
                 self.fault((), f"[{name}] is missing: {GROUPS[name]}")
                 return None
+        given = self.raw.table
         try:
-            return model.model_validate(self.raw.table.get(name, {}), context=self.setting)
+            return self.kept((name, "table"), given.get(name), lambda: model.model_validate(
+                given.get(name, {}), context=self.setting))  # fmt: skip
         except ValueError as error:
             self.misfit((name,), error)
             return None
@@ -308,11 +331,15 @@ class _Reader:
             if kind is None:
                 continue
             try:
-                rest = {key: value for key, value in part.items() if key != "type"}
-                made[name] = kind.model_validate(rest, context=self.setting)
+                made[name] = self.kept((group, name), part, functools.partial(self.part, kind, part))
             except ValueError as error:
                 self.misfit((group, name), error)
         return made
+
+    def part(self, kind: Any, given: dict[str, Any]) -> Any:
+        """A part of a kind, as its table has it."""
+        rest = {key: value for key, value in given.items() if key != "type"}
+        return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:
         """Meshes of basins by name; without one it is not known what may be joined, and reading ends."""
@@ -320,7 +347,8 @@ class _Reader:
         for name, node in nodes.items():
             try:
                 if isinstance(node, Basin):
-                    (self.lumped if node.lumped else made)[name] = basins.mesh_of(node, self.setting)
+                    mesh = self.kept(("meshes", name), node, functools.partial(basins.mesh_of, node, self.setting))
+                    (self.lumped if node.lumped else made)[name] = mesh
             except Misfit as error:
                 self.misfit(("nodes", name), error)
         if len(made) + len(self.lumped) < sum(isinstance(node, Basin) for node in nodes.values()):

@@ -83,6 +83,16 @@ def read_raw(source: Any) -> Raw:
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
 
 
+def opened(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
+    """The same table, copied along paths that are to be written; all else that it holds is shared."""
+    made = dict(table)
+    for key in {path[0] for path in paths}:
+        below = [path[1:] for path in paths if path[0] == key and path[1:]]
+        if below and isinstance(made.get(key), dict):
+            made[key] = opened(made[key], below)
+    return made
+
+
 def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
     """Put settings (dotted key -> value, text parsed as TOML where it can be) into a raw case; their faults.
 
@@ -95,7 +105,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
     for key, value in settings.items():
         keys = dotted(str(key))
         try:
-            _put(raw.table, keys, _copy(_parsed(value)))
+            _put(raw.table, keys, _copy(parsed(value)))
             raw.overridden.append(keys)
             for others in alternatives:
                 for other in others if keys[-1] in others else ():
@@ -198,6 +208,7 @@ def _copy(value: Any, depth: int = 0) -> Any:
     return value
 
 
+@functools.lru_cache(maxsize=4096)
 def dotted(key: str) -> tuple[str, ...]:
     """The keys of a path as TOML writes it: "links.valve.area"."""
     try:
@@ -214,7 +225,7 @@ def dotted(key: str) -> tuple[str, ...]:
     return tuple(keys)
 
 
-def _parsed(value: Any) -> Any:
+def parsed(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     try:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import sloshing
-from fvsolve.case.bodies import hangs_on, poses
+from fvsolve.case.bodies import hangs_on, point_inertia, poses
 from fvsolve.case.cells import means, samples
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.basin.part import Physics
@@ -93,11 +93,16 @@ def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravit
         basin, body = nodes[name], found[nodes[name].on]
         weigh = as_mass if basin.sloshing == "frozen" else sloshing.ice
         mass, centre, inertia = weigh(basin, mesh, density)
-        turn = sloshing.turn_of(basin)
-        centre = np.array(basin.at or (0.0, 0.0, 0.0)) + turn @ centre
+        turn = basin.turn
+        centre = np.array(basin.place) + turn @ centre
         both, own = body.mass + mass, np.array(body.centre_of_mass)
         middle = (body.mass * own + mass * centre) / both
-        total = body.moment() + apart(body.mass, own - middle) + turn @ inertia @ turn.T + apart(mass, centre - middle)
+        total = (
+            body.moment()
+            + point_inertia(body.mass, own - middle)
+            + turn @ inertia @ turn.T
+            + point_inertia(mass, centre - middle)
+        )
         change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
         found[nodes[name].on] = body.model_copy(update=change)
     swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}
@@ -105,11 +110,6 @@ def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravit
     for name, mesh in swinging.items():
         found |= sloshing.sliders(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
     return found
-
-
-def apart(mass: float, r: np.ndarray) -> np.ndarray:
-    """What a mass at r from an origin has of inertia about it : float64[3, 3] [kg m2]."""
-    return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
 
 
 def as_mass(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
@@ -128,5 +128,5 @@ def as_mass(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, n
     high = depth**2 / 12.0
     inertia = np.diag([mass @ (across + high), mass @ (along + high), mass @ (along + across)])
     for one, place in zip(mass, places - centre, strict=True):
-        inertia += apart(float(one), place)
+        inertia += point_inertia(float(one), place)
     return total, centre, inertia

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.cells import means, samples
-from fvsolve.case.sloshing import turn_of
 
 ENOUGH = 200  # halvings
 
@@ -20,7 +19,7 @@ def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) 
     faces = mesh.patch(patch)
     x, y = mesh.length[faces] @ mesh.middle[faces] / mesh.length[faces].sum()
     own = np.array([x, y, rest["elevation"] or 0.0])
-    at = np.array(basin.place) + turn_of(basin) @ own
+    at = np.array(basin.place) + basin.turn @ own
     found = rest | {"on": basin.on, "at": tuple(at.tolist())}
     if pose is not None:
         found["elevation"] = float(pose.at(at)[2])
@@ -31,7 +30,7 @@ def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) 
 
 def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -> float:
     """Height of the surface, level in the world, over a place in axes of a basin, not below it [m]."""
-    down = (attitude @ turn_of(basin)).T @ np.array([0.0, 0.0, -1.0])
+    down = (attitude @ basin.turn).T @ np.array([0.0, 0.0, -1.0])
     if not down[2] < 0.0:
         return 0.0
     bed, (x, y) = means(samples(basin.bed, mesh)), mesh.centre.T

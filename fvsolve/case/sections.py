@@ -12,6 +12,7 @@ from fvsolve.errors import did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OILY
+from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table import Named, Table
 from fvsolve.parts.value import (
     COUNTED,
@@ -49,6 +50,7 @@ DEFAULT_METHOD_CARRIED = "ssp-rk3"  # where basins carry scalars, whose bounds r
 DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
 DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cells of the same travel time
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
+DEFAULT_ACCURACY = 1e-2  # of the greatest jump
 
 
 # What liquids have, after CoolProp's and the CRC Handbook's: liquid hydrogen to mercury, light ones to cold heavy oil.
@@ -166,6 +168,19 @@ class Numerics(Table):
             changes=SHAPE,
         ),
     ] = None
+    line: Annotated[
+        str,
+        Choice("line", LINES, "how pipes that state no line are followed", changes=SHAPE),
+    ] = "cells"
+    accuracy: Annotated[
+        float,
+        Number(
+            between(0, 1, open=True),
+            "what lines chosen by auto may be off by, of the greatest jump; and the share of it below which a jump in "
+            "a delay line is smoothed",
+            changes=SHAPE,
+        ),
+    ] = DEFAULT_ACCURACY
     below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
     def filled(self, has_cells: bool, carries: bool) -> Numerics:

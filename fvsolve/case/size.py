@@ -18,28 +18,31 @@ LONGEST_NAME = 60  # letters, as names are parts of file names, of which systems
 CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # of memory [B]
 NUMBER = 8  # of a row in memory [B], which is copied once
 TEXT, LEAST_TEXT = 18, 4  # of a number in history.csv, usual and at least [B]
+LITTLE = 1e7  # B that any machine has
 FRAME_CELL = 60  # of a frame on disk [B]
 
 
 def misfits(numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
     """Faults of counts that cannot fit and of steps that cannot advance."""
-    pipes, free = {name: link for name, link in links.items() if isinstance(link, Pipe)}, free_memory()
+    pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
     method, span = METHODS.get(numerics.method), numerics.end - numerics.start
     implicit = method is None or not method.explicit
     cells = sum(pipe.cells or 0 for pipe in pipes.values())
     memory = cells * (IMPLICIT_CELL if implicit else CELL) + sum(len(one.cells) for one in meshes.values()) * BASIN_CELL
-    if memory > free and pipes:
+    if pipes and not fits(memory):
         worst = max(pipes, key=lambda name: pipes[name].cells or 0)
-        said = f"{cells:.3g} cells take about {size(memory)} of memory, and {size(free)} are free; wanted fewer"
+        said = (
+            f"{cells:.3g} cells take about {size(memory)} of memory, and {size(free_memory())} are free; wanted fewer"
+        )
         yield ("links", worst, "cells"), said
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:
         yield ("output", "every"), f"{output.every:g} s would not move the time; wanted more than {least:.2g} s"
     elif output.every is not None and output.probes is not None and span > 0.0:
         rows, columns = span / output.every, 1 + len(output.probes)
-        if 2 * NUMBER * rows * columns > free:
+        if not fits(2 * NUMBER * rows * columns):
             said = f"{output.every:g} s makes {rows:.3g} rows of {columns} numbers, about "
-            said += f"{size(2 * NUMBER * rows * columns)} to read back, and {size(free)} of memory are free"
+            said += f"{size(2 * NUMBER * rows * columns)} to read back, and {size(free_memory())} of memory are free"
             yield ("output", "every"), f"{said}; wanted a longer one or fewer probes"
 
 
@@ -67,6 +70,11 @@ def size(count: float) -> str:
             return f"{count:.3g} {unit}"
         count /= 1000.0
     return f"{count:.3g} TB"
+
+
+def fits(wanted: float) -> bool:
+    """Whether so many bytes can be had; of few the system is not asked."""
+    return wanted <= LITTLE or wanted <= free_memory()
 
 
 def free_memory() -> float:

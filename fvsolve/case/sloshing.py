@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.case.bodies import point_inertia
 from fvsolve.case.cells import means, samples
 from fvsolve.parts.body.part import Body, Joint
 from fvsolve.parts.schedule import constant
@@ -75,21 +76,21 @@ def outline_of(mesh: Any) -> Outline | None:
     area, sides = float(mesh.area.sum()), high - low
     if abs(area / float(np.prod(sides)) - 1.0) < 1e-9:
         return Outline(tuple(sides.tolist()), 0.5 * (low + high), False)
-    middle = mesh.area @ mesh.centre / area
+    middle = mesh.centroid
     far = np.linalg.norm(mesh.points[np.unique(mesh.ends[mesh.inner :])] - middle, axis=1)
     if np.ptp(far) < ROUND * far.mean():
         return Outline((2.0 * float(np.sqrt(area / np.pi)),) * 2, middle, True)
     return None
 
 
-def depth_of(basin: Any) -> float:
+def bed_of(basin: Any, mesh: Any) -> float:
+    """Height of a flat bed above the origin [m]."""
+    return float(means(samples(basin.bed, mesh))[0])
+
+
+def depth_of(basin: Any, mesh: Any) -> float:
     """Of water at rest over a flat bed [m]."""
-    return basin.level - bed_of(basin)
-
-
-def bed_of(basin: Any) -> float:
-    """Height of a flat bed above its origin [m]."""
-    return 0.0 if basin.bed is None else float(basin.bed.at(np.zeros(1), np.zeros(1))[0])
+    return basin.level - bed_of(basin, mesh)
 
 
 def modes(outline: Outline, depth: float, density: float, gravity: float, many: int = MANY) -> list[SloshingMode]:
@@ -181,7 +182,7 @@ def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]
             yield (*key, "level"), f"no water is above the bed, at {bed[0]:g} m"
         yield from left_out(key, basin)
         if (pose := poses.get(basin.on)) is not None:
-            upright = float((pose.attitude @ turn_of(basin))[2, 2])
+            upright = float((pose.attitude @ basin.turn)[2, 2])
             if upright < UPRIGHT:
                 text = f"its bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes say "
                 yield (*key, "sloshing"), text + 'nothing; wanted "cells" or "frozen"'
@@ -211,15 +212,10 @@ def left_out(key: tuple, basin: Any) -> Found:
             yield (*key, what), "modes have no friction; leave it out"
 
 
-def turn_of(basin: Any) -> np.ndarray:
-    """How it stands in the axes of its body : float64[3, 3]."""
-    return np.eye(3) if basin.attitude is None else basin.attitude.rotation
-
-
 def ice(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
     """(mass [kg], centre [m], inertia about it [kg m2]) of water whose surface is held, in axes of its basin."""
-    outline, depth = outline_of(mesh), depth_of(basin)
-    centre = np.array([*outline.middle, bed_of(basin) + 0.5 * depth])
+    outline, depth = outline_of(mesh), depth_of(basin, mesh)
+    centre = np.array([*outline.middle, bed_of(basin, mesh) + 0.5 * depth])
     return density * area_of(outline) * depth, centre, under_a_lid(outline, depth, density)
 
 
@@ -228,14 +224,12 @@ def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity
 
     Of a cylinder the two of one number are one mass, which slides along x on what slides along y.
     """
-    outline, turn = outline_of(mesh), turn_of(basin)
-    at = np.array(basin.at or (0.0, 0.0, 0.0))
-    places = [at + turn @ (*outline.middle, bed_of(basin) + one.height) for one in made(basin, mesh, density, gravity)]
-    every, found = made(basin, mesh, density, gravity), {}
+    outline, turn, every, found = outline_of(mesh), basin.turn, made(basin, mesh, density, gravity), {}
+    bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
+    places = [bed + turn[:, 2] * one.height for one in every]
     masses = np.array([one.mass for one in every]) * (0.5 if outline.is_round else 1.0)
     held = masses @ np.array(places) / masses.sum()
-    spread = sum(m * (np.dot(r - held, r - held) * np.eye(3) - np.outer(r - held, r - held))
-                 for m, r in zip(masses, places, strict=True))  # fmt: skip
+    spread = sum(point_inertia(m, r - held) for m, r in zip(masses, places, strict=True))
     found[f"{name} held"] = body(-float(masses.sum()), -spread, Joint.model_construct(kind="fixed", on=basin.on), held)
     down = (pose.attitude @ turn).T @ np.array([0.0, 0.0, -gravity])
     for mode, place in zip(every, places, strict=True):
@@ -278,7 +272,7 @@ def slider(name: str, mode: SloshingMode) -> str:
 
 def made(basin: Any, mesh: Any, density: float, gravity: float) -> list[SloshingMode]:
     """The modes of a basin."""
-    return modes(outline_of(mesh), depth_of(basin), density, gravity)
+    return modes(outline_of(mesh), depth_of(basin, mesh), density, gravity)
 
 
 def body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:

@@ -10,7 +10,7 @@ from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
 
-COMMANDS = (  # files that add commands to the application
+COMMANDS = (  # files that add commands to the application: those of one command each bear its name, but for `map`
     "commands",
     "chart",
     "energy",
@@ -18,9 +18,12 @@ COMMANDS = (  # files that add commands to the application
     "linearise",
     "order",
     "response",
+    "sensitivity",
     "stability",
     "sweep",
+    "warm",
 )
+PLAIN = ("run", "check", "list", "new", "schema", "methods", "compare", "view")  # commands of `commands`
 
 
 def main() -> None:
@@ -32,7 +35,7 @@ def main() -> None:
         stream.reconfigure(errors="backslashreplace")  # a terminal of few letters ends no run
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
-        for room in COMMANDS:
+        for room in _wanted(sys.argv[1:2]):
             import_module(f"fvsolve.cli.{room}")
         from fvsolve.cli.app import app
 
@@ -52,6 +55,13 @@ def main() -> None:
         _leave(f"internal error in {_where(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
         warnings.formatwarning = before
+
+
+def _wanted(command: list[str]) -> tuple[str, ...]:
+    """The files that a command line needs: that of its command, or all where it names none."""
+    if command and command[0] in PLAIN:
+        return COMMANDS[:1]
+    return COMMANDS
 
 
 def _leave(message: str, code: int) -> None:

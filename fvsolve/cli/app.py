@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from fvsolve.errors import CaseError, Fault
-from fvsolve.output.summary import plain
 
 app = typer.Typer(
     help="Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out.",
@@ -75,11 +74,12 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
 
 @functools.cache
 def _tell_of_compiling() -> None:
-    from fvsolve.jit import cold
+    from fvsolve.jit import cold, elsewhere
 
     if cold():
         said = "the first run on this machine compiles the solver, some 10 to 30 s; once, it is kept for all later runs"
-        print(f"fvsolve: {said}", file=sys.stderr)
+        other = elsewhere()
+        print(f"fvsolve: {said}{f'; {other}' if other else ''}", file=sys.stderr)
 
 
 def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
@@ -106,4 +106,6 @@ def value_of(text: str):
 
 def print_json(data) -> None:
     """One object on standard output, numbers unrounded."""
+    from fvsolve.output.summary import plain
+
     print(json.dumps(plain(data), allow_nan=False))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -20,31 +21,57 @@ def run(
     set: Set = [],  # noqa: B006
     resume: Annotated[bool, typer.Option("--resume", help="go on from the last checkpoint")] = False,
     force: Annotated[bool, typer.Option("--force", help="replace an earlier run")] = False,
+    threads: Annotated[int, typer.Option(metavar="N", help="that share out rows of basins")] = 1,
+    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="numbers alone")] = False,
     as_json: Json = False,
 ) -> None:
     """Solve cases and write their run directories."""
-    from fvsolve.cli import report
-    from fvsolve.cli.progress import watched
-    from fvsolve.run import model_of
-    from fvsolve.run import run as solve
-    from fvsolve.run.expected import expected
+    from fvsolve.draw.beside import Painter
 
     results = []
-    for name, place in _places(cases, out).items():
-        case = load_case(name, set)
-        model = model_of(case)
-        if said := expected(model):
-            print(visible(said), file=sys.stderr, flush=True)
-        with watched(case) as progress:
-            results.append(solve(model, out=place, force=force, resume=resume, progress=progress))
-        if not as_json:
-            report.result(results[-1])
-        if results[-1].reason.startswith("interrupted"):
-            break
+    with Painter(beside=not no_pictures) as painter:  # before anything else is fetched
+        from fvsolve.cli import report
+        from fvsolve.run import model_of, ranks
+
+        if ranks.follows():
+            painter.end()
+            for name in dict.fromkeys(cases):
+                ranks.follow(lambda name=name: model_of(load_case(name, set)))
+            sys.exit(0)
+        with ranks.leading(ranks.world()):
+            places = _places(cases, out)
+        for name, place in places.items():
+            with ranks.leading(ranks.world()):
+                model = model_of(load_case(name, set))
+            results.append(_run(model, place, force, resume, threads, None if no_pictures else painter, as_json))
+            if results[-1].reason.startswith("interrupted"):
+                break
     if as_json:
         said = [one.summary | {"directory": str(one.directory)} for one in results]
         print_json(said[0] if len(cases) == 1 else {"runs": said})
     sys.exit(max(report.exit_code(one) for one in results))
+
+
+def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool):
+    """Solve one case and say what came out, then draw it."""
+    from fvsolve.cli import report
+    from fvsolve.cli.progress import watched
+    from fvsolve.run import draw, sink_of, solved
+    from fvsolve.run.expected import expected
+
+    if said := expected(model):
+        print(visible(said), file=sys.stderr, flush=True)
+    with closing(sink_of(model, place, force, resume, threads)) as sink:
+        with watched(model.case) as progress:
+            result = solved(model, sink, progress, threads)
+        if not quiet:
+            report.result(result)
+            sys.stdout.flush()
+        if painter is not None:
+            draw(result, painter)
+    if not quiet:
+        report.files(result)
+    return result
 
 
 @app.command()
@@ -58,10 +85,12 @@ def check(
     from fvsolve.cli import report
     from fvsolve.limits.step import step_limits
     from fvsolve.run import model_of
+    from fvsolve.solve.bands import shared
 
     model = model_of(load_case(case, set))
     found = model.checks
     found["warnings"] += [one.plain() for one in step_limits(model)]
+    found["threads"] = shared(model)
     if as_json:
         print_json(found)
     else:
@@ -88,15 +117,16 @@ def new(
     source: Annotated[Path | None, typer.Option("--from", metavar="NET.inp", help="an EPANET network")] = None,
     hour: Annotated[float | None, typer.Option(metavar="H", help="of EPANET's run (default 0)")] = None,
     wave_speed: Annotated[str | None, typer.Option(metavar="A", help='of all pipes (default "1200 m/s")')] = None,
+    shortest: Annotated[str | None, typer.Option(metavar="L", help="make shorter pipes as long, as cells want")] = None,
 ) -> None:
     """Copy a shipped case and the files it uses; or with --from write the case NAME of an EPANET network."""
     from fvsolve.case import copying
     from fvsolve.cli import imported
 
     if source is not None:
-        imported.write(source, name, file, hour, wave_speed)
+        imported.write(source, name, file, hour, wave_speed, shortest)
         return
-    if name is None or hour is not None or wave_speed is not None:
+    if name is None or hour is not None or wave_speed is not None or shortest is not None:
         raise FvsolveError("fvsolve new NAME copies a shipped case, fvsolve new --from NET.inp [--hour H] imports one")
     for path in copying.copy(name, file or Path(f"{name}.toml")):
         print(path)

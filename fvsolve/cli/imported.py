@@ -11,25 +11,28 @@ from fvsolve.cli.app import value_of
 from fvsolve.errors import FvsolveError, listing
 
 WAVE_SPEED = "1200 m/s"
+SHORT = 'shorter than a cell, for line = "cells" see --shortest'
 
 
-def write(source: Path, name: str | None, file: Path | None, hour: float | None, wave_speed: str | None) -> None:
+def write(
+    source: Path,
+    name: str | None,
+    file: Path | None,
+    hour: float | None,
+    wave_speed: str | None,
+    shortest: str | None,
+) -> None:
     """Write the case of an EPANET network, its schema beside it; say what is not as EPANET has it."""
     from fvsolve.epanet import import_network
-    from fvsolve.units import parse
 
     to = file or Path(f"{name or source.stem}.toml")
     if to.is_dir():
         to = to / f"{name or source.stem}.toml"
     if to.exists():
         raise FvsolveError(f"{to} exists; state another file: fvsolve new NAME FILE --from {source}")
-    try:
-        speed = parse(value_of(wave_speed or WAVE_SPEED), "velocity")
-        if not speed > 0.0:
-            raise ValueError(f"{wave_speed} is not positive")
-    except ValueError as error:
-        raise FvsolveError(f"--wave-speed: {error}") from None
-    made = import_network(source, hour or 0.0, speed)
+    speed = _positive("--wave-speed", wave_speed or WAVE_SPEED, "velocity")
+    least = _positive("--shortest", shortest, "length") if shortest else 0.0
+    made = import_network(source, hour or 0.0, speed, least)
     to.parent.mkdir(parents=True, exist_ok=True)
     to.write_text(made.text, encoding="utf-8")
     written = [to]
@@ -39,5 +42,18 @@ def write(source: Path, name: str | None, file: Path | None, hour: float | None,
         written.append(described)
     for path in written:
         print(path)
-    for what, names in made.notes:
+    for what, names in [*made.notes, *([(SHORT, made.short)] if made.short else [])]:
         print(f"{what}: {listing(names)}", file=sys.stderr)
+
+
+def _positive(option: str, given: str, dimension: str) -> float:
+    """What an option gives, in SI."""
+    from fvsolve.units import parse
+
+    try:
+        found = parse(value_of(given), dimension)
+        if not found > 0.0:
+            raise ValueError(f"{given} is not positive")
+    except ValueError as error:
+        raise FvsolveError(f"{option}: {error}") from None
+    return found

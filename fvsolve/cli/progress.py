@@ -61,6 +61,26 @@ def _nothing() -> Iterator[None]:
     yield
 
 
+@contextmanager
+def counted(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A `progress(done, total, next)` function: a bar on a terminal, elsewhere a line now and then."""
+    if not sys.stderr.isatty():
+        from fvsolve.cli.studying import told
+
+        with told() as progress:
+            yield progress
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task(what, total=None)
+        yield lambda done, total, last: shown.update(
+            task, completed=done, total=total, description=f"{what}: {visible(last)}"
+        )
+
+
 class Bar:
     """A rich bar with simulated time, speed and what remains."""
 

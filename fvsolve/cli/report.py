@@ -5,7 +5,7 @@ from __future__ import annotations
 from fvsolve.cli.terminal import console as _console
 from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
-from fvsolve.output.directory import pictures
+from fvsolve.output.directory import pictures_there
 
 ROWS = 20  # of a table at most; the rest is on disk
 MANY = 40  # rows of a table of `check`: beyond, those that stand out
@@ -41,7 +41,7 @@ EVENTS_SHOWN = 12
 
 
 def result(one) -> None:
-    """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps, files."""
+    """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps."""
     said = one.summary
     console = _console()
     if said["title"]:
@@ -64,10 +64,14 @@ def result(one) -> None:
     _notices(console, said["warnings"])
     when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
     _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
-    if one.directory:
-        _line(console, f"{one.directory}: {', '.join(sorted([*said['files'], *pictures(one.directory)]))}")
-    if said["reason"].startswith("interrupted"):
-        _line(console, "go on with the same command and --resume")
+
+
+def files(one) -> None:
+    """What is in the run directory now."""
+    names = sorted([*one.summary["files"], *pictures_there(one.directory)])
+    _line(_console(), f"{one.directory}: {', '.join(names)}")
+    if one.reason.startswith("interrupted"):
+        _line(_console(), "go on with the same command and --resume")
 
 
 def exit_code(one) -> int:
@@ -108,10 +112,26 @@ def checks(case, found: dict, every: bool = False) -> None:
         _line(console, "")
     said = [f"friction of {name} remembers: {_memory(one['unsteady'])}"
             for name, one in found["pipes"].items() if "unsteady" in one]  # fmt: skip
+    lines = {name: one for name, one in found["pipes"].items() if one["line"] == "delay"}
+    said += [f"{name} is a delay line, off by at most {one['line_bound']:.2g} of the greatest jump: {one['line_why']}"
+             for name, one in lines.items()]  # fmt: skip
+    if lines:
+        said += [f"{name} has cells: {one['line_why']}" for name, one in found["pipes"].items() if name not in lines]
     _cut(console, said, every)
     _cut(console, [f"moves from the start: {text}" for text in found["moving"]], every)
     _notices(console, found["warnings"], every)
+    if found["basins"]:
+        _line(console, _threads(found["threads"]))
     _line(console, _step(found))
+
+
+def _threads(found: dict) -> str:
+    """What threads can share out."""
+    if found["why"]:
+        return f"threads: one; {found['why']}"
+    rows = ", ".join(f"{many} rows of {name}" for name, many in found["rows"].items())
+    kept = "; ".join(f"{name}: {why}" for name, why in found["whole"].items())
+    return f"threads: up to {found['most']} share out {rows}" + (f"; each steps the whole of {kept}" if kept else "")
 
 
 def _states(console, case, word: str, found: dict, keys: dict, every: bool, odd: set[str]) -> None:

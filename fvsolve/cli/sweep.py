@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,44 +10,87 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Out, folder_of, told
+from fvsolve.cli.studying import Out, folder_of, told, writable
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
     list[str], typer.Option("--set", metavar="KEY=a,b,c", help="values of a key, one run each; one value holds for all")
 ]
+Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="ends of a key, for --sample")]
+Jobs = Annotated[int, typer.Option(metavar="N", help="runs at a time, each in a process of its own")]
+Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="scheduler whose workers run: tcp://10.0.0.1:8786")]
+Outcomes = Annotated[
+    list[str], typer.Option("--outcome", metavar="max(PROBE)", help="what is charted, in place of all extremes")
+]
+Seed = Annotated[int, typer.Option(metavar="N", help="which of all samples")]
+WANTED = "KEY=a,b,c, for example links.main.cells=100,200,400"
 SHOWN = 6  # columns of a table on a terminal, beside the keys
+MOST = 100  # rows of it
 
 
 @app.command()
 def sweep(
     case: One,
-    set: Values,
-    jobs: Annotated[int, typer.Option(metavar="N", help="runs at a time")] = 1,
+    set: Values = [],  # noqa: B006
+    points: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="values of every run: a column for each key")
+    ] = None,
+    sample: Annotated[
+        str | None, typer.Option(metavar="sobol:N", help="N runs between the ends of --vary; or lhs:N")
+    ] = None,
+    vary: Ranges = [],  # noqa: B006
+    seed: Seed = 0,
+    jobs: Jobs = 1,
+    dask: Dask = None,
+    outcome: Outcomes = [],  # noqa: B006
     out: Out = None,
     as_json: Json = False,
 ) -> None:
     """One run for every combination of values: a table with a row for each, failed ones with their reason."""
     from fvsolve import studies
 
-    given = dict(_values(text) for text in set)
+    given = dict(values_of(text) for text in set)
     fixed = {key: values[0] for key, values in given.items() if len(values) == 1}
+    moved = {key: values for key, values in given.items() if key not in fixed} | ranges_of(vary, sample)
     found = load_case(case, [])
     folder = folder_of(found, "sweep", out)
     with told() as progress:
-        made = studies.sweep(found, {k: v for k, v in given.items() if k not in fixed}, fixed, jobs, folder, progress)
+        made = studies.sweep(found, moved, fixed, jobs, folder, progress, points, sample, seed, dask)
+    charts = write_charts(made, outcome, folder)
     if as_json:
-        print_json(made.plain() | {"directory": str(folder)})
+        print_json(made.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
     else:
         _show(made, folder)
     sys.exit(0 if all(row["ok"] for row in made.rows) else 1)
 
 
-def _values(text: str) -> tuple[str, list]:
+def ranges_of(texts: list[str], sample: str | None) -> dict[str, list]:
+    """`KEY=LOW,HIGH` as keys and their two ends."""
+    if texts and sample is None:
+        raise FvsolveError(f"--vary {texts[0]}: wants --sample sobol:N beside it; values of a grid are --set KEY=a,b,c")
+    return dict(values_of(text, "--vary", "KEY=LOW,HIGH, for example links.main.length=900,1000") for text in texts)
+
+
+def write_charts(made, outcomes: list[str], folder: Path) -> list[Path]:
+    """A picture for each outcome in `charts`, all extremes if none is named; returns their paths."""
+    from fvsolve.draw.sweep import outcome_figure
+
+    known = made.outcomes
+    names = [made.outcome(name) for name in outcomes] or [one for one in known if one.startswith(("max(", "min("))]
+    paths = []
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
+        path = writable(folder / "charts") / f"{plain}.png"
+        outcome_figure(made, name).savefig(path)
+        paths.append(path)
+    return paths
+
+
+def values_of(text: str, option: str = "--set", wanted: str = WANTED) -> tuple[str, list]:
     """`KEY=a,b,c` as the key and its values."""
     key, equals, listed = text.partition("=")
     if not (equals and key.strip() and listed.strip()):
-        raise FvsolveError(f"--set {text}: wanted KEY=a,b,c, for example links.main.cells=100,200,400")
+        raise FvsolveError(f"{option} {text}: wanted {wanted}")
     return key.strip(), [value_of(one) for one in split(listed)]
 
 
@@ -73,15 +117,17 @@ def _show(made, folder: Path) -> None:
     console = terminal.console()
     columns = [*made.keys, "ok", *(name for name in made.columns if name.startswith(("min(", "max(")))]
     shown = columns[len(made.keys) : len(made.keys) + 1 + SHOWN]
-    rows = [[*(pasted(row[key]) for key in made.keys), *(_text(row.get(name)) for name in shown)] for row in made.rows]
+    first = made.rows[:MOST]
+    rows = [[*(pasted(row[key]) for key in made.keys), *(_text(row.get(name)) for name in shown)] for row in first]
     terminal.table([*made.keys, *shown], rows, console)
-    for row in made.rows:
+    for row in first:
         where = ", ".join(f"{key} = {pasted(row[key])}" for key in made.keys)
         if not row["ok"]:
             terminal.line(console, f"{where}: {row['reason']}", "bold red")
         if row.get("marks"):
             terminal.line(console, f"{where}: {row['marks']}", "yellow")
     reused = f", {made.reused} of them found before" if made.reused else ""
+    reused += f", the first {MOST} of them here" if len(made.rows) > MOST else ""
     terminal.line(console, f"{folder / 'sweep.csv'}: {len(made.rows)} rows{reused}")
 
 

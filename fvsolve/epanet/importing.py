@@ -15,7 +15,6 @@ from fvsolve.errors import FvsolveError, listing
 
 CELL_TIME = 0.01  # [s] of a cell where there are few of them
 MOST_CELLS = 40_000  # beyond which cells grow
-SHORTEST = 0.25  # a pipe is at least this part of a cell long: steps follow the shortest one
 END = "20 s"
 PROBES = 5  # junctions that are recorded: those with the greatest demands
 
@@ -24,27 +23,30 @@ PROBES = 5  # junctions that are recorded: those with the greatest demands
 class Imported:
     """Text of a case file, and what in it is not as EPANET has it: (what, names).
 
-    nodes, links : EPANET's name -> the case's
+    nodes, links : EPANET's name -> the case's; short : EPANET's names of pipes shorter than a cell, the shortest first
     """
 
     text: str
     nodes: dict[str, str]
     links: dict[str, str]
     notes: list[tuple[str, list[str]]]
+    short: list[str]
 
 
-def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0) -> Imported:
+def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0) -> Imported:
     """The case of an EPANET file at an hour of EPANET's own run; every pipe gets one wave speed [m/s].
 
+    shortest : what shorter pipes are made as long as, with the loss of their own length [m]
     Raises FvsolveError where WNTR is absent, or where EPANET finds faults in the file.
     """
     if not (math.isfinite(hour) and hour >= 0.0):
         raise FvsolveError(f"hour {hour:g}; wanted hours from the start of EPANET's run, 0 or more")
     network = read_network(Path(path))
     time = cell_time([pipe.length for _, pipe in network.pipes()], wave_speed)
-    made = Translation(network, state_at(network, hour), wave_speed, wave_speed * time * SHORTEST)
-    said = _text(Path(path), network, made, hour, time)
-    return Imported(said, made.node_names.given, made.link_names.given, made.notes)
+    made = Translation(network, state_at(network, hour), wave_speed, shortest)
+    short = sorted((name for name, length in made.lengths.items() if length < wave_speed * time), key=made.lengths.get)
+    said = _text(Path(path), network, made, hour, time, short)
+    return Imported(said, made.node_names.given, made.link_names.given, made.notes, short)
 
 
 def cell_time(lengths: list[float], wave_speed: float) -> float:
@@ -52,7 +54,7 @@ def cell_time(lengths: list[float], wave_speed: float) -> float:
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
-def _text(path: Path, network: Any, made: Translation, hour: float, time: float) -> str:
+def _text(path: Path, network: Any, made: Translation, hour: float, time: float, short: list[str]) -> str:
     lines = [
         "#:schema schema.json",
         "schema = 1",
@@ -77,9 +79,17 @@ def _text(path: Path, network: Any, made: Translation, hour: float, time: float)
         "[numerics]",
         f'end = "{END}"',
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes that are shorter get one cell',
+        'line = "auto"' + (f"  # {_short(made, short)}" if short else ""),
     ]
     lines += ["", "[output]", f"probes = {text.inline(_probes(made))}", 'units = { flow = "l/s" }']
     return "\n".join(lines) + "\n"
+
+
+def _short(made: Translation, short: list[str]) -> str:
+    """What cells would cost where pipes are shorter than one."""
+    first = made.link_names.given[short[0]]
+    which = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"
+    return f"{which} shorter than a cell; with cells steps follow {first}, {made.lengths[short[0]]:.4g} m long"
 
 
 def _probes(made: Translation) -> list[str]:

@@ -21,14 +21,14 @@ REGULATES = 2  # WNTR's code of a valve that nobody holds open or shut
 class Translation:
     """Nodes and links of a case, and notes on what is not as EPANET has it.
 
-    nodes, links : name -> what the case file says; marks : link -> a word on it; notes : (what, EPANET's names)
+    nodes, links : name -> what the case file says; lengths : EPANET's name -> of a pipe; notes : (what, EPANET's names)
     """
 
     def __init__(self, network: Any, hour: Hour, wave_speed: float, shortest: float) -> None:
         self.network, self.hour, self.speed, self.shortest = network, hour, wave_speed, shortest
         self.nodes: dict[str, words.Part] = {}
         self.links: dict[str, words.Part] = {}
-        self.marks: dict[str, str] = {}
+        self.lengths: dict[str, float] = {}
         self.noted: dict[str, list[str]] = {}
         self.node_names, self.link_names = FreeNames(), FreeNames()
         hydraulic = network.options.hydraulic
@@ -152,14 +152,14 @@ class Translation:
             self.note(f"{what}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name)
             end = place
         law = words.friction(self.formula, link.roughness)
-        length = self.length(link)
+        length = self.lengths[name] = self.length(link)
         if length > link.length:
             law = self.spread(name, link, length)
             self.note(f"{length:.4g} m long here, with the loss of its own length", name)
         return words.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
 
     def length(self, link: Any) -> float:
-        """No less than the shortest that steps can follow, nor than a climb that stays [m]."""
+        """No less than the shortest that was asked for, nor than a climb that stays [m]."""
         low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
         inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
         return max(link.length, self.shortest, (high - low) / STEEPEST if inside and high - low > link.length else 0.0)

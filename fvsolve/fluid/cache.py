@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -20,16 +21,22 @@ FORMAT = 1  # of the files and of what they hold; raise it when either changes
 
 def cached(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
     """What CoolProp says, from the disk where it was asked before: a warm hit does not import CoolProp."""
-    from importlib.metadata import version
-
-    key = json.dumps([FORMAT, version("CoolProp"), name, temperature, pressure, law])
+    key = json.dumps([FORMAT, coolprop(), name, temperature, pressure, law])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
     path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
     found = _read(path, key)
     if found is None:
-        found = ask(name, temperature, pressure, law) | {"source": f"CoolProp {version('CoolProp')}"}
+        found = ask(name, temperature, pressure, law) | {"source": f"CoolProp {coolprop()}"}
         _write(path, key, found)
     return found
+
+
+@functools.cache
+def coolprop() -> str:
+    """The version of CoolProp, which is not imported for it."""
+    from importlib.metadata import version
+
+    return version("CoolProp")
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:

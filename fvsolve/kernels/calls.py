@@ -7,12 +7,12 @@ functions named as `HOOKS`, each taking its own. What they raise is lost.
 
 from __future__ import annotations
 
-import os
+import functools
 
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.jit import njit, once
+from fvsolve.jit import COMPILING, Intrinsic, declared, njit, plain_kinds
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import table_types
 
@@ -39,28 +39,28 @@ HOOKS = {  # of the law of a part: arguments, and what it returns
     "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, by the drop alone
     "lead": ("tVTDtttb", "tt"),  # t, y, tables, device, p' before, p' behind, drop, ahead: as `kernels.led` asks
 }
-COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 def argument_types(letters: str) -> tuple:
     """Numba's types of times (t), rows of numbers (v) and handles (h); of V and H as calls by address pass these."""
-    from numba import types
-
-    from fvsolve.kernels.handle import Tables
-    from fvsolve.kernels.vectors import Vector
-
-    kinds = {"t": types.float64, "v": types.float64[::1], "h": types.int64[::1]}
-    kinds |= {"V": Vector(types.float64), "H": Vector(types.int64), "i": types.int64, "b": types.boolean}
-    kinds |= {"T": Tables(), "D": table_types().devices.dtype}
+    kinds = _kinds()
     return tuple(kinds[letter] for letter in letters)
 
 
-@once
-def compile_as(function, letters: str) -> None:
-    """Compile for arguments of these kinds, and for no others."""
-    if hasattr(function, "compile") and not function.overloads:
-        function.compile(argument_types(letters))
-        function.disable_compile()
+@functools.cache
+def _kinds() -> dict:
+    from numba import types
+
+    from fvsolve.kernels.opened import Tables
+    from fvsolve.kernels.vectors import Vector
+
+    own = {"V": Vector(types.float64), "H": Vector(types.int64), "T": Tables(), "D": table_types().devices.dtype}
+    return plain_kinds() | own
+
+
+def compile_as(function, letters: str):
+    """The function compiled for arguments of these kinds and no others, itself where JIT is off."""
+    return declared(function, letters, argument_types)
 
 
 def addressed(function, letters: str):
@@ -68,11 +68,7 @@ def addressed(function, letters: str):
 
     Its machine code stays there as long as the function does.
     """
-    if not COMPILING:
-        return function
-    compile_as(function.within, letters)
-    (compiled,) = function.within.overloads.values()
-    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+    return function.address(letters, argument_types) if COMPILING else function
 
 
 def hook_of(law, name: str):
@@ -90,11 +86,11 @@ def empty_calls(rows: int, columns: int) -> np.ndarray:
 
 
 if COMPILING:
-    from numba.core import types
-    from numba.extending import intrinsic
 
     def call(letters: str, returned: str = ""):
         """(signature, generator) of a call whose first argument is the address."""
+        from numba.core import types
+
         kinds = argument_types(letters)
         found = argument_types(returned)
         result = types.none if not found else found[0] if len(found) == 1 else types.Tuple(found)
@@ -107,77 +103,77 @@ if COMPILING:
 
         return result(types.int64, *kinds), generate
 
-    @intrinsic
+    @Intrinsic
     def call_rates(typingctx, address, t, y, dydt, out, handle):
         """Call the function at an address."""
         return call(RATES)
 
-    @intrinsic
+    @Intrinsic
     def call_reader(typingctx, address, t, y, out, handle, values):
         """Call the function at an address."""
         return call(READS)
 
-    @intrinsic
+    @Intrinsic
     def call_energies(typingctx, address, t, y, dydt, out, handle, rows):
         """Call the function at an address."""
         return call(ENERGIES)
 
-    @intrinsic
+    @Intrinsic
     def call_set(typingctx, address, t, y, out, tables, device):
         """Call the hook at an address."""
         return call(*HOOKS["set"])
 
-    @intrinsic
+    @Intrinsic
     def call_move(typingctx, address, t, y, dydt, out, tables, device):
         """Call the hook at an address."""
         return call(*HOOKS["move"])
 
-    @intrinsic
+    @Intrinsic
     def call_events(typingctx, address, t, y, out, tables, device, g):
         """Call the hook at an address."""
         return call(*HOOKS["events"])
 
-    @intrinsic
+    @Intrinsic
     def call_value(typingctx, address, t, y, out, tables, device, which):
         """Call the hook at an address."""
         return call(*HOOKS["value"])
 
-    @intrinsic
+    @Intrinsic
     def call_outside(typingctx, address, out, tables, device):
         """Call the hook at an address."""
         return call(*HOOKS["outside"])
 
-    @intrinsic
+    @Intrinsic
     def call_power(typingctx, address, t, y, dydt, out, tables, device):
         """Call the hook at an address."""
         return call(*HOOKS["power"])
 
-    @intrinsic
+    @Intrinsic
     def call_stored(typingctx, address, y, tables, device):
         """Call the hook at an address."""
         return call(*HOOKS["stored"])
 
-    @intrinsic
+    @Intrinsic
     def call_step(typingctx, address, out, tables, k, g, m, drop, denser, wide):
         """Call the hook at an address."""
         return call(*HOOKS["step"])
 
-    @intrinsic
+    @Intrinsic
     def call_slope(typingctx, address, out, tables, k, g, drop):
         """Call the hook at an address."""
         return call(*HOOKS["slope"])
 
-    @intrinsic
+    @Intrinsic
     def call_lift(typingctx, address, out, tables, k, g, drop, denser, wide):
         """Call the hook at an address."""
         return call(*HOOKS["lift"])
 
-    @intrinsic
+    @Intrinsic
     def call_bends(typingctx, address, tables, k, drop, g):
         """Call the hook at an address."""
         return call(*HOOKS["bends"])
 
-    @intrinsic
+    @Intrinsic
     def call_lead(typingctx, address, t, y, tables, device, before, behind, drop, ahead):
         """Call the hook at an address."""
         return call(*HOOKS["lead"])

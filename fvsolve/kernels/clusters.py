@@ -129,9 +129,22 @@ def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wid
             a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop, 1.0, wide)
             lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop, 1.0, wide)
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
+    put_couples(cluster, tables, out, n, matrix, right)
     for i in range(n):
         if held[i] == 0.0:
             right[i], matrix[n * i + i] = 0.0, 1.0
+
+
+@njit
+def put_couples(cluster, tables, out, n, matrix, right):
+    """Add what flows between the ends of short delay lines at once."""
+    layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
+    for k in range(cluster["couples"]):
+        line = tables.delays[integers[cluster["first_couple"] + k]]
+        pipe, g = tables.pipes[line["pipe"]], line["couple"]
+        i, j = inner_row(nodes, pipe["from_node"]), inner_row(nodes, pipe["to_node"])
+        p, q = out[layout["pressure"] + pipe["from_node"]], out[layout["pressure"] + pipe["to_node"]]
+        put_valve(i, j, g * (p - q), 0.0, g, 0.0, n, matrix, right)
 
 
 @njit
@@ -177,6 +190,10 @@ def prepare(cluster, tables, out, g, m):
             m[e] *= sqrt(g[e] / valve["open"])  # at the profile's drop: all but shut, its flow would ask for any
         quiet = quiet and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
+            quiet = quiet and out[layout["pressure"] + i] == 0.0
+    for k in range(cluster["couples"]):
+        pipe = tables.pipes[tables.delays[integers[cluster["first_couple"] + k]]["pipe"]]
+        for i in (pipe["from_node"], pipe["to_node"]):
             quiet = quiet and out[layout["pressure"] + i] == 0.0
     return quiet
 
@@ -279,4 +296,5 @@ def close_clusters(t, y, dydt, out, handle):
     """Pressures of the nodes of all clusters and flows of their valves."""
     tables = open_tables(handle)
     for which in range(tables.clusters.size):
-        close_cluster(out, tables, which)
+        if tables.clusters[which]["inverse"] < 0:
+            close_cluster(out, tables, which)

@@ -11,11 +11,12 @@ from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH
 TWO_OVER_LN10 = 2.0 / log(10.0)
 EXPONENT = 0.852  # Hazen-Williams: drop as flow to 1.852
 MANTISSA, ONE = 0x000FFFFFFFFFFFFF, 0x3FF0000000000000  # bits of a float64
-SCALES = 2.0 ** (EXPONENT * (np.arange(2048.0) - 1023.0))  # 2^(0.852 e) for every e a float64 can have
+WHOLE, REST = np.divmod(213 * (np.arange(2048) - 1023), 500)  # of 0.426 e, for every e that a float64 can have
+SCALES = np.ldexp(2.0 ** (REST / 500.0), WHOLE)  # 2^(0.426 e)
 SCALES[2047] = np.nan  # of what is not finite
 C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, C11, C12, C13, C14, C15 = (
     float(c) * 2.0**k
-    for k, c in enumerate(chebyshev.cheb2poly(chebyshev.chebinterpolate(lambda x: (1.5 + 0.5 * x) ** EXPONENT, 15)))
+    for k, c in enumerate(chebyshev.cheb2poly(chebyshev.chebinterpolate(lambda x: (1.5 + 0.5 * x) ** 0.426, 15)))
 )
 LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers between which the two laws are blended
 
@@ -49,14 +50,14 @@ def factor_times_reynolds(reynolds, roughness):
     return 64.0 + weight * (turbulent - 64.0)
 
 
-@njit
-def power(size):
-    """size^0.852 of a float64 >= 0, to 1e-14 of itself, in a sixth of the time of the library's power.
+@njit(fastmath={"contract"})
+def power_of_square(square):
+    """(M^2)^0.426 = |M|^0.852 of M^2 >= 0, to 2e-14 of itself for 1e-150 <= |M| <= 1e150.
 
     Mantissa in [1, 2) by a polynomial of Chebyshev's through its middle, exponent by a table: no branch and no call,
-    so that a loop over cells does four at once.
+    so that a loop over cells does four at once, and a product with its sum is one instruction.
     """
-    bits = np.float64(size).view(np.int64)
+    bits = np.float64(square).view(np.int64)
     u = np.int64((bits & MANTISSA) | ONE).view(np.float64) - 1.5
     high = C8 + u * (C9 + u * (C10 + u * (C11 + u * (C12 + u * (C13 + u * (C14 + u * C15))))))
     low = C0 + u * (C1 + u * (C2 + u * (C3 + u * (C4 + u * (C5 + u * (C6 + u * C7))))))
@@ -68,8 +69,7 @@ def power(size):
 @njit
 def drag_hazen(loss, rough, flow):
     """loss |M| M + rough |M|^0.852 M."""
-    size = abs(flow)
-    return loss * (size * flow) + rough * (power(size) * flow)
+    return loss * (abs(flow) * flow) + rough * (power_of_square(flow * flow) * flow)
 
 
 @njit
@@ -97,5 +97,5 @@ def drag_slope(kind, loss, rough, roughness, reynolds, flow):
         high = drag(kind, 0.0, rough, roughness, reynolds, size + step)
         slope += (high - drag(kind, 0.0, rough, roughness, reynolds, size)) / step
     elif kind == FRICTION_HAZEN:
-        slope += (1.0 + EXPONENT) * rough * power(size)
+        slope += (1.0 + EXPONENT) * rough * power_of_square(size * size)
     return slope

@@ -25,7 +25,7 @@ class Functions:
         self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
         self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
         others = "" if all(name.startswith("fvsolve.") for name in cast.homes()) else "import fvsolve.parts; "
-        with beside(f"{others}{READERS}compile_readers({cast!r}); {MARCH}", "march.march-*.nbi"):
+        with beside(f"{others}{READERS}compile_readers({cast!r}); {MARCH}", "march_at"):
             self.rhs = self.all(calls.RHS, rates, calls.rhs_in_turn)
             self.hang(*MOVING, *["lead"] * cast.columns)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))
@@ -50,8 +50,7 @@ class Functions:
     def all(self, job: int, functions: list, in_turn):
         """The function that calls all of a job."""
         self.enter(job, functions)
-        calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
-        return in_turn
+        return calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
 
     @functools.cached_property
     def energies(self) -> tuple:
@@ -72,9 +71,8 @@ def compile_readers(cast: Cast) -> tuple:
         for hook in READING:
             if (function := calls.hook_of(law, hook)) is not None:
                 calls.addressed(function, calls.HOOKS[hook][0])
-    calls.compile_as(calls.record_in_turn, calls.READS.lower())
-    calls.compile_as(calls.events_in_turn, "tvhv")
-    return calls.record_in_turn, calls.events_in_turn
+    record = calls.compile_as(calls.record_in_turn, calls.READS.lower())
+    return record, calls.compile_as(calls.events_in_turn, "tvhv")
 
 
 @once
@@ -83,8 +81,7 @@ def leap_function(wanted: bool):
     found = stay
     if wanted:
         from fvsolve.kernels.leap import leap_linear as found
-    calls.compile_as(found, "ttvvvhv")
-    return found
+    return calls.compile_as(found, "ttvvvhv")
 
 
 @njit

@@ -14,6 +14,8 @@ def offer_waves(t, y, dydt, out, handle):
     scratch = tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
+        if pipe["delay"] >= 0:
+            continue
         n, at = pipe["cells"], layout["ends"] + 4 * i
         r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
         family = family_of(settings, n)
@@ -32,6 +34,8 @@ def answer_waves(t, y, dydt, out, handle):
     layout, pipes = tables.layout[0], tables.pipes
     for i in range(pipes.size):
         pipe = pipes[i]
+        if pipe["delay"] >= 0:
+            continue
         at = layout["ends"] + 4 * i
         p_from = out[layout["pressure"] + pipe["from_node"]]
         p_to = out[layout["pressure"] + pipe["to_node"]]
@@ -48,6 +52,8 @@ def wave_rates(t, y, dydt, out, handle):
         return
     for i in range(pipes.size):
         pipe = pipes[i]
+        if pipe["delay"] >= 0:
+            continue
         n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
         pipe_rates(
             settings, pipe, y[o : o + n], y[o + n : o + 2 * n], out[at], out[at + 1], out[at + 2], out[at + 3],

@@ -22,6 +22,7 @@ class Pieces:
     home : package of the modules
     """
 
+    meet: str = ""  # what bands of a state tell each other of it
     prepare: str = ""  # what (t, y) alone tell: conductances, speeds, pressures of vessels
     offer: str = ""  # what pipes say of their ends
     store: str = ""  # pressures that are stored or given, flows from outside
@@ -33,6 +34,7 @@ class Pieces:
     brake: str = ""  # rates that steps have to see; so far nodes are closed, which events ask for
     move: str = ""  # rates of what stands between nodes: columns, bodies, devices
     rates: str = ""  # of cells, in pipes and basins
+    together: str = ""  # what bands tell each other of what passes boundaries
     enter: str = ""  # what comes into these by patches
     accelerate: str = ""  # bodies, once all that pushes them is known
     follow: str = ""  # what feels these accelerations
@@ -40,6 +42,7 @@ class Pieces:
     mix: str = ""  # and their values at nodes
     carry: str = ""  # rates of what is carried in cells
     swell: str = ""  # of rates of scalars in cells that stretch, those of what they contain
+    agree: str = ""  # on the rate that the quickest of all bands has
     # and beside the right-hand side
     observe: str = ""  # reads probes
     record: str = ""  # notes an accepted state
@@ -51,7 +54,7 @@ class Pieces:
 
 
 JOBS = tuple(field.name for field in fields(Pieces) if field.name != "home")
-PHASES = JOBS[: JOBS.index("swell") + 1]
+PHASES = JOBS[: JOBS.index("agree") + 1]
 CLOSING = PHASES[: PHASES.index("brake") + 1]
 
 BAROTROPIC = {"store": "barotropic_nodes: store_barotropic", "close": "barotropic_nodes: close_barotropic"}
@@ -133,6 +136,14 @@ MEMBERS = {
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
+DELAYS = Pieces(
+    offer="delay.lines: offer_lines", answer="delay.lines: answer_lines", rates="delay.lines: fill_lines",
+    observe="delay.along: observe_lines", record="delay.record: record_lines",
+)  # fmt: skip
+COUPLED = Pieces(close="delay.lines: couple_clusters")
+TOLD = Pieces(record="delay.record: record_places")
+BANDS = Pieces(meet="joint: meet", agree="joint: agree")
+TOGETHER = Pieces(home="fvsolve.basins", together="bands: book_together")
 MIXED = Pieces(mix="scalars: mix_scalars")
 ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
 
@@ -145,6 +156,7 @@ class Cast:
     of parts, as rows of `hooks` lie
     basins : of what basins consist, and with scalars of what carries these there; see `basins.lower_pieces`
     alone : whether there is nothing but basins, and no link
+    bands, together : whether threads step bands of the state, and whether more than one of these has an open boundary
     """
 
     family: str
@@ -164,16 +176,26 @@ class Cast:
     carried: tuple[Pieces, ...] = ()
     scalars: bool = False
     valves: bool = False
+    delays: bool = False
     alone: bool = False
+    bands: bool = False
+    together: bool = False
 
     def members(self) -> Iterator[Pieces]:
         """Of what it consists, in the order in which pieces of one phase run."""
+        if self.bands:
+            yield BANDS
+        if self.together:
+            yield TOGETHER
         linear = self.family == "linear"
         family = self.family if linear or self.pipes else "barotropic"
-        yield from (ALONE,) if self.alone else (LUMPED,) if linear and not self.pipes else (NETWORK, NODES[family])
+        lumped = linear and not self.pipes and not self.delays
+        yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
         if self.pipes:
             yield PIPES[family]
+        if self.delays:
+            yield DELAYS
         if self.valves:
             yield MEMBERS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
@@ -183,6 +205,8 @@ class Cast:
             yield MEMBERS["bends"]
         if self.clusters and linear:
             yield MEMBERS["clusters"]
+            if self.delays:
+                yield COUPLED
         if self.columns:
             yield MEMBERS["columns" if linear else "columns, barotropic"]
         if self.bodies:
@@ -212,6 +236,8 @@ class Cast:
         yield from self.carried
         if self.pipes:
             yield MEMBERS["pipes"]
+        if self.delays:
+            yield TOLD
         yield ALWAYS
 
     def modules(self) -> list:

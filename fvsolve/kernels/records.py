@@ -69,6 +69,7 @@ SETTINGS = np.dtype(
         ("floor", "f8"),  # mixture: what the pressure of the gas adds to, vapour pressure or 0 [Pa]
         ("gas", "f8"),  # its volume over the liquid's, times pressure to the power below [Pa^gas_power]
         ("gas_power", "f8"),  # 1 / (gas exponent)
+        ("jumps", "f8"),  # share of the greatest jump from which on a jump in a delay line is kept as one
         ("saturation", "f8"),  # gas pressure at which all of it is dissolved; infinite for none [Pa]
     ],
     align=True,
@@ -111,6 +112,22 @@ PIPE = np.dtype(
         ("from_mass", "f8"),  # and the mass per length at the end that it computes to [kg/m]
         ("to_mass", "f8"),
         ("ride", "i8"),  # of its first cell in `rides`; -1 where it stands still
+        ("delay", "i8"),  # of `delays`, where it has no cells; else -1
+    ],
+    align=True,
+)
+
+DELAY = np.dtype(  # a pipe as a delay line: stretches of equal travel time, friction in the middle of each
+    [
+        ("pipe", "i8"),
+        ("stretch", "i8"),  # its first
+        ("stretches", "i8"),
+        ("tau", "f8"),  # travel time of a stretch [s]
+        ("hold", "f8"),  # what is read was sent so long ago: tau, or of a shorter one the longest step [s]
+        ("now", "f8"),  # share of a shorter one that arrives at once, 1 - tau / hold; 0 of others
+        ("couple", "f8"),  # of a shorter one, flow between its ends per pressure [kg/s per Pa]
+        ("slope", "f8"),  # d drag / d flow of the profile [1/s]
+        ("places", "i8"),  # at which fields and envelopes are told
     ],
     align=True,
 )
@@ -144,6 +161,8 @@ NODE = np.dtype(
         ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
         ("density", "f8"),  # of what a tank holds [kg/m3]
         ("ride", "i8"),  # in `rides`; -1 where it stands still
+        ("lines", "i8"),  # offset in `integers` of ends of delay lines that touch it, twice the line plus side
+        ("line_count", "i8"),
     ],
     align=True,
 )
@@ -371,7 +390,18 @@ SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
 # a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
 PIECE_COLUMNS = 7
 
-CLUSTER_RECORD = np.dtype([("first_node", "i8"), ("nodes", "i8"), ("first_valve", "i8"), ("valves", "i8")], align=True)
+CLUSTER_RECORD = np.dtype(
+    [
+        ("first_node", "i8"),
+        ("nodes", "i8"),
+        ("first_valve", "i8"),
+        ("valves", "i8"),
+        ("first_couple", "i8"),
+        ("couples", "i8"),
+        ("inverse", "i8"),
+    ],
+    align=True,
+)
 
 LAYOUT = np.dtype(
     [
@@ -587,14 +617,18 @@ RECORDS = {
     "patches": PATCHES,
     "scalars": SCALAR,
     "walls": WALL,
+    "delays": DELAY,
 }
 # Of a model, which nobody writes; of one run, which writes them; behind a handle, with addresses of functions: of
 # pieces, a row a job, and of devices, a row a law.
 Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
-Written = namedtuple("Written", ("clock", "work", "armed", "marks", "scratch", "spare", "seen", "envelope", "extremes"))
+Written = namedtuple(
+    "Written",
+    ("clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "envelope", "extremes", "past"),
+)
 Called = namedtuple("Called", (*Tables._fields, *Written._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are no records float64[:]
-INTEGERS = ("integers", "calls", "hooks")  # but int64
+INTEGERS = ("integers", "bands", "joint", "calls", "hooks")  # but int64
 
 
 @functools.cache

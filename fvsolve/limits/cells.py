@@ -28,10 +28,11 @@ def rubbed(model) -> Modes:
     """Waves of pipes against friction, at the flow of the start."""
     scheme, found = model.case.numerics.scheme, []
     weights = SCHEMES[scheme].smooth.weights
+    symbols = {n: symbol(weights, PHASES * (1.0 - 0.5 / n)) for n in {mesh.cells for mesh in model.pipes}}
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = slope(row)
-        if g > 0.0:
-            z = symbol(weights, PHASES * (1.0 - 0.5 / mesh.cells))  # between ends no wave is quite two cells long
+        if g > 0.0 and row["delay"] < 0:
+            z = symbols[mesh.cells]  # between ends no wave is quite two cells long
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
             found.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
     return found

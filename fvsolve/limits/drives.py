@@ -17,10 +17,12 @@ def drives(model) -> np.ndarray:
     if len(pipes):
         pressure = max(pressure, flow / float(pipes["admittance"].min()))
     for mesh, row in zip(model.pipes, pipes, strict=True):
-        own = found[row["y"] : row["y"] + 2 * mesh.cells]
-        own[:] = np.maximum(
-            max(pressure * float(row["admittance"]), flow), model.scale[row["y"] : row["y"] + 2 * mesh.cells]
-        )
+        if row["delay"] >= 0:  # what it holds beside the profile
+            waves = pressure * float(row["admittance"]) * mesh.length / float(row["speed"])
+            found[row["y"]] = FAR * max(found[row["y"]], waves)
+            continue
+        own = slice(row["y"], row["y"] + 2 * mesh.cells)
+        found[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
     for basin in model.basins:
         states, scales = basin.own(found), basin.own(model.scale)
         ratio = 1.0 + pressure / (linear.density * model.case.gravity)
@@ -47,8 +49,11 @@ def given(model) -> tuple[float, float]:
 
 
 def lumped(model) -> np.ndarray:
-    """Numbers of the states that are no cell's: of vessels, columns, bodies and devices : int64[k]."""
-    return np.array([i for i, name in enumerate(model.state_names) if "[" not in name], dtype=np.int64)
+    """Numbers of the states that are no cell's and no line's: of vessels, columns, bodies and devices : int64[k]."""
+    pipes = model.tables.pipes
+    lines = set(pipes["y"][pipes["delay"] >= 0].tolist())
+    names = enumerate(model.state_names)
+    return np.array([i for i, name in names if "[" not in name and i not in lines], dtype=np.int64)
 
 
 def spreads(model, share: float = 1.0) -> np.ndarray:

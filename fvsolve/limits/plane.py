@@ -51,6 +51,7 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
     return low
 
 
+@functools.lru_cache(maxsize=1024)
 def holds_well(scheme: str, method: str, courant: float, share: float = 1.0, waves: bool = False) -> bool:
     """Whether no wave that is tried grows at a Courant number, nor at one that is a little greater."""
     if share == 1.0 and not waves:

@@ -94,7 +94,8 @@ def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None, j
 
 def pipe_rooms(model, method: str) -> list[Room]:
     """The pipe that is farthest beyond its limit, if there are any."""
-    if not model.cells:
+    own = model.tables.pipes["delay"] < 0  # whose waves cells carry
+    if not own.any():
         return []
     numerics, waves = model.case.numerics, model.wave_rates
     if numerics.step is not None:
@@ -103,8 +104,9 @@ def pipe_rooms(model, method: str) -> list[Room]:
         courant = numerics.courant * waves / (waves * model.tables.pipes["quicker"]).max()
     cells, one = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
     long = cells >= (ROOM if one.limited and one.shorter else LONG)  # at whose ends it is of a lower order where rough
-    rooms = [room for k in np.flatnonzero(~long) if (room := short_pipe(model, method, int(k), float(courant[k])))]
-    inner = cells >= ROOM if proved(model) else long  # what grows between the ends does so in few cells, too
+    short = np.flatnonzero(own & ~long)
+    rooms = [room for k in short if (room := short_pipe(model, method, int(k), float(courant[k])))]
+    inner = own & (cells >= ROOM if proved(model) else long)  # what grows between the ends does so in few cells, too
     if inner.any():
         k = int(np.argmax(np.where(inner, courant, -1.0)))
         rooms += long_pipe(model, method, k, float(courant[k]))

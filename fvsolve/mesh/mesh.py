@@ -57,6 +57,11 @@ class Mesh:
         """How many faces lie between two cells; the rest is boundary."""
         return int(np.count_nonzero(self.right >= 0))
 
+    @property
+    def centroid(self) -> np.ndarray:
+        """Of all its cells together : float64[2] [m]."""
+        return self.area @ self.centre / self.area.sum()
+
     def patch(self, name: str) -> slice:
         """The faces of a patch; raises ValueError for a name that is none."""
         k = self.patches.index(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
+from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays, past_of
 from fvsolve.model.device import lower_devices
 from fvsolve.model.draft import Draft
 from fvsolve.model.lowering import lowering_of
@@ -46,9 +48,10 @@ def build(case) -> Model:
     return model_of(draft)
 
 
-def drafted(case: Case) -> Draft:
-    """The tables of a case and its profile."""
+def drafted(case: Case, unfit: Collection[str] = ()) -> Draft:
+    """The tables of a case and its profile; unfit : pipes that are no delay lines, see `model.delay`."""
     draft = Draft(case)
+    draft.followed = followed(case, unfit)
     fill_places(draft)
     fill_links(draft)
     sort_nodes(draft)
@@ -58,8 +61,9 @@ def drafted(case: Case) -> Draft:
     pack(draft, np.zeros(profile_size(draft)))
     draft.steady = start_profile(draft)
     settle_scalars(draft)
+    worse = cut_lines(draft)
     draft.check()
-    return draft
+    return drafted(case, {*unfit, *worse}) if worse else draft
 
 
 def fill_places(draft: Draft) -> None:
@@ -75,12 +79,13 @@ def fill_places(draft: Draft) -> None:
 def fill_links(draft: Draft) -> None:
     """Rows of links, of devices and of masses."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
+    lower_delays(draft)
     draft.column_names, draft.column_table = draft.fill("column", rec.COLUMN)
     draft.valve_names, draft.valve_table = draft.fill("valve", rec.VALVE)
     lower_devices(draft)
     for row in draft.pipe_table:
-        draft.node_table["admittance"][row["from_node"]] += row["admittance"]
-        draft.node_table["admittance"][row["to_node"]] += row["admittance"]
+        for end in ("from_node", "to_node"):
+            draft.node_table["admittance"][row[end]] += row["admittance"] * at_ends(draft, row)
     lower_bodies(draft)
     lower_rides(draft)
     lower_masses(draft)
@@ -113,14 +118,15 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
         draft.ride_table, draft.mass_table,
         draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
-        draft.wall_table,
+        draft.wall_table, draft.delay_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
     draft.shapes = rec.Written(
         clock=1, work=draft.work_size, marks=marks_of(draft),
         armed=limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
         scratch=scratch_of(draft), spare=int(layout["size"][0]), seen=draft.size if len(draft.wall_table) else 0,
-        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)),
+        bands=2 * len(draft.basin_table), joint=0,
+        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_of(draft),
     )  # fmt: skip
 
 
@@ -134,6 +140,7 @@ def settings_of(draft: Draft) -> np.ndarray:
     s["vapor"] = case.law.cavity_pressure
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
+    s["jumps"] = 0.25 * case.numerics.accuracy
     s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *column_rates(draft)])
     return found
 
@@ -180,7 +187,7 @@ def marks_of(draft: Draft) -> int:
 def scratch_of(draft: Draft) -> int:
     """Numbers that the rhs needs to work with, at most."""
     many, nodes = len(draft.scalar_table), len(draft.node_table)
-    most = max(draft.pipe_table["cells"], default=0)
+    most = max([0, *draft.pipe_table["cells"], *draft.delay_table["places"]])
     system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in draft.cluster_table), default=0)
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))

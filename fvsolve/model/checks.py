@@ -55,6 +55,7 @@ def checks(model) -> dict[str, Any]:
             "reynolds": float(rho * abs(velocity) * mesh.diameter / viscosity) if viscosity else None,
             "friction_factor": float(rubbed(loss, link, rho, velocity) / dynamic) if rubs else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
+            **model.steady["lines"][mesh.name],
             **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}),
         }  # fmt: skip
     step, set_by = step_and_reason(model)

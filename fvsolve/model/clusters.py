@@ -14,9 +14,18 @@ def sort_nodes(draft) -> None:
     """Sort nodes and valves into those with closed roots and those that Newton solves together."""
     nodes, valves = draft.node_table, draft.valve_table
     inner = nodes["kind"] == rec.JUNCTION
-    group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in valves
+    short = np.flatnonzero(draft.delay_table["now"] > 0.0)
+    joins = [draft.pipe_table[draft.delay_table["pipe"][k]] for k in short]
+    group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in (*valves, *joins)
                                if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
     touched: dict[int, list[int]] = {}
+    couples: dict[int, list[int]] = {}
+    for k, row in zip(short.tolist(), joins, strict=True):
+        for i in {int(row["from_node"]), int(row["to_node"])}:
+            if inner[i]:
+                touched.setdefault(group[i], [])
+                own = couples.setdefault(group[i], [])
+                own += [] if k in own else [k]
     for k, v in enumerate(valves):
         for i in {int(v["from_node"]), int(v["to_node"])}:
             if inner[i]:
@@ -31,7 +40,7 @@ def sort_nodes(draft) -> None:
     for root, ks in touched.items():
         soft = np.all(nodes["admittance"][members[root]] > 0.0)
         plain = np.all(even[ks])
-        single = len(ks) == 1 and soft and plain and draft.case.law.linear
+        single = len(ks) == 1 and soft and plain and draft.case.law.linear and root not in couples
         nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
         valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
         if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(draft, members[root], ks):
@@ -39,16 +48,19 @@ def sort_nodes(draft) -> None:
         if single:
             continue
         nodes["row"][members[root]] = np.arange(len(members[root]))
-        clusters.append((len(integers), len(members[root]), len(integers) + len(members[root]), len(ks)))
-        integers += members[root] + ks
+        n, own = len(members[root]), couples.get(root, [])
+        at = len(integers)
+        inverse = inverted(draft, members[root], own) if not ks else -1
+        clusters.append((at, n, at + n, len(ks), at + n + len(ks), len(own), inverse))
+        integers += members[root] + ks + own
     for k in np.flatnonzero(known & ~even):  # a cluster without nodes
         valves["solve"][k] = rec.CLUSTER
-        clusters.append((len(integers), 0, len(integers), 1))
+        clusters.append((len(integers), 0, len(integers), 1, 0, 0, -1))
         integers.append(int(k))
     if not draft.case.law.linear:
         for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
             nodes["row"][i] = 0
-            clusters.append((len(integers), 1, len(integers) + 1, 0))
+            clusters.append((len(integers), 1, len(integers) + 1, 0, 0, 0, -1))
             integers.append(int(i))
     gates(draft)
     refuse_loose_air_valves(draft, members)
@@ -60,6 +72,23 @@ def sort_nodes(draft) -> None:
             name = list(draft.case.places)[i]
             draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+
+def inverted(draft, members, couples) -> int:
+    """Where the inverse of the admittances of nodes that short delay lines join lies in `floats`, row by row."""
+    rows, place = {i: k for k, i in enumerate(members)}, len(draft.floats)
+    matrix = np.diag(draft.node_table["admittance"][members])
+    for k in couples:
+        line = draft.delay_table[k]
+        pipe = draft.pipe_table[line["pipe"]]
+        ends = [rows[i] for i in (int(pipe["from_node"]), int(pipe["to_node"])) if i in rows]
+        for i in ends:
+            matrix[i, i] += line["couple"]
+        if len(ends) == 2:
+            matrix[ends[0], ends[1]] -= line["couple"]
+            matrix[ends[1], ends[0]] -= line["couple"]
+    draft.floats += np.linalg.inv(matrix).ravel().tolist()
+    return place
 
 
 def is_root(valves) -> np.ndarray:

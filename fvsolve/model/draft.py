@@ -73,6 +73,7 @@ class Draft:
     events: list[tuple[str, str]] = field(default_factory=list)  # (what, what it means); "": nothing to a reader
     meshes: list[PipeMesh] = field(default_factory=list)
     basins: list[Any] = field(default_factory=list)
+    followed: dict[str, Any] = field(default_factory=dict)  # pipe -> by cells or as a delay line, see `model.delay`
 
     # rows
     node_table: np.ndarray = rows(rec.NODE)
@@ -95,6 +96,7 @@ class Draft:
     patch_table: np.ndarray = rows(rec.PATCHES)
     scalar_table: np.ndarray = rows(rec.SCALAR)
     wall_table: np.ndarray = rows(rec.WALL)
+    delay_table: np.ndarray = rows(rec.DELAY)
     probe_table: np.ndarray = rows(rec.PROBE)
 
     # of the start
@@ -181,8 +183,8 @@ class Draft:
         if table == "valve":
             rows["device"] = rows["hooks"] = rows["data"] = rows["event"] = -1
             rows["back"] = 1.0
-        if "ride" in record.names:
-            rows["ride"] = -1
+        for key in {"ride", "delay"}.intersection(record.names):
+            rows[key] = -1
         for name, link, lowering in parts:
             lowering.fill(self, name, link, rows[at : at + lowering.rows])
             at += lowering.rows

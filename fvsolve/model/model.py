@@ -13,6 +13,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
+from fvsolve.model.delay import begin_past, without_past
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
 from fvsolve.shown import Shown
@@ -65,7 +66,10 @@ class State(Shown):
 
 def flags_of(state: State, model: Model) -> np.ndarray | float:
     """Flags of devices that a state remembers, if `advance` gave it; 0 of others."""
-    return state.memory[2:] if state.memory.size == 2 + model.shapes.armed else 0.0
+    memory = state.memory
+    if len(model.tables.delays) and memory.size:
+        memory = without_past(memory)[0]
+    return memory[2:] if memory.size == 2 + model.shapes.armed else 0.0
 
 
 def given_numbers(name: str, given: Any) -> np.ndarray:
@@ -169,7 +173,7 @@ class Model(Shown):
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses in a second, for every pipe [1/s]."""
         pipes = self.tables.pipes
-        return pipes["speed"] / pipes["dx"]
+        return pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
 
     @property
     def wave_rate(self) -> float:
@@ -196,9 +200,10 @@ class Model(Shown):
         there.append(many.rides)
         basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
         patches = (self.tables.nodes["kind"] == rec.PATCH).all()
-        alone = bool(self.basins and patches) and not (self.cells or valves or many.devices or any(there))
-        cast = Cast(self.case.law.family, self.cells > 0, *there, self.unsteady, many.devices, tuple(self.laws),
-                    basins, carried, many.scalars, valves, alone)  # fmt: skip
+        alone = bool(self.basins and patches) and not (self.pipes or valves or many.devices or any(there))
+        cells = bool((self.tables.pipes["cells"] > 0).any())
+        cast = Cast(self.case.law.family, cells, *there, self.unsteady, many.devices, tuple(self.laws),
+                    basins, carried, many.scalars, valves, many.delays, alone)  # fmt: skip
         return functions(cast)
 
     @property
@@ -234,9 +239,23 @@ class Model(Shown):
                                "Model.state_names lists")  # fmt: skip
         return found
 
-    def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
-        """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there."""
+    def rhs(self, t: float | State, y: np.ndarray | None = None) -> np.ndarray:
+        """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there.
+
+        With delay lines it wants a `State`, whose memory holds their past; FvsolveError where it gets a y alone.
+        """
+        if isinstance(t, State) and y is None:
+            with self.slate() as slate:
+                slate.recall(t)
+                return slate.evaluate(t.t, t.y, np.inf)[0]
+        self.refuse_lines("rhs")
         return self.evaluate(t, y)[0]
+
+    def refuse_lines(self, what: str) -> None:
+        """FvsolveError where delay lines have a past that no y tells."""
+        if len(self.tables.delays):
+            raise FvsolveError(f"{what}(t, y) of a model with delay lines is not all there is to say: what was sent "
+                               'into them counts too; wanted rhs(State), or line = "cells"')  # fmt: skip
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """(dydt, out) at t, as `rhs`; from `limit` [s] on schedules take their left limit there."""
@@ -255,11 +274,13 @@ class Model(Shown):
         except IndexError:
             slate = Slate(self)
         slate.armed[:] = armed
+        begin_past(slate.past, self.tables.delays)
         yield slate
         self.slates.append(slate)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
+        self.refuse_lines("jacobian")
         (t, y), n = self.given(t, y), self.y_size
         found = np.empty((n, n))
         for j in range(n):
@@ -275,11 +296,12 @@ class Model(Shown):
 
         Devices stand as at a start from there, or as a state that `advance` gave remembers.
         """
-        armed, limit = 0.0, given_limit(limit)
+        armed, limit, past = 0.0, given_limit(limit), None
         if isinstance(t, State) and y is None:
-            t, y, armed = t.t, t.y, flags_of(t, self)
+            t, y, armed, past = t.t, t.y, flags_of(t, self), t
         t, y = self.given(t, y)
         with self.slate(armed) as slate:
+            slate.recall(past)
             return slate.observe(t, y, slate.evaluate(t, y, limit)[1])
 
     # what the numbers mean ----------------------------------------------------------------------------------
@@ -306,8 +328,11 @@ class Model(Shown):
         """Whether the density law knows cavities: it has a floor."""
         return self.case.law.cavitates
 
-    def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
-        """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it."""
+    def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
+        """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it.
+
+        lines : pipe -> both waves of those that are delay lines, as `Slate.along` gives them
+        """
         y = self.sized(y)
         if np.shape(out) != (int(self.layout["size"]),):
             raise FvsolveError(f"out has shape {np.shape(out)}; wanted what Model.evaluate gives beside the rates")
@@ -316,6 +341,8 @@ class Model(Shown):
             row = self.tables.pipes[k]
             n, o = pipe.cells, row["y"]
             r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
+            if row["delay"] >= 0:
+                r, l = (lines or {}).get(k, (np.zeros(n), np.zeros(n)))  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
             flow = mass_flow / law.density(pressure)
             found[pipe.name] = {
@@ -345,11 +372,11 @@ class Model(Shown):
         """Mass stored in the profile and by how much the state deviates from it [kg]."""
         y = self.sized(y)
         initial, change = 0.0, 0.0
-        for k, pipe in enumerate(self.pipes):
-            row = self.tables.pipes[k]
-            o, n = row["y"], pipe.cells
+        for k, row in enumerate(self.tables.pipes):
+            o, n = row["y"], int(row["cells"])
             initial += self.case.law.held_in_pipe(row, self.profiles[k], self.tables.profile)
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
+            change += float(y[o]) if row["delay"] >= 0 else 0.0
         for row in self.tables.nodes:
             if row["y"] >= 0:
                 initial += float(row["mass"])

@@ -69,7 +69,7 @@ def lower_surface(draft, row, probe) -> None:
     case, basin = draft.case, draft.case.nodes[probe.name]
     about = basin, case.lumped[probe.name]
     every, shares = sloshing.reading(*about, *probe.point, case.properties.density, case.gravity)
-    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(basin)
+    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*about)
     row["cell"], row["count"], row["weights"] = len(draft.integers), len(every), len(draft.floats)
     draft.integers += [draft.body_names.index(sloshing.slider(probe.name, one)) for one in every]
     draft.floats += shares

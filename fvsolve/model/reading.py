@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from fvsolve.schemes import SCHEMES
@@ -21,6 +23,7 @@ def along(draft, row, fraction: float, degree: int | None = None) -> None:
     draft.floats += weights.tolist()
 
 
+@functools.lru_cache(maxsize=4096)
 def around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
     """First of the cells that are read x cells from `from`, and their weights.
 

@@ -1,5 +1,7 @@
 """Schemes and limiters as the numbers that kernels read. Knows codes and weights; knows no fields."""
 
+import functools
+
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
 from fvsolve.schemes import LIMITERS, SCHEMES
@@ -18,7 +20,13 @@ def scheme_settings(settings, scheme: str, limiter: str) -> None:
     one, settings["limiter"] = SCHEMES[scheme], CODES[limiter]
     settings["scheme"], settings["degree"] = family(scheme), one.degree
     if settings["scheme"] == rec.LINEAR:
-        weights = [float(w) for w in one.weights]
-        for k, weight in enumerate(weights):
-            settings[f"w{k}"] = weight
-        settings["inside"], settings["enter"], settings["leave"] = difference_rows(weights, one.degree)
+        for k, weight in enumerate(one.weights):
+            settings[f"w{k}"] = float(weight)
+        settings["inside"], settings["enter"], settings["leave"] = differences(scheme)
+
+
+@functools.cache
+def differences(scheme: str) -> tuple:
+    """What a linear scheme makes of the difference of two faces, see `records.SETTINGS`."""
+    one = SCHEMES[scheme]
+    return difference_rows([float(w) for w in one.weights], one.degree)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.delay import SPARE, begin_past, doubled, room_left, without_past
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -25,8 +26,9 @@ def lined(size: int) -> np.ndarray:
 
 def wiped(shapes: rec.Written) -> rec.Written:
     """What runs write, of these shapes, all zero."""
-    _, work, *others = shapes
-    return rec.Written(np.zeros(1, rec.CLOCK), lined(work), *map(np.zeros, others))
+    found = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
+    found |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
+    return rec.Written(**found | {"clock": np.zeros(1, rec.CLOCK), "work": lined(shapes.work)})
 
 
 class Slate:
@@ -35,6 +37,8 @@ class Slate:
     clock : until when schedules are as in the segment, and the step that is given; see `records.CLOCK`
     armed : 1.0 where an event has happened and still holds; marks : first times of what a model cannot follow [s]
     envelope, extremes : least and greatest of all cells and of all probes, each above its time
+    bands : of every basin, the first of the rows, of a mesh of the cells, that are stepped here and one beyond the
+    last; joint : see `kernels.joint`, empty where all are
     """
 
     def __init__(self, model: Model) -> None:
@@ -48,7 +52,10 @@ class Slate:
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
+        begin_past(self.written.past, model.tables.delays)
         self.clock["limit"], self.marks[:] = np.inf, np.nan
+        basins = model.tables.basins
+        self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
         for array in (self.envelope, self.extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
 
@@ -59,6 +66,41 @@ class Slate:
 
         functions = self.model.functions
         return make_handle((*self.tables, *self.written, functions.calls, functions.hooks))
+
+    @property
+    def past(self) -> np.ndarray:
+        """What was sent into delay lines."""
+        return self.written.past
+
+    @past.setter
+    def past(self, past: np.ndarray) -> None:
+        self.written = self.written._replace(past=past)
+        self.__dict__.pop("handle", None)
+
+    def recall(self, state) -> None:
+        """Take the past of delay lines from what a state remembers; of one without memory there is none."""
+        if len(self.model.tables.delays) and state is not None and state.memory.size:
+            self.past = without_past(state.memory)[1].copy()
+
+    def room(self) -> float:
+        """Steps that can be taken before the past of delay lines forgets what is yet to arrive."""
+        delays = self.model.tables.delays
+        if not len(delays):
+            return np.inf
+        while (left := room_left(self.past, delays)) < SPARE // 2:
+            self.past = doubled(self.past, delays)
+        return float(left)
+
+    def along(self, t: float, out: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """Pipe -> both waves in the middle of its cells, of delay lines [kg/s]."""
+        found = {}
+        if len(self.model.tables.delays):
+            from fvsolve.kernels.delay.along import along_lines
+
+            for which, row in enumerate(self.model.tables.delays):
+                found[int(row["pipe"])] = r, l = np.zeros(row["places"]), np.zeros(row["places"])  # noqa: E741
+                along_lines(t, out, self.handle, which, r, l)
+        return found
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
         """`Model.evaluate` where devices stand as the flags here have them, which follow what holds at (t, y)."""
@@ -79,9 +121,9 @@ class Slate:
             if not changed:
                 return
 
-    def fields(self, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
+    def fields(self, t: float, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
         """`Model.fields`, with the least and greatest pressures of pipes so far."""
-        found = self.model.fields(y, out)
+        found = self.model.fields(y, out, self.along(t, out))
         found["out"] = out
         for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):
             own, cells = found[pipe.name], row["cell"] + np.arange(pipe.cells)

@@ -37,6 +37,7 @@ class Couplings:
         self.size = model.y_size
         self.nodes, self.pipes = tables.nodes, tables.pipes
         self.valves, self.columns = tables.valves, tables.columns
+        self.short = self.pipes[tables.delays["pipe"][tables.delays["now"] > 0.0]]
         settings = tables.settings[0]
         self.linear = model.case.law.linear
         self.upwind = settings["scheme"] == rec.UPWIND
@@ -58,6 +59,9 @@ class Couplings:
     def pairs(self) -> Iterator[Pairs]:
         """All couplings but those of a state with itself."""
         for pipe in self.pipes:
+            if pipe["delay"] >= 0:
+                yield every(states(pipe["y"]), states(*(self.sets[i] for i in ends_of(pipe))))
+                continue
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
             yield from self.remembered(pipe)
@@ -82,8 +86,8 @@ class Couplings:
     # nodes ------------------------------------------------------------------------------------------------------
 
     def joints(self) -> list:
-        """Links whose ends are solved together: valves, and columns that all but shut valves can lead."""
-        return [*self.valves, *(column for column in self.columns if self.led(column))]
+        """Links whose ends are solved together: valves, short delay lines, columns that valves can lead."""
+        return [*self.valves, *self.short, *(column for column in self.columns if self.led(column))]
 
     def led(self, column) -> bool:
         """Whether there are openings at which a column's flow follows the valves at its end."""

@@ -128,8 +128,8 @@ class Start:
         """The steady state with devices as they are now."""
         self.held, self.demand = self.givens()
         held = self.held
-        pipes = [self.wall_edge(name, row, row["dx"] * row["cells"]) for name, row in
-                 zip(self.draft.pipe_names, self.pipes, strict=True)]  # fmt: skip
+        pipes = [self.wall_edge(mesh.name, row, mesh.length) for mesh, row in
+                 zip(self.draft.meshes, self.pipes, strict=True)]  # fmt: skip
         columns = [self.wall_edge(name, row, row["length"]) for name, row in
                    zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
         valves = [self.valve_edge(k) for k in range(len(self.valves))]

@@ -31,9 +31,9 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
         addresses[calls.RHS, k] = calls.addressed(found(HOME, piece), calls.RATES)
-    calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
+    run = calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
     handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
-    calls.rhs_in_turn(t, y, rates, out, handle)
+    run(t, y, rates, out, handle)
 
 
 def plain(shapes: rec.Written) -> rec.Written:

@@ -201,7 +201,7 @@ def _refuse_size(folder: Path, case) -> None:
                        "longer [output] every, or another place with --out DIR")  # fmt: skip
 
 
-def pictures(folder: Path) -> list[str]:
+def pictures_there(folder: Path) -> list[str]:
     """Names of the pictures that are there."""
     return [name for name in PICTURES if (folder / name).is_file()]
 

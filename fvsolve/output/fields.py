@@ -6,9 +6,9 @@ array carries its unit as VTK's own UNITS_LABEL.
 
 from __future__ import annotations
 
+import html
 import re
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -131,7 +131,7 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
     text = path.read_bytes()
     for name, unit in units.items():
         end = text.index(ARRAY, text.index(f' Name="{name}"'.encode()))
-        text = text[:end] + UNIT.format(escape(unit)).encode() + text[end:]
+        text = text[:end] + UNIT.format(html.escape(unit, quote=False)).encode() + text[end:]
     path.write_bytes(text)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
 import sys
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,30 +33,35 @@ class Restart:
 
 def identity(case) -> dict[str, str]:
     """What has to be the same for a run to go on: the case but for its end time, and the versions."""
-    resolved = tomllib.loads(case.resolved())
-    for key in SILENT:
-        resolved.pop(key, None)
-    resolved.get("numerics", {}).pop("end", None)
-    digest = hashlib.sha256(json.dumps(resolved, sort_keys=True, default=str).encode())
+    said = {key: one for key, one in case.table().items() if key not in SILENT}
+    said["numerics"].pop("end")
+    digest = hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode())
     for path in case.files:
         digest.update(Path(path).read_bytes())
     return {"case": digest.hexdigest()[:16]} | versions(case)
 
 
 def versions(case) -> dict[str, str]:
-    """Versions that the numbers of a run depend on."""
+    """Versions that the numbers of a run depend on, and the machine that they were compiled for."""
+    return programs() | {"fluid": case.properties.source}
+
+
+def programs() -> dict[str, str]:
+    """Versions of what computes."""
+    return dict(_programs())
+
+
+@functools.cache
+def _programs() -> tuple[tuple[str, str], ...]:
+    """They stay the same while a process lasts."""
     import fvsolve
     from fvsolve import jit
 
-    numba = sys.modules.get("numba")
-    return {
-        "fvsolve": fvsolve.__version__,
-        "sources": jit.source_hash(),
-        "python": sys.version.split()[0],
-        "numpy": np.__version__,
-        "numba": numba.__version__ if numba else "not used",
-        "fluid": case.properties.source,
-    }
+    own = {"fvsolve": fvsolve.__version__, "sources": jit.source_hash(), "python": sys.version.split()[0]}
+    own |= {"numpy": np.__version__, "numba": "not used", "target": "none"}
+    if jit.COMPILING:
+        own |= {"numba": jit.store.numba_version(), "target": jit.store.target()["name"]}
+    return tuple(own.items())
 
 
 def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:

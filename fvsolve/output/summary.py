@@ -43,6 +43,7 @@ def described(summary, model) -> dict:
         **summary.counts,
         "methods": summary.methods,
         "cells": int(summary.cells),
+        "threads": int(summary.threads),
         "seconds": float(summary.seconds),
         "seconds_setup": float(summary.seconds_setup),
         "cost": plain(summary.cost),

@@ -189,6 +189,7 @@ class Scheduled(Value):
         return Schedule(kind if len(v) > 1 else "constant", t, v, origin=origin)
 
     def _read_signal(self, given: dict[str, Any], setting: Setting) -> Schedule:
+        setting.asked += 1
         name = read_keys(given, self.forms()["signal"], setting)["signal"]
         if name not in setting.signals:
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"

@@ -14,6 +14,7 @@ from fvsolve.units import show
 
 def find_file(name: str, setting: Setting) -> Path:
     """The file `name`, relative to the case, noted in the setting's files. ValueError where there is none."""
+    setting.asked += 1
     path = Path(name)
     if not path.is_absolute():
         path = (setting.folder or Path.cwd()) / path

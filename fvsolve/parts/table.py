@@ -49,7 +49,10 @@ def _near(name: str, keys: list[str]) -> str:
 class Table(BaseModel):
     """Base of everything that is a table in a case file: frozen, every key known, all faults at once."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True,
+        defer_build=True,  # what a case has not costs nothing
+    )  # fmt: skip
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # keys of which one at most is given
     needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # keys of which one at least is given

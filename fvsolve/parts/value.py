@@ -42,6 +42,7 @@ class Setting:
     signals: dict[str, Any] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     used: dict[str, Any] = field(default_factory=dict)  # signals that parts name, in SI
+    asked: int = 0  # times that a file or a signal was asked for
 
 
 def setting_of(info: Any) -> Setting:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -192,25 +192,33 @@ class Result(Shown):
         """The probes over time as a matplotlib Figure, also written to `path` where one is given."""
         from fvsolve.draw.plot import history_figure
 
-        figure = history_figure(
-            self.t,
-            self._table[:, 1:],
-            list(self.units.items()),
-            time_unit=self._time.unit,
-            marks=[(self._time.from_si(one.time), f"{one.place} {one.what}") for one in self.marks]
-            + [(self.t[0], f"{one.place} {one.kind}") for one in self.warnings if not one.ok and len(self.t)],
-            measured=self._measured(),
-            title=self.summary["title"],
-        )
-        return kept(figure, path)
+        return kept(history_figure(**self.history_drawn()), path)
+
+    def history_drawn(self) -> dict[str, Any]:
+        """What the picture of the history shows, nothing where no probe was asked for."""
+        if not self.probes:
+            return {}
+        marks = [(self._time.from_si(one.time), f"{one.place} {one.what}") for one in self.marks]
+        marks += [(self.t[0], f"{one.place} {one.kind}") for one in self.warnings if not one.ok and len(self.t)]
+        return {
+            "t": self.t, "values": self._table[:, 1:], "probes": list(self.units.items()),
+            "time_unit": self._time.unit, "marks": marks, "measured": self._measured(), "title": self.summary["title"],
+        }  # fmt: skip
 
     @door(path=PATH)
     def plot_envelope(self, path=None):
         """Least and greatest head along the pipes as a matplotlib Figure, also written to `path`."""
         from fvsolve.draw.plot import envelope_figure
 
-        figure = envelope_figure(self.envelope, self.summary["envelope_units"], self.summary["title"])
-        return kept(figure, path)
+        return kept(envelope_figure(**self.envelope_drawn()), path)
+
+    def envelope_drawn(self) -> dict[str, Any]:
+        """What the picture of the envelope shows, nothing where there are no pipes."""
+        if not self.envelope:
+            return {}
+        return {
+            "envelope": self.envelope, "units": self.summary["envelope_units"], "title": self.summary["title"],
+        }  # fmt: skip
 
     @door(time=NUMBER, field=TEXT, path=PATH, contours=AMOUNT)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:

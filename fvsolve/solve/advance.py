@@ -41,6 +41,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop.now[:] = state.y
     loop.memory[slots.T] = state.t
     loop.armed[:] = flags_of(state, model)
+    loop.slate.recall(state)
     loop.on_switch = lambda: loop.stop_columns(loop.orders[slots.END])
     adaptive = loop.orders[slots.CONTROL] == slots.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
@@ -49,7 +50,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         first = loop.t == state.t
         loop.stop_columns(end)
         loop.begin(end, NO_LIMIT)
-        if first and adaptive and state.memory.size == 2 + loop.armed.size:
+        if first and adaptive and state.memory.size >= 2 + loop.armed.size:
             loop.memory[[slots.STEP, slots.ERROR_OLD]] = state.memory[:2]
         code = loop.run(NO_LIMIT)
         while code == slots.CHUNK and automatic.wants_change(loop.stepper):
@@ -57,7 +58,10 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
             code = loop.run(NO_LIMIT)
         if code != slots.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
-    return State(loop.t, loop.now.copy(), np.append(loop.memory[[slots.STEP, slots.ERROR_OLD]], loop.armed))
+    memory = np.append(loop.memory[[slots.STEP, slots.ERROR_OLD]], loop.armed)
+    if len(model.tables.delays):
+        memory = np.concatenate([memory, loop.slate.past, [float(loop.slate.past.size)]])
+    return State(loop.t, loop.now.copy(), memory)
 
 
 def hold(model: Model, inputs: dict[str, float]) -> Model:

@@ -13,10 +13,11 @@ from fvsolve.kernels.functions import leap_function
 from fvsolve.model import Model, Slate
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
+from fvsolve.solve.bands import cut
 from fvsolve.solve.meeting import let_go, shut_places
 from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.ledger import SUMS
-from fvsolve.steppers.stepper import Stepper, arguments
+from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method, method_named
 
@@ -29,7 +30,9 @@ MOST_IN_A_SPAN, SPAN = 2000, 1e-6  # events within this share of the run, or wit
 class Loop:
     """Buffers of one run of a model by one method; `run` steps on until there is something to do."""
 
-    def __init__(self, model: Model, structure: Callable[[], Structure] | None = None) -> None:
+    # threads or comm, MPI's, of all ranks: who steps it beside this one
+
+    def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
         numerics = model.case.numerics
         self.model, self.slate = model, Slate(model)
         method = method_named(automatic.first_method(numerics.method))
@@ -39,9 +42,9 @@ class Loop:
         self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
-        self.rhs, self.observe, self.record, self.events = arguments((call.rhs, call.observe, call.record, call.events))
+        self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
         leaps = leap_allowed(model, method)
-        (self.leap,) = arguments((leap_function(leaps),))
+        self.leap = leap_function(leaps)
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
         sums = [
@@ -58,7 +61,9 @@ class Loop:
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
-        self.orders[slots.STEP_MAX] = model.step_max if numerics.rtol is not None else NO_LIMIT
+        self.orders[slots.STEP_MAX] = (
+            min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
+        )
         self.orders[slots.STOP_AT], self.orders[slots.LEAPS] = NO_LIMIT, leaps
         for control, key in ((slots.COURANT, "courant"), (slots.FIXED_STEP, "step"), (slots.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
@@ -70,6 +75,18 @@ class Loop:
             self.orders[slots.SIZE] = numerics.courant / model.wave_rate
         given = self.orders[slots.CONTROL] == slots.FIXED_STEP
         self.slate.clock["step"] = self.orders[slots.SIZE] if given else 0.0
+        self.team = None
+        if numerics.rtol is not None:  # errors are summed by rows
+            one = cut(model, 1)
+            stepper.spans, stepper.sums = one.spans(0), np.zeros(one.sums)
+        if comm is not None:
+            from fvsolve.solve.ranks import Ranks
+
+            self.team = Ranks(self, cut(model, comm.size), comm)
+        elif threads > 1:
+            from fvsolve.solve.team import Team
+
+            self.team = Team(self, cut(model, threads))
 
     @property
     def now(self) -> np.ndarray:
@@ -79,6 +96,8 @@ class Loop:
     @property
     def before(self) -> np.ndarray:
         """The state before the last step (a view)."""
+        if self.team is not None:
+            self.team.whole(self.flags[slots.OLD])
         return self.stepper.y[self.flags[slots.OLD]]
 
     @property
@@ -100,18 +119,38 @@ class Loop:
 
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
+        while (room := self.slate.room()) < budget:
+            code = self.steps(room)
+            left, budget = self.orders[slots.BUDGET], budget - room
+            if code != slots.CHUNK or left > 0.0 or automatic.wants_change(self.stepper):
+                return code
+        return self.steps(budget)
+
+    def steps(self, budget: float) -> int:
+        """`run`, while what delay lines remember has room for as many."""
         self.orders[slots.BUDGET] = budget
         code = slots.SWITCHED
         while code == slots.SWITCHED:
             before = self.armed.copy()
-            code = self.stepper.call(
-                self.leap, self.observe, self.record, self.events, self.rhs, self.slate.handle,
-                int(self.model.layout["supply"]), self.armed,
-            )  # fmt: skip
+            functions, where = self.functions
+            if self.team is None:
+                code = self.stepper.call(*functions, self.slate.handle, where, self.armed)
+            else:
+                code = self.team.call(functions, where)
             if code == slots.SWITCHED:
                 code = slots.SWITCHED if self.switch(before) else slots.CHATTERS
                 self.on_switch()
         return code
+
+    @property
+    def functions(self) -> tuple:
+        """What the stepper calls, and where rates of the ledger begin."""
+        return (self.leap, self.observe, self.record, self.events, self.rhs), int(self.model.layout["supply"])
+
+    def close(self) -> None:
+        """Let threads and ranks end."""
+        if self.team is not None:
+            self.team.close()
 
     @property
     def armed(self) -> np.ndarray:
@@ -181,10 +220,17 @@ class Loop:
     def step_back(self) -> None:
         """Return to the state before the last step, unless that step is in the ledgers: then its end was sound."""
         if self.flags[slots.BEHIND] == 1 and self.memory[slots.UNBOOKED] > 0.0:
+            self.before  # noqa: B018  which brings it here
             self.memory[slots.T] -= self.memory[slots.LAST]
             self.memory[slots.UNBOOKED] = 0.0
             self.flags[slots.NOW], self.flags[slots.OLD] = self.flags[slots.OLD], self.flags[slots.NOW]
             self.flags[slots.BEHIND] = 0
+
+
+def longest_step(model: Model) -> float:
+    """Step that delay lines are cut for [s]."""
+    asked = model.tables.pipes["delay"] >= 0
+    return float(1.0 / model.wave_rates[asked].max()) if asked.any() else np.inf
 
 
 def leap_allowed(model: Model, method: Method) -> bool:

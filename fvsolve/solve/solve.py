@@ -9,8 +9,11 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
+from fvsolve.model.delay import without_past
 from fvsolve.model.scalars import scalar_ledgers
+from fvsolve.solve.bands import threads_of
 from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.ranks import FAREWELL
 from fvsolve.solve.soundness import Soundness, parted
 from fvsolve.solve.summary import (
     Event,
@@ -44,20 +47,30 @@ def initial_state(model: Model) -> State:
     return State(model.case.numerics.start, model.start.copy())
 
 
-def solve(model: Model, state: State, sink, progress=None) -> Summary:
+def solve(model: Model, state: State, sink, progress=None, threads: int = 1, comm=None) -> Summary:
     """Step from `state` to the case's end, with rows, fields and checkpoints to `sink`.
 
-    progress(t, seconds, steps) is called about ten times a second. A state with memory is resumed bit for bit.
+    progress(t, seconds, steps) is called about ten times a second. A state with memory is resumed bit for bit, by any
+    number of threads; comm : MPI's, of ranks that follow this one in place of threads.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
     if progress is not None and not callable(progress):
         raise FvsolveError(f"progress = {progress!r} cannot be called; wanted progress(t, seconds, steps)")
-    model.given(state.t, state.y)
-    run = Run(model, state, sink, progress)
+    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise FvsolveError(f"threads = {show(threads)} is no number of threads; wanted a whole number, 1 or more")
+    if comm is not None and not callable(getattr(comm, "bcast", None)):
+        raise FvsolveError(f"comm = {show(comm)} is none of MPI's; wanted mpi4py's MPI.COMM_WORLD, or None")
     lacks = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
-    if lacks:
-        raise FvsolveError(f"sink = {show(sink)} is none: it has no {listing(lacks)}()")
+    try:
+        model.given(state.t, state.y)
+        run = Run(model, state, sink, progress, threads, comm)
+        if lacks:
+            raise FvsolveError(f"sink = {show(sink)} is none: it has no {listing(lacks)}()")
+    except BaseException:
+        if comm is not None:
+            comm.bcast(FAREWELL)
+        raise
     return run.go()
 
 
@@ -66,10 +79,12 @@ class Run:
 
     loop_type = Loop
 
-    def __init__(self, model: Model, state: State, sink, progress) -> None:
+    def __init__(self, model: Model, state: State, sink, progress, threads: int = 1, comm=None) -> None:
         self.model, self.sink, self.progress = model, sink, progress
+        self.threads, self.told = threads_of(model, threads if comm is None else comm.size)
+        comm = comm if self.threads > 1 else None
         self.began = time.perf_counter()
-        self.loop = self.loop_type(model)
+        self.loop = self.loop_type(model, threads=self.threads, comm=comm)
         self.slate = self.loop.slate
         self.loop.on_switch = self.stop_columns
         numerics, output = model.case.numerics, model.case.output
@@ -96,6 +111,8 @@ class Run:
             try:
                 self.remember(state.memory)
             except (ValueError, IndexError, OverflowError):  # of a damaged checkpoint, or of another solver's
+                if comm is None:
+                    self.loop.close()
                 raise MemoryMisfit(f"a memory of {state.memory.size} numbers is not of such a run; start it again with "
                                    "--force, or with a State without memory") from None  # fmt: skip
         self.setup = time.perf_counter() - self.began
@@ -113,10 +130,15 @@ class Run:
         own += [x for one in self.watches for x in one.kept]
         own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
         views = (view.ravel() for view in self.loop.stepper.memories())
-        own += self.soundness.swings.kept.ravel().tolist()
-        return np.concatenate([own, *views, *kept, self.soundness.halves.kept])
+        own += self.soundness.unfelt.kept.ravel().tolist()
+        past = self.slate.past
+        return np.concatenate([own, *views, *kept, self.soundness.halves.kept, past, [float(past.size)]])
 
     def remember(self, memory: np.ndarray) -> None:
+        memory, past = without_past(memory)
+        if (past.size == 0) != (self.slate.past.size == 0):
+            raise ValueError("no such past")
+        self.slate.past = past.copy()
         self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
         if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[4 + 3 * changes] >= 0):
             raise ValueError("counts out of range")
@@ -133,7 +155,7 @@ class Run:
             one.kept[:], memory = memory[: one.kept.size], memory[one.kept.size :]
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
-        risen = self.soundness.swings.kept.ravel()
+        risen = self.soundness.unfelt.kept.ravel()
         risen[:], memory = memory[: risen.size], memory[risen.size :]
         seen = self.soundness.halves.kept
         known = [getattr(self.slate, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
@@ -181,7 +203,7 @@ class Run:
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.look(t, y)
-        self.sink.field(t, self.slate.fields(y, out))
+        self.sink.field(t, self.slate.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows and frames that are due at a jump or at the end, which are written apart."""
@@ -206,6 +228,8 @@ class Run:
         except KeyboardInterrupt:
             self.loop.take_rows()
             return self.close(reason, saved=False)
+        finally:
+            self.loop.close()
         return self.close(reason)
 
     def open(self) -> None:
@@ -257,9 +281,9 @@ class Run:
     def steps(self) -> str:
         """Step to the end of the segment; returns a reason where the run cannot go on."""
         while True:
-            before, steps, busy = time.perf_counter(), self.loop.memory[slots.STEPS], time.thread_time()
+            before, steps, busy = time.perf_counter(), self.loop.memory[slots.STEPS], self.busy
             code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
-            self.processor += time.thread_time() - busy
+            self.processor += self.busy - busy
             self.left = max(1.0, self.left - (self.loop.memory[slots.STEPS] - steps))
             self.spent += time.perf_counter() - before
             self.seconds += time.perf_counter() - before
@@ -281,6 +305,11 @@ class Run:
                 return ""
             elif code not in (slots.CHUNK, slots.ROWS_FULL):
                 return self.failure(code)
+
+    @property
+    def busy(self) -> float:
+        """CPU time of all threads that step it [s]."""
+        return time.thread_time() + (0.0 if self.loop.team is None else self.loop.team.seconds)
 
     def pause(self, spent: float) -> None:
         """Between chunks: report, save, and aim at a tenth of a second for the next."""
@@ -361,7 +390,7 @@ class Run:
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         told = [notice for one in self.watches for notice in one.notices()]
-        warnings = [*told, *self.soundness.warnings(ledgers), *run_downs(self.slate)]
+        warnings = [*self.told, *told, *self.soundness.warnings(ledgers), *run_downs(self.slate)]
         warnings += drifts(model, loop.now)
         warnings += parted(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(one.ok for one in warnings)
@@ -369,7 +398,7 @@ class Run:
             reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
             find_envelope(self.slate), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds,
             self.processor, self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
-            find_cavities(self.slate), warnings,
+            find_cavities(self.slate), warnings, self.threads,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

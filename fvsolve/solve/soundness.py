@@ -8,7 +8,7 @@ from fvsolve.errors import Notice
 from fvsolve.limits.drives import drives
 from fvsolve.limits.step import step_limits
 from fvsolve.solve.halves import Halves
-from fvsolve.solve.swings import Swings
+from fvsolve.solve.unfelt import Unfelt
 
 MOST = 1e6  # times what drives a scene: what is beyond has grown by itself
 OPEN = 1e-8  # of the largest term of a ledger: what does not close to that is wrong
@@ -27,20 +27,20 @@ class Soundness:
         self.rates: dict[str, float] = {}
         self.predicted = step_limits(model)
         self.halves = Halves(slate)
-        self.swings = Swings(model)
+        self.unfelt = Unfelt(model)
         self.largest = MOST * drives(model)
         self.grown: Notice | None = None
 
     @property
     def close(self) -> bool:
         """Whether it has to look every few steps."""
-        return bool(self.predicted or self.swings.tanks)
+        return bool(self.predicted or self.unfelt.tanks)
 
     def look(self, t: float, y: np.ndarray) -> str:
         """At a state: keep the pace of basins; why the run has to stop, or nothing."""
         for basin in self.moving:
             self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.pace(y)[0])
-        if stops := self.swings.look(t, y):
+        if stops := self.unfelt.look(t, y):
             return stops
         ratio = np.abs(y) / self.largest
         if not np.any(ratio > 1.0):
@@ -61,7 +61,7 @@ class Soundness:
             found = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
         astray = self.halves.notice()
         found += [] if astray is None else [astray]
-        found += self.swings.notices()
+        found += self.unfelt.notices()
         found += [] if self.grown is None else [self.grown]
         return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]
 

@@ -65,6 +65,7 @@ class Summary:
     events: list[Event] = field(default_factory=list)
     cavities: list[Cavity] = field(default_factory=list)  # that the law `mixture` followed
     warnings: list[Notice] = field(default_factory=list)  # of what came about, beside those of the model
+    threads: int = 1
 
     @property
     def finished(self) -> bool:

@@ -103,7 +103,7 @@ def try_stages(
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
         row = row_of(coefficients, s, i)
-        combine(y, h, row, i, k, base)
+        combine(0, y.size, y, h, row, i, k, base)
         if row[i] == 0.0:
             rhs(t + c[i] * h, base, k[i], out, handle)
             memory[CALLS] += 1.0
@@ -141,8 +141,8 @@ def try_stages(
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
-    where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
+    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
@@ -166,7 +166,7 @@ def attempt(
         if work[MADE] == memory[STEPS]:
             return NEWTON_FAILED
         work[HAS] = 0.0
-    combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
+    combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:
         return 0.0
     if work[DAMPED] == memory[STEPS]:

@@ -5,7 +5,7 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.slots import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
-from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.step import BEGIN, STOP, combine, error_of_bands
 
 
 @njit
@@ -21,8 +21,8 @@ def quotient(f_new, f, y_new, y, scale):
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
-    where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
+    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
@@ -32,15 +32,19 @@ def attempt(
     c, last_is_new = nodes_of(coefficients, s), orders[FSAL] == 1.0
     for i in range(1, s):
         target = y[new] if last_is_new and i == s - 1 else y[3]
-        combine(y[now], h, row_of(coefficients, s, i), i, k, target)
+        for m in range(spans.shape[0]):
+            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, target)
         rhs(t + c[i] * h, target, k[i], out, handle)
         for m in range(supply.shape[1]):
             supply[i, m] = out[where + m]
     if not last_is_new:
-        combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
+        for m in range(spans.shape[0]):
+            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, weights_of(coefficients, s), s, k, y[new])
     memory[CALLS] += s - 1.0
     if orders[WATCH] != 0.0:
         memory[RADIUS] = quotient(k[s - 1], k[s - 2], y[new], y[3], scale)
     if orders[CONTROL] != TOLERANCE:
         return 0.0
-    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])
+    return error_of_bands(
+        join, handle, spans, sums, h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE]
+    )

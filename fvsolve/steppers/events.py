@@ -47,8 +47,8 @@ def nearness(g, g_new):
 
 @njit
 def locate(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients, shape, h, y, now, new, k,
-    supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new, e,
+    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, shape, spans, sums,
+    h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new, e,
 ):  # fmt: skip
     """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] belongs to it.
 
@@ -68,8 +68,8 @@ def locate(
         if done:
             guess = high
         e = attempt(
-            rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, guess, y, now, new, k,
-            supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, guess,
+            y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
         )  # fmt: skip
         if e == NEWTON_FAILED:
             break

@@ -293,8 +293,8 @@ def unseen(rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale,
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
-    where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
+    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
@@ -343,7 +343,7 @@ def attempt(
                 return NEWTON_FAILED
             break
         work[HAS] = 0.0
-    combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
+    combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:
         return 0.0
     collocates = error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0

@@ -6,13 +6,13 @@ model (functions of declared type).
 
 from math import isfinite
 
-from fvsolve.jit import njit, once
+from fvsolve.jit import COMPILING, njit
 from fvsolve.steppers.coefficients import error_of, row_of, weights_of
 from fvsolve.steppers.control import closing_step, grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
 from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.rows import emit, next_due
-from fvsolve.steppers.signatures import function_types
+from fvsolve.steppers.signatures import ATTEMPT, compiled_as
 from fvsolve.steppers.slots import (
     BAD_STATUS,
     BAD_VALUE,
@@ -67,7 +67,22 @@ from fvsolve.steppers.slots import (
     WHERE,
     T,
 )
-from fvsolve.steppers.step import add_stored, all_finite, copy
+from fvsolve.steppers.step import BEGIN, STOP, add_stored, all_finite, copy
+
+if COMPILING:
+    from fvsolve.steppers.signatures import (
+        attempt_at,
+        events_at,
+        factor_at,
+        factor_complex_at,
+        join_at,
+        leap_at,
+        observe_at,
+        record_at,
+        rhs_at,
+        solve_at,
+        solve_complex_at,
+    )
 
 
 @njit(forceinline=True)
@@ -94,15 +109,18 @@ def bearable(e, passing):
 
 @njit
 def march(
-    attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, handle,
-    coefficients, shape, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row,
-    values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
+    attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, join, handle,
+    coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale,
+    out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store,
+    store_complex,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
     rhs(t, y, dydt, out, handle) with an empty dydt computes `out` alone, which is all that a row wants;
     leap(t, h, y, y_new, out, handle, values), where orders[LEAPS] allows it, is a whole step to t of a method of one
     stage, with the `out` and the record of its end: taken wherever no row is due;
+    join(sums, spans, handle) : fills in what other bands of the state, which step it beside this one, have;
+    spans, sums : the states of this band, and room for a number of each row of all, see `step`;
     y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
     ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
@@ -125,14 +143,16 @@ def march(
                     arm(g, armed)
                     return SWITCHED
             if reuse:
-                copy(k[s - 1], k[0])
+                for m in range(spans.shape[0]):
+                    begin, end = spans[m, BEGIN], spans[m, STOP]
+                    copy(k[s - 1, begin:end], k[0, begin:end])
             else:
                 rhs(memory[T], y[now], k[0], out, handle)
                 memory[CALLS] += 1.0
             reuse = False
             flags[PHASE] = EMIT
             record(memory[T], y[now], out, handle, values)
-            if not all_finite(y[now]):
+            if not all_finite(join, handle, spans, sums, y[now]):
                 out[STATUS] = NOT_FINITE
         if flags[PHASE] <= EMIT:
             if out[STATUS] == NOT_FINITE or not isfinite(out[RATE]):
@@ -148,8 +168,8 @@ def march(
         if flags[PHASE] == EMIT:
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
-                    rhs, observe, handle, orders, memory, times, flags, memory[T] - memory[LAST], y[old], f_old,
-                    y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
+                    rhs, observe, handle, spans, orders, memory, times, flags, memory[T] - memory[LAST], y[old],
+                    f_old, y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -189,8 +209,9 @@ def march(
             if too_short(orders, memory, h) and (not last or failed == NEWTON_STUCK):
                 return failed
             e = attempt(
-                rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, memory[T], h, y, now,
-                new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+                rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums,
+                memory[T], h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store,
+                store_complex,
             )  # fmt: skip
             passing = rest <= 1e3 * shortest(orders, memory)
             if e != NEWTON_FAILED:
@@ -199,9 +220,9 @@ def march(
                     events(memory[T] + h, y[new], handle, g_new)
                     if fallen(g, g_new):
                         length, e = locate(
-                            attempt, rhs, factor, solve, factor_complex, solve_complex, events, handle, coefficients,
-                            shape, h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store,
-                            store_complex, g, g_new, e,
+                            attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle,
+                            coefficients, shape, spans, sums, h, y, now, new, k, supply, where, out, scale, orders,
+                            memory, work, vectors, store, store_complex, g, g_new, e,
                         )  # fmt: skip
                         if e != NEWTON_FAILED:
                             h, memory[STEP], memory[LEFT] = length, 0.0, 0.0
@@ -249,23 +270,54 @@ def march(
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
         if next_due(orders, memory, times) <= memory[T]:
-            copy(vectors[s - 1] if steep and work[KNOWN] == 1.0 else k[0], f_old)
+            slopes = vectors[s - 1] if steep and work[KNOWN] == 1.0 else k[0]
+            for m in range(spans.shape[0]):
+                begin, end = spans[m, BEGIN], spans[m, STOP]
+                copy(slopes[begin:end], f_old[begin:end])
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
 
 
-@once
-def compiled():
-    """The loop compiled against its declared types (cached on disk), or plain where JIT is off."""
-    if not hasattr(march, "compile"):
-        return march
-    from numba import types
-
-    i, v, w, ints = types.int64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
-    march.compile(
-        (*function_types(), ints, v, ints, w, v, v, v, ints, w, w, v, w, i, v, v, v, v, v, v, v, v, ints, v, v, w, ints,
-         w, v, w, v, types.complex128[::1])
+@njit
+def march_at(
+    calls, handle, coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where,
+    ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work,
+    vectors, store, store_complex,
+):  # fmt: skip
+    """`march` with the functions at these addresses, in its order."""
+    return march(
+        attempt_at(calls[0]), leap_at(calls[1]), observe_at(calls[2]), record_at(calls[3]), events_at(calls[4]),
+        rhs_at(calls[5]), factor_at(calls[6]), solve_at(calls[7]), factor_complex_at(calls[8]),
+        solve_complex_at(calls[9]), join_at(calls[10]), handle, coefficients, shape, spans, sums, dense, orders,
+        memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
+        stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
     )  # fmt: skip
-    march.disable_compile()
-    return march
+
+
+@njit
+def attempt_with(
+    calls, handle, coefficients, shape, spans, sums, t, h, y, now, new, k, supply, where, out, scale, orders, memory,
+    work, vectors, store, store_complex,
+):  # fmt: skip
+    """One step with the functions at these addresses: the method's, rhs, linear algebra, the joint."""
+    attempt = attempt_at(calls[0])
+    return attempt(
+        rhs_at(calls[1]), factor_at(calls[2]), solve_at(calls[3]), factor_complex_at(calls[4]),
+        solve_complex_at(calls[5]), join_at(calls[6]), handle, coefficients, shape, spans, sums, t, h, y, now, new, k,
+        supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    )  # fmt: skip
+
+
+def compiled():
+    """The loop as Python calls it: its functions as `addresses` gives them, then all else that `march` takes."""
+    if not COMPILING:
+        return lambda functions, *others: march(*functions, *others)
+    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvz")
+
+
+def compiled_attempt():
+    """One step as Python calls it, likewise."""
+    if not COMPILING:
+        return lambda functions, *others: functions[0](*functions[1:], *others)
+    return compiled_as(attempt_with, "h" + ATTEMPT)

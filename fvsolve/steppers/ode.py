@@ -10,14 +10,13 @@ from numbers import Real
 
 import numba
 import numpy as np
-from numba import objmode, types
+from numba import objmode
 
 from fvsolve.errors import FvsolveError
-from fvsolve.jit import once
+from fvsolve.jit import COMPILING, Declared, code_of, once
 from fvsolve.steppers import automatic, slots
-from fvsolve.steppers.march import compiled
 from fvsolve.steppers.methods import AUTO
-from fvsolve.steppers.signatures import compiled_as
+from fvsolve.steppers.signatures import EVENTS, LEAP, OBSERVE, RHS, kinds_of
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, Method, method_named
@@ -221,7 +220,7 @@ def in_place(f) -> bool:
 
 def _functions(f, t0, y0):
     """(leap, observe, record, events, rhs) around f, compiled where numba can."""
-    if not hasattr(compiled(), "overloads"):
+    if not COMPILING:
 
         def plain(t, y, dydt, out, handle):
             out[:] = (0.0, 0.0, -1.0, 0.0)
@@ -229,21 +228,21 @@ def _functions(f, t0, y0):
                 _python(t, y, dydt, int(handle[0]))
 
         return _no_leap, _row, _nothing, _no_events, plain
-    v, handle = types.float64[::1], types.int64[::1]
-    return *watchers(), compiled_as(numba.njit(_rhs(f, t0, y0)), (types.float64, v, v, v, handle))
+    return *watchers(), _taken(numba.njit(_rhs(f, t0, y0)), RHS)
+
+
+def _taken(function, letters: str) -> Declared:
+    """What numba is to compile for arguments of these kinds, as the loop takes it."""
+    kinds = kinds_of(letters)
+    function.compile(kinds)
+    return Declared(function, letters, code_of(function.overloads[kinds]))
 
 
 @once
 def watchers() -> tuple:
     """(leap, observe, record, events) of a system that has none of them but its states."""
-    v, handle = types.float64[::1], types.int64[::1]
-    functions = (
-        (_no_leap, (types.float64, types.float64, v, v, v, handle, v)),
-        (_row, (types.float64, v, v, handle, v)),
-        (_nothing, (types.float64, v, v, handle, v)),
-        (_no_events, (types.float64, v, handle, v)),
-    )
-    return tuple(compiled_as(numba.njit(function), signature) for function, signature in functions)
+    functions = (_no_leap, LEAP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
+    return tuple(_taken(numba.njit(function), letters) for function, letters in functions)
 
 
 def _rhs(f, t0, y0):

@@ -85,8 +85,8 @@ def book_stage(shape, nnz, i, gamma, late, row, d, supply, where, out, work):
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, handle, coefficients, shape, t, h, y, now, new, k, supply,
-    where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
+    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
@@ -122,14 +122,14 @@ def attempt(
                 out[where + m] = supply[0, m]
         else:
             f = vectors[s + RATE]
-            combine(y[now], h, row_of(coefficients, s, i), i, k, y[3])
+            combine(0, y[now].size, y[now], h, row_of(coefficients, s, i), i, k, y[3])
             rhs(t + c[i] * h, y[3], f, out, handle)
         late, u, row = beyond[s * s + i] * h, k[i], beyond[i * s : (i + 1) * s]
         if late != 0.0:
             for e in range(n):
                 d[e] = f[e] + late * slope[e]
             f = d
-        combine(f, 1.0, row, i, k, u)
+        combine(0, n, f, 1.0, row, i, k, u)
         solve(shape, store, u)
         if ledgers > 0:
             copy(u, d)
@@ -137,7 +137,7 @@ def attempt(
         for e in range(n):
             u[e] *= per
     memory[CALLS] += s - 2.0
-    combine(y[now], h, weights_of(coefficients, s), s, k, y[new])
+    combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
     if orders[CONTROL] != TOLERANCE:
         return 0.0
     return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])

@@ -15,7 +15,7 @@ from fvsolve.steppers.slots import (
     STOP_AT,
     T,
 )
-from fvsolve.steppers.step import HUGE, interpolate
+from fvsolve.steppers.step import BEGIN, HUGE, STOP, interpolate
 
 BASE, GAIN, LEAST, MOST = range(4)
 LITTLE = 1e-9  # of what there are shares of, too little to tell them by
@@ -75,7 +75,7 @@ def keep_within(at, by, y_old, y, out):
 
 @njit
 def emit(
-    rhs, observe, handle, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
+    rhs, observe, handle, spans, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
     within_at, within_by,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
@@ -88,7 +88,9 @@ def emit(
             return DONE
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
-        interpolate((due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
+        for m in range(spans.shape[0]):
+            begin, end = spans[m, BEGIN], spans[m, STOP]
+            interpolate(begin, end, (due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
         keep_within(within_at, within_by, y_old, y, y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:

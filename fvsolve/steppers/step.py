@@ -14,10 +14,17 @@ def copy(source, target):
         target[i] = source[i]
 
 
+# Columns of `spans`, int64[q, 4], the states that a band steps: from where to where, the number of the first sum, and
+# how many there are: errors are summed by rows, and these added in the order of their numbers, whatever the bands are.
+BEGIN, STOP, FIRST, SUMS = range(4)
+
+
 @njit
-def combine(y, h, weights, count, k, out):
-    """out = y + h sum of weights[j] k[j] over j < count; three terms a pass where there are so many."""
-    one, two, moved, base = -1, -1, False, y
+def combine(begin, end, y, h, weights, count, k, out):
+    """out = y + h sum of weights[j] k[j] over j < count, of [begin:end]; three terms a pass where there are so many."""
+    one, two, moved = -1, -1, False
+    y, out = y[begin:end], out[begin:end]
+    base = y
     for j in range(count):
         if weights[j] == 0.0:
             continue
@@ -26,16 +33,17 @@ def combine(y, h, weights, count, k, out):
         elif two < 0:
             two = j
         else:
-            c0, c1, c2, k0, k1, k2 = h * weights[one], h * weights[two], h * weights[j], k[one], k[two], k[j]
+            c0, c1, c2 = h * weights[one], h * weights[two], h * weights[j]
+            k0, k1, k2 = k[one, begin:end], k[two, begin:end], k[j, begin:end]
             for i in range(out.size):
                 out[i] = base[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
             base, moved, one, two = out, True, -1, -1
     if two >= 0:
-        c0, c1, k0, k1 = h * weights[one], h * weights[two], k[one], k[two]
+        c0, c1, k0, k1 = h * weights[one], h * weights[two], k[one, begin:end], k[two, begin:end]
         for i in range(out.size):
             out[i] = base[i] + (c0 * k0[i] + c1 * k1[i])
     elif one >= 0:
-        c0, k0 = h * weights[one], k[one]
+        c0, k0 = h * weights[one], k[one, begin:end]
         for i in range(out.size):
             out[i] = base[i] + c0 * k0[i]
     elif not moved:
@@ -49,20 +57,42 @@ def small(scale, y):
 
 
 @njit
-def error_norm(h, error, k, y, y_new, scale, tolerance):
-    """Root mean square of h sum e_j k_j over tolerance times `small` of the greater of y and y_new."""
+def squares(begin, end, h, error, k, y, y_new, scale, tolerance):
+    """Sum over [begin:end] of (h sum e_j k_j over tolerance times `small` of the greater of y and y_new)^2."""
     first, last = 0, error.size
     while last > 0 and error[last - 1] == 0.0:
         last -= 1
     while first < last and error[first] == 0.0:
         first += 1
     total = 0.0
-    for i in range(y.size):
+    for i in range(begin, end):
         e = 0.0
         for j in range(first, last):
             e += error[j] * k[j, i]
         w = h * e / (tolerance * small(scale[i], max(abs(y[i]), abs(y_new[i]))))
         total += w * w
+    return total
+
+
+@njit
+def error_norm(h, error, k, y, y_new, scale, tolerance):
+    """Root mean square of h sum e_j k_j over tolerance times `small` of the greater of y and y_new."""
+    return sqrt(squares(0, y.size, h, error, k, y, y_new, scale, tolerance) / max(y.size, 1))
+
+
+@njit
+def error_of_bands(join, handle, spans, sums, h, error, k, y, y_new, scale, tolerance):
+    """The same by rows, which bands tell each other; sums : room for these."""
+    for m in range(spans.shape[0]):
+        begin, many = spans[m, BEGIN], spans[m, SUMS]
+        long = (spans[m, STOP] - begin) // many
+        for r in range(many):
+            at = begin + r * long
+            sums[spans[m, FIRST] + r] = squares(at, at + long, h, error, k, y, y_new, scale, tolerance)
+    join(sums, spans, handle)
+    total = 0.0
+    for r in range(sums.size):
+        total += sums[r]
     return sqrt(total / max(y.size, 1))
 
 
@@ -76,37 +106,57 @@ def weight(theta, dense, j):
 
 
 @njit
-def interpolate(theta, h, y, f, y_new, f_new, k, dense, out):
-    """Dense output at t + theta h: the method's own polynomial, else the cubic through both ends."""
+def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, out):
+    """Dense output at t + theta h, of [begin:end]: the method's own polynomial, else the cubic through both ends."""
     if dense.shape[0] > 0:
         w = h * weight(theta, dense, 0)
-        for i in range(y.size):
+        for i in range(begin, end):
             out[i] = y[i] + w * f[i]
         j = 1
         while j < dense.shape[0]:
             if j + 1 < dense.shape[0]:
                 a, b, ka, kb = h * weight(theta, dense, j), h * weight(theta, dense, j + 1), k[j], k[j + 1]
-                for i in range(y.size):
+                for i in range(begin, end):
                     out[i] += a * ka[i] + b * kb[i]
             else:
                 w, ka = h * weight(theta, dense, j), k[j]
-                for i in range(y.size):
+                for i in range(begin, end):
                     out[i] += w * ka[i]
             j += 2
         return
     s, r = theta, 1.0 - theta
     h01, h10, h11 = s * s * (1.0 + 2.0 * r), h * s * r * r, -h * s * s * r
-    for i in range(y.size):  # by differences: what stands still does to the last bit
+    for i in range(begin, end):  # by differences: what stands still does to the last bit
         out[i] = y[i] + (h01 * (y_new[i] - y[i]) + (h10 * f[i] + h11 * f_new[i]))
 
 
 @njit(forceinline=True)
-def all_finite(y):
-    """False where any value is not finite or its square is not: counted in integers, which is vectorised."""
+def endless(begin, end, y):
+    """How many values of [begin:end] are not finite or have no finite square: in integers, which is vectorised."""
     bad = 0
-    for i in range(y.size):
+    for i in range(begin, end):
         bad += not abs(y[i]) < HUGE
-    return bad == 0
+    return bad
+
+
+@njit
+def all_finite(join, handle, spans, sums, y):
+    """Whether all values of all bands are, and their squares; sums : room for what bands tell each other.
+
+    A single sum is that of one band, of all.
+    """
+    if sums.size == 1:
+        return endless(0, y.size, y) == 0
+    for m in range(spans.shape[0]):
+        first = spans[m, FIRST]
+        for r in range(first, first + spans[m, SUMS]):
+            sums[r] = 0.0
+        sums[first] = endless(spans[m, BEGIN], spans[m, STOP], y)
+    join(sums, spans, handle)
+    bad = 0.0
+    for r in range(sums.size):
+        bad += sums[r]
+    return bad == 0.0
 
 
 @njit(forceinline=True)

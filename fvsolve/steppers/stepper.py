@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fvsolve.jit import argument, beside, once
+from fvsolve.jit import beside, once
 from fvsolve.steppers import slots
 from fvsolve.steppers.coefficients import coefficients
 from fvsolve.steppers.ledger import SUMS
-from fvsolve.steppers.march import compiled
-from fvsolve.steppers.signatures import compiled_step, no_algebra
+from fvsolve.steppers.march import compiled, compiled_attempt
+from fvsolve.steppers.signatures import addresses, compiled_step, no_algebra, no_joint
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import Method
 
@@ -37,6 +37,7 @@ class Stepper:
         self.g = self.g_new = self.none
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
         self.within = self.nobody, np.zeros((0, 4))
+        self.join, self.spans, self.sums = no_joint(), np.array([[0, n, 0, 1]]), np.zeros(1)
         self.use(method)
 
     def use(self, method: Method) -> None:
@@ -76,8 +77,8 @@ class Stepper:
         self.kept = slots.HEADER + structure.nnz
         self.store, self.store_complex = np.zeros(reals * size), np.zeros(n + pairs * size, dtype=complex)
         self.algebra = (
-            *arguments(structure.functions()),
-            *(arguments(structure.functions(complex=True)) if pairs else no_algebra()[2:]),
+            *structure.functions(),
+            *(structure.functions(complex=True) if pairs else no_algebra()[2:]),
         )
         newton.forget(self.work)
 
@@ -125,27 +126,22 @@ class Stepper:
         self.memory[slots.STEPS] += 1.0
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.supply[0] = self.out[where : where + self.supply.shape[1]]
-        error = self.attempt(
-            rhs, *self.algebra, handle, self.coefficients, self.shape, t, h, self.y, 0, 1, self.k, self.supply, where,
-            self.out, self.scale, self.orders, self.memory, self.work, self.vectors, self.store, self.store_complex,
+        error = compiled_attempt()(
+            addresses((self.attempt, rhs, *self.algebra, self.join)), handle, self.coefficients, self.shape,
+            self.spans, self.sums, t, h, self.y, 0, 1, self.k, self.supply, where, self.out, self.scale, self.orders,
+            self.memory, self.work, self.vectors, self.store, self.store_complex,
         )  # fmt: skip
         return self.y[1].copy() if error != slots.NEWTON_FAILED else np.full(y.size, np.nan)
 
     def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
         """March on; returns one of the codes of `steppers.orders`."""
         return self.march(
-            self.attempt, leap, observe, record, events, rhs, *self.algebra, handle, self.coefficients, self.shape,
-            self.dense, self.orders, self.memory, self.times, self.flags, self.y, self.k, self.f_old, self.supply,
-            where, self.ledger, self.scale, self.out, self.out_row, self.values, self.g, self.g_new, armed,
-            self.stored, self.carry, self.y_out, self.rows, *self.within, self.work, self.vectors,
-            self.store, self.store_complex,
+            addresses((self.attempt, leap, observe, record, events, rhs, *self.algebra, self.join)), handle,
+            self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
+            self.flags, self.y, self.k, self.f_old, self.supply, where, self.ledger, self.scale, self.out,
+            self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
+            *self.within, self.work, self.vectors, self.store, self.store_complex,
         )  # fmt: skip
-
-
-@once
-def arguments(functions: tuple) -> tuple:
-    """Compiled functions as the loop takes them."""
-    return tuple(argument(function) for function in functions)
 
 
 # Kinds of methods: the file of their steps, and what they are to the loop.
@@ -168,5 +164,5 @@ def attempt_of(kind: str, algebra: str = ""):
         return compiled_step(importlib.import_module(room).attempt)
     shifts = {False, kind == "full"}
     code = f"from fvsolve.steppers.structure import functions; [functions({algebra!r}, of) for of in {shifts}]"
-    with beside(code, f"linear_{algebra}.factor-*.nbi"):
+    with beside(code, "factor"):
         return compiled_step(importlib.import_module(room).attempt)

@@ -15,6 +15,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.jit import njit, once
+from fvsolve.steppers.signatures import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COMPLEX, compiled_as
 
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
@@ -135,16 +136,5 @@ def kind_module(kind: str):
 def functions(kind: str, complex: bool) -> tuple:
     """(factor, solve) of a kind, each compiled for one signature."""
     module = kind_module(kind)
-    factor, solve = njit(module.factor), njit(module.solve)
-    if hasattr(factor, "compile"):
-        from numba import types
-
-        shape, values = types.int64[::1], types.float64[::1]
-        number = types.complex128 if complex else types.float64
-        for function, signature in (
-            (factor, (shape, values, number, number[::1])),
-            (solve, (shape, number[::1], number[::1])),
-        ):
-            function.compile(signature)
-            function.disable_compile()
-    return factor, solve
+    letters = (FACTOR_COMPLEX, SOLVE_COMPLEX) if complex else (FACTOR, SOLVE)
+    return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((module.factor, module.solve), letters, strict=True))

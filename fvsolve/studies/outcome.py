@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
+from fvsolve.model.delay import followed
 from fvsolve.run import model_of
 
 
@@ -127,11 +128,19 @@ def _once(model, y, run) -> Outcome:
 Progress = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
 
 
+def without_lines(case, study: str) -> None:
+    """Raises FvsolveError where pipes are delay lines, of whose past a study knows nothing yet."""
+    names = [name for name, one in followed(case).items() if one.line == "delay"]
+    if names:
+        raise FvsolveError(f"{study} does not know delay lines yet; {listing(names)} would be: say numerics.line = "
+                           '"cells", and line of no pipe')  # fmt: skip
+
+
 def without_basins(case, study: str, riding: bool = False) -> None:
     """Raises FvsolveError where a case has basins, whose cells a study does not refine or replace yet.
 
-    riding : whether those that ride on bodies will do
+    riding : whether those that ride on bodies with a free surface will do
     """
-    names = [name for name in case.meshes if not (riding and case.nodes[name].on)]
+    names = [name for name in case.meshes if not (riding and case.nodes[name].on and case.nodes[name].own.sloshes)]
     if names:
         raise FvsolveError(f"{study} does not know basins yet; the case has {listing(names)}")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 
 from fvsolve.doors import PATH, Kind
+from fvsolve.errors import RunError
 from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import plain
@@ -28,45 +30,78 @@ class Points:
         self.found: dict[str, dict] = {}
         self.reused = 0
         self.lock = None if folder is None else locked(Path(folder), "a study")
+        self.file = None
         if self.path is not None and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8", errors="replace").splitlines():
-                try:
-                    point = json.loads(line)
-                    self.found[point["key"]] = point["found"]
-                except (ValueError, KeyError, TypeError):  # the last line of a study that was killed
-                    continue
+            self._read()
+
+    def _read(self) -> None:
+        data = self.path.read_bytes()
+        whole = data.rfind(b"\n") + 1  # behind it is the last line of a study that was killed, or had no room left
+        for line in data[:whole].decode("utf-8", errors="replace").splitlines():
+            try:
+                point = json.loads(line)
+                self.found[point["key"]] = point["found"]
+            except (ValueError, KeyError, TypeError):
+                continue
+        if whole < len(data):
+            with writing(self.path), open(self.path, "r+b") as file:
+                file.truncate(whole)
 
     def __enter__(self) -> Points:
         return self
 
     def __exit__(self, *_) -> None:
         """Let go of the folder."""
+        if self.file is not None:
+            self.file.close()
         if self.lock is not None:
             let_go(self.lock)
 
     def get(self, case, extra: dict, make: Callable[[], dict]) -> dict:
         """What was found for a case and settings, made now where it is new; None stands for what is not finite."""
         known = self.find(case, extra)
-        if known is not None:
-            return known
-        key, made = key_of(case, extra), plain(make())
-        self.found[key] = made
-        if self.path is not None:
-            with open(self.path, "a", encoding="utf-8") as file:
-                file.write(json.dumps({"key": key, "of": plain(extra), "found": made}) + "\n")
-        return made
+        return self.keep(key_of(case, extra), extra, make()) if known is None else known
 
     def find(self, case, extra: dict) -> dict | None:
         """What was found for a case and settings before, or None."""
-        known = self.found.get(key_of(case, extra))
+        return self.known(key_of(case, extra))
+
+    def known(self, key: str) -> dict | None:
+        """What was found before under a key, or None."""
+        known = self.found.get(key)
         self.reused += known is not None
         return known
+
+    def keep(self, key: str, of: Any, made: dict) -> dict:
+        """What was found under a key, kept from now on; RunError where the disk does not take it."""
+        made = self.found[key] = plain(made)
+        if self.path is not None:
+            line = json.dumps({"key": key, "of": plain(of), "found": made}) + "\n"
+            with writing(self.path):
+                self.file = self.file or open(self.path, "ab", buffering=0)
+                if self.file.write(line.encode()) < len(line.encode()):
+                    raise OSError(28, "No space left on device")
+        return made
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Where a file is written: what the system has against it is a RunError."""
+    try:
+        yield
+    except OSError as error:
+        raise RunError(f"{path}: cannot be written: {error.strerror or error}; what is finished is kept, and the same "
+                       "command goes on once it can") from None  # fmt: skip
 
 
 def key_of(case, extra: dict) -> str:
     """A name for a case with settings: what it says, what it computes with, and the settings."""
-    who = identity(case) | {"resolved": case.resolved(), "extra": plain(extra)}
-    return hashlib.sha256(json.dumps(who, sort_keys=True).encode()).hexdigest()[:24]
+    return hashed(identity(case) | {"resolved": case.table(), "extra": plain(extra)})
+
+
+def hashed(who: dict) -> str:
+    """A name for all that a point depends on."""
+    return hashlib.sha256(json.dumps(who, sort_keys=True, default=str).encode()).hexdigest()[:24]
 
 
 OUT = Kind(lambda given: PATH.holds(given) or isinstance(given, Points), PATH.wanted)

@@ -6,6 +6,7 @@ A bare number is SI. Text is a number and a unit, `"304.8 mm"`. Spellings outsid
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import re
 from typing import Any
@@ -159,6 +160,7 @@ def _spellings(dimension: str) -> list[str]:
     return [name for name in names if DIMENSIONS[dimension].gauge or not UNITS[name].gauge]
 
 
+@functools.lru_cache(maxsize=1024)
 def _plain(spelling: str) -> str:
     """The spelling as the table has it: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
     text = spelling.strip().replace("**", "").replace("^", "")

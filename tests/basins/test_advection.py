@@ -278,7 +278,7 @@ def test_a_step_of_euler_as_long_as_diffusion_allows_keeps_bounds():
         case, s = random_case("upwind", seed, through=True, deep=True)
         rate = np.zeros_like(s)
         flows = 1.0, case.flow_x, case.flow_y, case.depth, case.outside
-        size = case.nx, case.ny, case.kx, case.ky
+        size = case.nx, case.ny, 0, case.ny, case.kx, case.ky
         most = diffusion.grid_diffusion(*size, 0.01, *flows, s, case.other, rate)
         low, high = surroundings(case, s / case.depth)
         after = (s + rate / most) / case.depth
@@ -288,7 +288,7 @@ def test_a_step_of_euler_as_long_as_diffusion_allows_keeps_bounds():
 def test_the_rates_that_set_the_step_are_those_of_plain_grids():
     case = carried("upwind", 8, {"expression": "constant", "u": 3.0, "v": -2.0}, size=(4.0, 2.0))
     assert case.fastest == approx(3.0 / 0.5 + 2.0 / 0.25)
-    size, s = (case.nx, case.ny, case.kx, case.ky), np.zeros(64)
+    size, s = (case.nx, case.ny, 0, case.ny, case.kx, case.ky), np.zeros(64)
     flows = 1.0, 0.0 * case.flow_x, 0.0 * case.flow_y, NONE, case.outside
     most = diffusion.grid_diffusion(*size, 0.1, *flows, s, case.other, s.copy())
     assert most == approx(2.0 * 0.1 * (1.0 / 0.5**2 + 1.0 / 0.25**2))

@@ -61,7 +61,8 @@ class Box:
         flat = np.ascontiguousarray(state).reshape(3, -1)
         codes = SCHEMES[self.scheme], LIMITERS[self.limiter]
         still = (None, None) if self.log else (None,)
-        rate = kernel.grid_rates(*given, *codes, self.nx, self.ny, kx, ky, reflect, *flat, WALLS, work, *found, *still)
+        size = self.nx, self.ny, 0, self.ny
+        rate = kernel.grid_rates(*given, *codes, *size, kx, ky, reflect, *flat, WALLS, work, *found, *still)
         return found.reshape(state.shape), rate
 
     def run(self, state: np.ndarray, end: float, courant: float = 0.8) -> np.ndarray:

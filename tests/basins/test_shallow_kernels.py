@@ -41,7 +41,7 @@ class Water:
     def rates(self, y, out):
         a, b = y.reshape(3, -1), out.reshape(3, -1)
         rate = grid_rates(
-            G, self.scheme, self.limiter, self.nx, self.ny, self.kx, self.ky, self.reflect, self.plan,
+            G, self.scheme, self.limiter, self.nx, self.ny, 0, self.ny, self.kx, self.ky, self.reflect, self.plan,
             a[0], a[1], a[2], self.flow_x, self.flow_y, NONE, self.work, b[0], b[1], b[2], None,
         )  # fmt: skip
         if self.friction is not None:

@@ -77,9 +77,9 @@ def truth(path, hour):
     return found.node["head"].loc[at].to_dict(), found.link["flowrate"].loc[at].to_dict()
 
 
-def differences(path, hour, where):
+def differences(path, hour, where, shortest=0.0):
     """Greatest differences of heads [m] and of flows (to the largest flow), the case as checked, the names."""
-    made = import_network(path, hour)
+    made = import_network(path, hour, shortest=shortest)
     case = where / "net.toml"
     case.write_text(made.text, encoding="utf-8")
     model = build(load(case))
@@ -136,9 +136,14 @@ def still(made):
     return case
 
 
+LINES = [("auto", 0.0), ("cells", 3.0)]  # numerics.line, and the shortest pipe that steps of cells can follow [m]
+
+
+@pytest.mark.parametrize("line, shortest", LINES)
 @pytest.mark.parametrize("name", ["Net2", "Net3"])
-def test_without_an_event_nothing_moves_by_one_bit_and_a_closure_moves_it(name):
-    case = still(import_network(SHIPPED / f"{name}.inp"))
+def test_without_an_event_nothing_moves_by_one_bit_and_a_closure_moves_it(name, line, shortest):
+    case = still(import_network(SHIPPED / f"{name}.inp", shortest=shortest))
+    case["numerics"]["line"] = line
     drawn = {node: float(part["demand"].split()[0]) for node, part in case["nodes"].items() if "demand" in part}
     most = max(drawn, key=drawn.get)
     case["nodes"][most]["demand"] = {"start": 20.0, "duration": 0.5, "value": [drawn[most] * 1e-3, 0.0]}
@@ -151,8 +156,10 @@ def test_without_an_event_nothing_moves_by_one_bit_and_a_closure_moves_it(name):
     assert np.ptp(result[f"nodes.{most}.head"]) > 1.0
 
 
-def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_after():
-    case = still(import_network(SHIPPED / "Net3.inp"))
+@pytest.mark.parametrize("line, shortest", LINES)
+def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_after(line, shortest):
+    case = still(import_network(SHIPPED / "Net3.inp", shortest=shortest))
+    case["numerics"]["line"] = line
     case["links"]["335"] |= {"rated_speed": "890 rpm", "inertia": "47 kg m2", "trip": 20.0}
     case["output"] = {"every": 0.25, "fields": 0, "probes": ["nodes.61.head", "nodes.123.head", "nodes.15.head"]}
     set = {"numerics.end": 34.0, "numerics.cell_time": 0.04, "numerics.scheme": "muscl", "numerics.method": "ssp-rk2"}
@@ -165,15 +172,39 @@ def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_
     assert np.ptp(far[t <= arrival - 0.5]) < 1e-2 and far[0] - far[-1] > 5.0
 
 
-def test_a_pipe_too_short_for_a_step_is_lengthened_with_its_loss_and_said_so(tmp_path):
+def test_a_pipe_shorter_than_asked_for_is_lengthened_with_its_loss_and_said_so(tmp_path):
     path = tmp_path / "in" / "short.inp"
     path.parent.mkdir()
     for formula, roughness in (("H-W", 110), ("C-M", 0.011)):
         path.write_text(SMALL.format(r=roughness, formula=formula).replace("p3 b c 350", "p3 b c 0.5"))
-        lost, off, made = differences(path, 0, tmp_path)
+        lost, off, made = differences(path, 0, tmp_path, shortest=3.0)
         assert lost < 0.05
         assert tomllib.loads(made.text)["links"]["p3"]["length"] == "3 m"
         assert ["p3"] in [names for what, names in made.notes if what.startswith("3 m long here")]
+
+
+@pytest.mark.parametrize("name", ["Net3", "ky4"])
+def test_every_pipe_is_as_long_as_in_epanet_and_those_shorter_than_a_cell_are_said(name):
+    made = import_network(SHIPPED / f"{name}.inp")
+    network, case = wntr.network.WaterNetworkModel(str(SHIPPED / f"{name}.inp")), load(tomllib.loads(made.text))
+    lengths = {pipe: link.length for pipe, link in network.pipes()}
+    found = {pipe: case.links[made.links[pipe]].length for pipe in lengths}
+    assert found == {pipe: pytest.approx(length, rel=1e-9) for pipe, length in lengths.items()}
+    assert made.short == [pipe for pipe in sorted(lengths, key=lengths.get) if lengths[pipe] < 12.0] != []
+    assert f"{len(made.short)} pipes are shorter than a cell" in made.text and made.links[made.short[0]] in made.text
+
+
+def test_short_pipes_set_no_step_and_keep_their_own_loss(tmp_path):
+    path = tmp_path / "in" / "short.inp"
+    path.parent.mkdir()
+    path.write_text(SMALL.format(r=110, formula="H-W").replace("p3 b c 350", "p3 b c 0.5"))
+    lost, off, made = differences(path, 0, tmp_path)
+    assert lost < 1e-3 and off < 1e-3 and made.short == ["p3"]
+    steps = {
+        line: build(load(tomllib.loads(made.text), {"numerics.line": line})).checks["step"]
+        for line in ("auto", "cells")
+    }
+    assert steps["auto"] > 10 * steps["cells"]
 
 
 @pytest.mark.parametrize("units, exponent", [("LPS", 0.5), ("LPS", 0.9), ("GPM", 0.9)])
@@ -382,6 +413,14 @@ def test_the_command_writes_a_case_that_checks_and_never_writes_over_one(tmp_pat
     code, out, err = fvs("new", "town", to, "--from", SHIPPED / "Net2.inp", "--hour", "7", "--wave-speed", "1000 m/s")
     assert code == 0 and str(to) in out and (tmp_path / "schema.json").exists()
     assert load(to).links["1"].wave_speed == 1000.0
+    code, _, err = fvs("new", "long", tmp_path / "long.toml", "--from", SHIPPED / "Net2.inp", "--shortest", "100 m")
+    assert (
+        code == 0
+        and "100 m long here" in err
+        and min(p.length for p in load(tmp_path / "long.toml").links.values()) == 100
+    )
+    code, _, err = fvs("new", "none", tmp_path / "none.toml", "--from", SHIPPED / "Net2.inp", "--shortest", "0 m")
+    assert code == 2 and "--shortest: 0 m is not positive" in err
     code, out, _ = fvs("check", to)
     assert code == 0 and "step" in out
     code, _, err = fvs("new", "town", to, "--from", SHIPPED / "Net2.inp")

@@ -11,6 +11,7 @@ from truth.folders import CASES
 from truth.scenes import WATER, chamber, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
+from fvsolve.jit import COMPILING
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import PHASES
 from fvsolve.model import Slate
@@ -64,7 +65,7 @@ def line(**numerics) -> dict:
 @pytest.fixture
 def compiling():
     """What is compiled can only be told where something is."""
-    if not hasattr(Loop(fvsolve.build(fvsolve.load(tanks()))).stepper.march, "py_func"):
+    if not COMPILING:
         pytest.skip("JIT is off")
 
 

@@ -1,14 +1,19 @@
 """The package's njit: an edit in another file is noticed, and a second process starts from the cache."""
 
+import hashlib
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from fvsolve import jit
+from fvsolve import jit, store
+from fvsolve.steppers.signatures import no_algebra
 
 LAW = """from fvsolve.jit import njit
 
@@ -27,13 +32,10 @@ def loop(n):
     return total
 """
 PROBE = """
-import numba, sys
-before = numba.config.CACHE_DIR
+import sys
 from fvsolve.steppers.loop import loop
 value = loop(4)
-stats = loop.stats
-hits, misses = sum(stats.cache_hits.values()), sum(stats.cache_misses.values())
-print(value, hits, misses, before == numba.config.CACHE_DIR)
+print(value, 'numba' in sys.modules, 'numba' in sys.modules and sum(loop.numba.stats.cache_misses.values()))
 """
 
 
@@ -44,15 +46,17 @@ def package(tmp_path):
     for room in (folder, folder / "kernels", folder / "steppers"):
         room.mkdir()
         (room / "__init__.py").touch()
-    shutil.copy(jit.__file__, folder)
+    for module in (jit, store):
+        shutil.copy(module.__file__, folder)
     (folder / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
     (folder / "steppers" / "loop.py").write_text(LOOP)
     return folder
 
 
-def python(package: Path, code: str, **environment: str) -> list[str]:
-    """Words printed by `code` in a new process with this copy and a cache of its own; it warns of nothing."""
+def python(package: Path, code: str, told: str = "", **environment: str) -> list[str]:
+    """Words printed by `code` in a new process with this copy and its own cache; it warns of nothing but `told`."""
     stated = {"FVSOLVE_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    stated["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache sees no edit within a second
     inherited = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -61,15 +65,19 @@ def python(package: Path, code: str, **environment: str) -> list[str]:
         capture_output=True,
         text=True,
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0 and (re.search(told, done.stderr) if told else done.stderr == ""), done.stderr
     return done.stdout.split()
 
 
-def test_second_process_hits_the_cache_and_an_edit_elsewhere_is_noticed(package):
-    assert python(package, PROBE) == ["12.0", "0", "1", "True"]
-    assert python(package, PROBE) == ["12.0", "1", "0", "True"]
+def test_second_process_needs_no_numba_and_an_edit_elsewhere_is_noticed(package):
+    assert python(package, PROBE) == ["12.0", "True", "1"]
+    assert python(package, PROBE) == ["12.0", "False", "False"]
     (package / "kernels" / "law.py").write_text(LAW.format(factor=3.0))
-    assert python(package, PROBE) == ["18.0", "0", "1", "True"]
+    assert python(package, PROBE) == ["18.0", "True", "1"]
+    for kept in (package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}"):
+        kept.unlink()
+    assert python(package, PROBE) == ["18.0", "True", "0"]  # numba's own cache
+    assert python(package, PROBE) == ["18.0", "False", "False"]
     assert not list(package.rglob("*.nb?")), "compiled code belongs in the cache folder"
 
 
@@ -77,16 +85,79 @@ def test_python_and_compiled_code_may_call_the_same_function(package):
     """What compiled code alone has called has no door to Python, and gets one when Python calls it."""
     code = """
 from fvsolve.steppers.loop import law, loop
-print(loop(4), len(law.overloads), len(law.within.overloads), law(1.0), len(law.overloads))
+print(loop(4), len(law.numba.overloads), len(law.numba.within.overloads), law(1.0), len(law.numba.overloads))
 """
     assert python(package, code) == ["12.0", "0", "1", "2.0", "1"]
-    assert python(package, code) == ["12.0", "0", "0", "2.0", "1"]
+    assert python(package, code) == ["12.0", "0", "0", "2.0", "0"]
+
+
+def forged(package: Path, **changes) -> Path:
+    """The one file of the store, its head changed, and whole."""
+    (path,) = (package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}")
+    head, _, code = path.read_bytes()[store.DIGEST :].partition(b"\n")
+    data = json.dumps(json.loads(head) | changes).encode() + b"\n" + code
+    path.write_bytes(hashlib.sha256(data).digest() + data)
+    return path
+
+
+def test_a_store_serves_wherever_it_is_copied_to(package, tmp_path):
+    """Numba's own cache goes by time stamps of sources, so that a copy is worth nothing."""
+    assert python(package, PROBE) == ["12.0", "True", "1"]
+    elsewhere = tmp_path / "elsewhere"
+    shutil.copytree(package, elsewhere / "fvsolve", copy_function=shutil.copyfile)
+    shutil.copytree(tmp_path / "cache", elsewhere / "cache", ignore=shutil.ignore_patterns("*.nb?"))
+    assert python(elsewhere / "fvsolve", PROBE) == ["12.0", "False", "False"]
+
+
+def test_settings_that_change_code_have_a_store_of_their_own(package):
+    assert python(package, PROBE) == ["12.0", "True", "1"]
+    for _ in range(2):
+        told = python(package, PROBE, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
+        assert told[0] == "12.0"
+    assert told[1] == "False" and python(package, PROBE, NUMBA_DEBUG_JIT="0") == ["12.0", "False", "False"]
+    said = "from fvsolve import jit; print(jit.elsewhere())"
+    other, own = (python(package, said, **settings) for settings in ({"NUMBA_OPT": "1"}, {}))
+    assert " ".join(other).count(jit.store.target()["processor"]) == 3, "two stores and this machine's"
+    assert (
+        own[own.index("is") + 1] == python(package, "from fvsolve.jit import store; print(store.target()['name'])")[0]
+    )
+
+
+def test_code_of_other_sources_is_named(package):
+    python(package, PROBE)
+    old = python(package, "from fvsolve import jit; print(jit.source_hash())")[0]
+    (package / "units.py").write_text("NEW = 1\n")
+    told = " ".join(python(package, "from fvsolve import jit; print(jit.elsewhere())"))
+    assert f"holds code of other sources, {old}, and these are " in told
+
+
+@pytest.mark.parametrize(
+    "changes, named",
+    {
+        "another machine": ({"target": "znver9-01234567"}, r"holds code for znver9-01234567, and this machine is \S+"),
+        "a helper that is gone": (
+            {"wanted": ["numba_gone"]},
+            r"code of fvsolve.steppers.loop.loop cannot be loaded: numba \S+ has no numba_gone",
+        ),
+        "a helper not declared": (
+            {"wanted": []},
+            r"not found: \[ numba_\w+[^$]*code of fvsolve.steppers.loop.loop cannot be loaded: it calls",
+        ),
+    }.values(),
+    ids=["another machine", "a helper that is gone", "a helper not declared"],
+)
+def test_what_cannot_be_called_is_refused_by_name_and_compiled_again(package, changes, named):
+    python(package, PROBE)
+    forged(package, **changes)
+    said = python(package, PROBE, told=named)
+    assert said[:2] == ["12.0", "True"]
+    assert python(package, PROBE) == ["12.0", "False", "False"]
 
 
 def test_old_generations_are_deleted_and_the_newest_few_kept(package):
     for generation in range(6):
         (package / "units.py").write_text(f"GENERATION = {generation}\n")
-        python(package, "from fvsolve import jit; jit._code_folder()")
+        python(package, "from fvsolve import jit; jit.code_folder()")
     assert len(list((package.parent / "cache" / "code").iterdir())) == jit.KEPT + 1
 
 
@@ -96,7 +167,7 @@ def test_without_jit_the_plain_function_comes_back_and_numba_stays_away(package)
 
 
 def test_a_function_without_a_file_compiles_without_a_cache(package):
-    code = "from fvsolve.jit import njit\n@njit\ndef f(x): return x + 1\nprint(f(1), type(f._cache).__name__)"
+    code = "from fvsolve.jit import njit\n@njit\ndef f(x): return x + 1\nprint(f(1), type(f.numba._cache).__name__)"
     assert python(package, code) == ["2", "NullCache"]
 
 
@@ -114,7 +185,7 @@ def test_first_class_functions_do_not_warn(package):
 from fvsolve.jit import njit
 one, two = njit(lambda x: x + 1.0), njit(lambda x: x + 2.0)
 for function in (one, two):
-    function.compile("float64(float64)")
+    function.numba.compile("float64(float64)")
 
 @njit
 def either(first, x):
@@ -146,3 +217,17 @@ def test_what_declares_or_lowers_compiles_nothing():
     assert Path("basins/liquid/grid.py") in hashed and Path("basins/carried.py") in hashed
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
     assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")
+
+
+def test_a_compiled_function_of_declared_arguments_takes_no_others():
+    """Machine code looks at no type: integers among numbers are turned into these, arrays of another kind refused."""
+    if not jit.COMPILING:
+        pytest.skip("JIT is off")
+    factor, solve, *_ = no_algebra()
+    whole, numbers = np.zeros(3, dtype=np.int64), np.zeros(3)
+    assert factor(whole, numbers, 1, numbers) == 0 and solve(whole, numbers, numbers) is None
+    frozen = numbers.copy()
+    frozen.flags.writeable = False
+    for wrong in (whole, numbers.astype(np.float32), numbers[::2], frozen, np.zeros((3, 1)), [0.0], None):
+        with pytest.raises(TypeError):
+            solve(whole, wrong, numbers)

@@ -12,11 +12,11 @@ from truth.random_networks import random_network
 from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
-from fvsolve.jit import njit
+from fvsolve.jit import COMPILING, njit
 from fvsolve.model import Slate
 from fvsolve.model.dependence import sparsity
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.signatures import function_types
+from fvsolve.steppers.signatures import addresses, compiled_as
 from fvsolve.steppers.structure import KINDS, Structure
 
 CASES = sorted(folders.CASES.glob("*.toml"))
@@ -114,19 +114,17 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
 
 @functools.cache
 def compiled_differences():
-    """The function as a stepper compiles it: against the declared type of a rhs, not against each rhs anew.
+    """The function as a stepper compiles it: against the declared type of a rhs, which comes by its address."""
+    if not COMPILING:
+        return lambda calls, *others: differences(*calls, *others)
+    from fvsolve.steppers.signatures import rhs_at
 
-    (Called with a jitted rhs itself, it would be cached by what that is made of, and loading that takes minutes.)
-    """
-    if not hasattr(differences, "compile"):
-        return differences
-    from numba import types
+    @njit
+    def differences_at(calls, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian):
+        rhs = rhs_at(calls[0])
+        return differences(rhs, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian)
 
-    found = njit(differences.py_func)
-    i, v, f, shape = types.int64, types.float64[::1], types.float64, types.int64[::1]
-    found.compile((function_types()[5], shape, shape, i, f, v, v, v, v, v, v, v, v))
-    found.disable_compile()
-    return found
+    return compiled_as(differences_at, "hhhitvvvvvvvv")
 
 
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
@@ -135,7 +133,7 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     slate = Slate(model)
     f, out = slate.evaluate(t, y, np.inf)
     supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
-    given = (model.functions.rhs, slate.handle, structure.shape, at, t, y, f, supply, model.scale.copy())
+    given = (addresses((model.functions.rhs,)), slate.handle, structure.shape, at, t, y, f, supply, model.scale.copy())
     calls = compiled_differences()(*given, np.zeros(n), np.zeros(n), model.new_out(), jacobian)
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)

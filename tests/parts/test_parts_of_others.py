@@ -154,9 +154,7 @@ def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
         return told["extremes"]["upper.level"]["least"]
 
     def compiled() -> int:
-        told = command(home, "run", "mill.toml", "--force", NUMBA_DEBUG_CACHE="1")
-        assert told.count("index loaded") > 5
-        return told.count("saved to")
+        return command(home, "run", "mill.toml", "--force", NUMBA_DEBUG_CACHE="1").count("saved to")
 
     first, law = least(), home / "mill" / "runner" / "law.py"
     assert compiled() == 0

@@ -229,8 +229,10 @@ def rocking(method: str = "rk4", sloshing: str = "cells", **more) -> dict:
     links = {side: {"type": "spring", "from": f"world.{side}", "to": f"hull.{side}", "stiffness": 900.0, "preload": 0.0}
              for side in ("right", "left")}  # fmt: skip
     probes = seen("hull.right") + [f"hull.w{axis}" for axis in "xyz"]
+    if sloshing != "frozen":
+        probes += ["b.depth@0.2,0.3"]
     if sloshing == "cells":
-        probes += ["b.depth@0.2,0.3", "b.u@0.7,0.4", "b.v@0.7,0.4"]
+        probes += ["b.u@0.7,0.4", "b.v@0.7,0.4"]
     return scene(nodes, links, END, stepped(method, 0.01), probes, 1 / 32) | more
 
 
@@ -290,6 +292,7 @@ SCENES: dict[str, Callable[..., dict]] = {
     "full table free": lambda method="rk4": full(method, "table", free=True),
     "rocking": rocking,
     "frozen": lambda method="rk4": rocking(method, "frozen"),
+    "modes": lambda method="rk4": rocking(method, "modes"),
     "u-tube free": u_tube,
     "u-tube driven": lambda method="rk4": u_tube(method, free=False),
     "hose linear": hose,

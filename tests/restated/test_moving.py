@@ -28,7 +28,7 @@ pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers tha
 ROUND, BY_DIFFERENCES = 1e-9, 1e-4
 EACH = ["rk4", "gauss-4", "rodas-4"]
 IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop", "carried", "rocking", "frozen",
-            "full", "full log", "full free", "full table free", "u-tube free", "u-tube driven"]  # fmt: skip
+            "modes", "full", "full log", "full free", "full table free", "u-tube free", "u-tube driven"]  # fmt: skip
 SWINGS = (".rate", ".angle", ".travel")
 
 

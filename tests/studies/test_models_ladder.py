@@ -42,12 +42,12 @@ def named(found, name: str, law: str = "linear"):
 def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
     slow, quick = ladder(shutting(20.0, end=25.0), target=0.01), ladder(shutting(0.0, cells=80), target=0.01)
     assert slow.cheapest.states <= 8 and named(slow, "rigid column").error < 0.01  # the quickest of the small ones
-    assert quick.cheapest.name == "full line" and named(quick, "rigid column").error > 0.1
+    assert quick.cheapest.name in ("full line", "delay lines") and named(quick, "rigid column").error > 0.1
     assert slow.change_time == pytest.approx(20.0) and quick.change_time == 0.0
     assert slow.travel_time == pytest.approx(LENGTH / SPEED)
     assert "waves hardly matter" in slow.thumb[1] and "waves matter" in quick.thumb[1]
     coarse = ladder(shutting(0.0), target=0.01)  # 40 cells err by more than the target behind a jump themselves
-    assert named(coarse, "full line").error > 0.01 and coarse.cheapest.name == "2 times the cells"
+    assert named(coarse, "full line").error > 0.01 and coarse.cheapest.name == "delay lines"  # exact at any step
 
 
 def test_the_cheapest_is_within_the_target_and_nothing_quicker_is():

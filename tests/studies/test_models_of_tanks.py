@@ -62,3 +62,13 @@ def test_basins_that_do_not_ride_are_refused_by_name():
     case["nodes"]["pond"] = {"type": "basin", "size": [1, 1], "cells": [4, 4], "level": 0.1}
     with pytest.raises(FvsolveError, match="does not know basins yet; the case has pond"):
         ladder(case)
+
+
+def test_a_liquid_that_rides_is_no_tank_that_sloshes():
+    """It has no level: a rung of it is refused by name, never said with one."""
+    liquid = {"physics": "liquid", "cells": [4, 4], "pressure": 5e5, "thickness": 0.1}
+    case = rolling(1e-4, **liquid)
+    case["output"]["probes"] = ["hull.angle"]
+    del case["nodes"]["tank"]["level"]
+    with pytest.raises(FvsolveError, match="chart --models does not know basins yet; the case has tank"):
+        ladder(case, target=0.05)

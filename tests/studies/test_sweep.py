@@ -17,7 +17,7 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.cli.app import value_of
 from fvsolve.cli.sweep import split
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.studies import sweep
 from fvsolve.studies.sweep import pasted
 
@@ -149,9 +149,33 @@ def test_a_value_is_written_as_set_reads_it(value):
 
 
 def test_a_fault_of_every_run_is_a_fault_of_the_sweep(line, tmp_path):
-    with pytest.raises(FvsolveError, match="all 2 runs are refused: links.main.cels"):
-        sweep(line, {"links.main.cels": [10, 20]}, out=tmp_path)
+    with pytest.raises(FvsolveError, match="all 2 runs are refused: links.main.cells: 0 is out of range"):
+        sweep(line, {"numerics.courant": [0.5, 0.4]}, {"links.main.cells": 0}, out=tmp_path)
     assert not (tmp_path / "sweep.csv").exists()
+
+
+def test_keys_that_do_not_exist_are_named_all_at_once_before_anything_runs(line, tmp_path):
+    vary, told = {"links.main.cels": [10, 20], "numerics.courant": [0.5, 0.4], "nodes.lak.pressure": [1e6]}, []
+    with pytest.raises(CaseError) as raised:
+        sweep(line, vary, {"links.valve.aera": 1.0}, out=tmp_path, progress=lambda *said: told.append(said))
+    said = str(raised.value)
+    assert 'links.main.cels: unknown key; did you mean "cells"?' in said and "3 faults" in said
+    assert 'links.valve.aera: unknown key; did you mean "area"?' in said and 'no node named "lak"' in said
+    assert told == [] and not (tmp_path / "points.jsonl").exists()
+
+
+def test_a_key_that_another_brings_is_none_that_does_not_exist(line):
+    new = {"type": "orifice", "from": "gate", "to": "out", "area": 1e-4, "discharge_coefficient": 0.6}
+    made = sweep(line, {"links.more.area": [1e-4, 2e-4]}, {"links.more": new})
+    assert [row["ok"] for row in made.rows] == [True, True]
+
+
+def test_a_case_that_was_read_with_other_values_keeps_them(line):
+    read = fvsolve.load(line, {"links.main.cells": 10})
+    made = sweep(read, {"numerics.courant": [0.5, 0.9]})
+    assert (
+        made.rows[1]["steps"] == fvsolve.run(line, {"links.main.cells": 10, "numerics.courant": 0.9}).summary["steps"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -183,3 +207,124 @@ def test_the_command_prints_the_rows_and_fails_where_one_does(fvs, tmp_path):
     assert code == 1 and "refused: numerics.rtol" in out
     code, _, err = fvs("sweep", "two-tanks", "--set", "numerics.rtol", "--out", tmp_path)
     assert code == 2 and "wanted KEY=a,b,c" in err
+
+
+def bare(rows) -> list[dict]:
+    """Rows without what a clock says."""
+    return [{key: one for key, one in row.items() if key != "seconds"} for row in rows]
+
+
+def test_points_of_a_list_and_of_a_file_are_the_runs(line, tmp_path):
+    points = [
+        {"links.main.cells": 10, "nodes.lake.pressure": 9e5},
+        {"links.main.cells": 12, "nodes.lake.pressure": 1e6},
+    ]
+    made = sweep(line, points=points)
+    assert made.keys == ("links.main.cells", "nodes.lake.pressure")
+    (tmp_path / "points.csv").write_text("links.main.cells,nodes.lake.pressure\n10,900000.0\n12,1e6\n")
+    assert bare(sweep(line, points=tmp_path / "points.csv").rows) == bare(made.rows)
+    grid = sweep(line, {"links.main.cells": [10, 12], "nodes.lake.pressure": [9e5, 1e6]}, jobs=2)
+    assert bare([grid.rows[0], grid.rows[3]]) == bare(made.rows)
+
+
+def test_rows_are_the_same_to_the_bit_in_any_engine_and_order(line, cluster):
+    vary = {"links.main.cells": [10, 20], "links.valve.area": [0.01, 0.012], "numerics.courant": [0.5, -1.0, 0.9]}
+    here = bare(sweep(line, vary).rows)
+    assert bare(sweep(line, vary, jobs=2).rows) == here
+    turned = bare(sweep(line, {key: vary[key] for key in reversed(vary)}).rows)
+    assert {repr(sorted(row.items(), key=str)) for row in turned} == {
+        repr(sorted(row.items(), key=str)) for row in here
+    }
+    assert bare(sweep(line, vary, dask=cluster.scheduler_address).rows) == here
+    alone = [fvsolve.run(line, {key: row[key] for key in vary}) for row in here if row["ok"]]
+    assert [row["max(gate.pressure) [Pa]"] for row in here if row["ok"]] == [
+        one.extremes["gate.pressure"].greatest for one in alone
+    ]
+
+
+def test_a_sweep_that_is_killed_goes_on_where_it_was_a_torn_line_or_not(line, tmp_path):
+    (tmp_path / "line.toml").write_text(write({**line, "output": {"every": 1e6, "probes": ["gate.pressure"]}}))
+    values = ["--set", "numerics.end=0.5,0.4,0.3,1e7", "--jobs", "2"]
+    command = [sys.executable, "-m", "fvsolve", "sweep", "line.toml", "--out", "o", *values]
+    running = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    kept = tmp_path / "o" / "points.jsonl"
+    try:
+        while not kept.exists() or len(kept.read_text().splitlines()) < 3:
+            assert running.poll() is None
+            time.sleep(0.01)
+    finally:
+        running.kill()
+        running.wait()
+    with open(kept, "a") as file:
+        file.write('{"key": "half of a li')
+    for reused in (3, 4):  # the line that is whole after the torn one is found, too
+        made = sweep(tmp_path / "line.toml", {"numerics.end": [0.5, 0.4, 0.3, 0.2]}, out=tmp_path / "o")
+        assert made.reused == reused and [row["t [s]"] for row in made.rows] == [0.5, 0.4, 0.3, 0.2]
+    assert all(json.loads(text)["key"] for text in kept.read_text().splitlines())
+
+
+def test_a_disk_that_is_full_in_the_middle_is_named_and_what_was_kept_is_found_again(line, tmp_path):
+    """Files may hold no more than 3000 bytes, which takes two rows and a part of the third."""
+    resource = pytest.importorskip("resource", reason="a limit of Unix")
+    vary, limits = {"numerics.courant": [0.5, 0.6, 0.7, 0.8]}, resource.getrlimit(resource.RLIMIT_FSIZE)
+    sweep(line, {"numerics.courant": [0.5, 0.9]})  # what is compiled is written too
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
+        with pytest.raises(
+            RunError, match="points.jsonl: cannot be written: .*; what is finished is kept, and the same"
+        ):
+            sweep(line, vary, out=tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    kept = (tmp_path / "points.jsonl").read_bytes()
+    assert 0 < kept.count(b"\n") < 4 and not kept.endswith(b"\n")  # the last line is torn
+    made = sweep(line, vary, out=tmp_path)
+    assert made.reused == kept.count(b"\n") and bare(made.rows) == bare(sweep(line, vary).rows)
+
+
+def test_two_sweeps_in_one_folder_are_refused_and_the_first_loses_nothing(line, tmp_path):
+    def again(done, total, what):
+        if done == 1:
+            with pytest.raises(RunError, match="is in use: a study still writes there"):
+                sweep(line, VARY, out=tmp_path)
+
+    assert len(sweep(line, VARY, out=tmp_path, progress=again).rows) == 4
+
+
+def test_progress_says_how_long_it_will_be(line):
+    told = []
+    sweep(line, VARY, progress=lambda *said: told.append(said))
+    assert [said[:2] for said in told] == [(k, 4) for k in range(5)]
+    assert (
+        told[0][2] == "links.main.cells = 10, numerics.courant = 0.5" and " s left, links.main.cells = 10" in told[1][2]
+    )
+
+
+def test_a_file_that_a_value_names_is_part_of_what_is_reused(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in "ab":
+        (tmp_path / f"{name}.csv").write_text("t [s],opening [-]\n0,1\n0.2,0\n")
+    vary = {"links.valve.opening": [{"file": "a.csv"}, {"file": "b.csv"}]}
+    sweep(line, vary, out=tmp_path / "o")
+    assert sweep(line, vary, out=tmp_path / "o").reused == 2
+    (tmp_path / "b.csv").write_text("t [s],opening [-]\n0,1\n0.3,0\n")
+    assert sweep(line, vary, out=tmp_path / "o").reused == 1
+
+
+def test_the_table_is_parquet_too_and_every_extreme_has_a_chart(line, fvs, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is an extra")
+    (tmp_path / "line.toml").write_text(write(line))
+    to = ("--out", tmp_path / "o")
+    code, out, _ = fvs("sweep", tmp_path / "line.toml", "--set", "links.valve.area=0.01,0.02", *to, "--json")
+    said = json.loads(out)
+    assert code == 0 and {path.rpartition("/")[2] for path in said["charts"]} == {
+        "max-gate.pressure.png", "min-gate.pressure.png", "max-valve.flow.png", "min-valve.flow.png",
+    }  # fmt: skip
+    assert all(os.path.getsize(path) > 1000 for path in said["charts"])
+    table = parquet.read_table(tmp_path / "o" / "sweep.parquet").to_pydict()
+    for name in ("links.valve.area", "ok", "max(gate.pressure) [Pa]", "steps"):
+        assert table[name] == [row[name] for row in said["rows"]]
+    code, _, err = fvs(
+        "sweep", tmp_path / "line.toml", "--set", "links.valve.area=0.01,0.02", *to, "--outcome", "max(x)"
+    )
+    assert code == 2 and 'no outcome "max(x)"; there are' in err

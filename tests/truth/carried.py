@@ -39,12 +39,13 @@ class Carried:
 
     def rates(self, s, factor=1.0):
         size, rate = (self.nx, self.ny, self.kx, self.ky), np.empty_like(s)
+        rows = self.nx, self.ny, 0, self.ny, self.kx, self.ky
         flows = factor, self.flow_x, self.flow_y, self.depth, self.outside
-        advection.grid_advection(self.scheme, self.limiter, *size, *flows, s, self.work, rate)
+        advection.grid_advection(self.scheme, self.limiter, *rows, *flows, s, self.work, rate)
         if self.scheme in (rec.LINEAR, rec.WENO5):
             advection.add_fifth_order(self.scheme, *size, *flows, *self.bounds, self.fastest, s, self.work, rate)
         if self.diffusivity:
-            diffusion.grid_diffusion(*size, self.diffusivity, *flows, s, self.other, rate)
+            diffusion.grid_diffusion(*rows, self.diffusivity, *flows, s, self.other, rate)
         return rate
 
     def run(self, s, end, courant, method="ssp-rk3", factor=lambda t: 1.0):

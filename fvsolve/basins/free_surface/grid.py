@@ -126,11 +126,12 @@ def push_walls(g, speed, rest, side, f, thrust):
 
 @njit
 def grid_rates(
-    g, scheme, limiter, nx, ny, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h, rate_x,
-    rate_y, moves,
+    g, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through, work, rate_h,
+    rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+    """Rates of the cells of rows `begin` to `stop`; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
+    Rows are those of the whole grid, whose neighbours as far as the scheme reaches are looked at too.
     scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
     kx float64[nx], ky float64[ny] : 1 / widths of columns and rows [1/m]
     reflect : float64[2 (nx + ny)], 1 a wall and 0 open, west, east, south, north; or empty, walls all around
@@ -147,8 +148,8 @@ def grid_rates(
     for first in range(0, nx, MOST):
         last = min(first + MOST, nx)
         rate = column_rates(
-            g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
-            work, rate_h, rate_x, rate_y, moves,
+            g, scheme, limiter, nx, ny, begin, stop, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
+            through, work, rate_h, rate_x, rate_y, moves,
         )  # fmt: skip
         most = max(most, rate)
     return most
@@ -156,7 +157,7 @@ def grid_rates(
 
 @njit
 def column_rates(
-    g, scheme, limiter, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
+    g, scheme, limiter, nx, ny, begin, stop, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
     work, rate_h, rate_x, rate_y, moves,
 ):  # fmt: skip
     """The same of columns `first` to `last`, no more than MOST of them, row by row."""
@@ -168,12 +169,12 @@ def column_rates(
     for i in range(STRIDE):
         top[i] = 0.0
     reach = 3 if fifth else 2
-    ahead = min(reach, ny)
-    for j in range(ahead):
+    ahead = min(begin + reach, ny)
+    for j in range(max(begin - reach, 0), ahead):
         put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
-    for j in range(-1, -1 - reach, -1):
+    for j in range(-1, begin - 1 - reach, -1):
         put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
-    for j in range(-1, ny + 1):
+    for j in range(begin - 1, stop + 1):
         while ahead < j + reach:
             put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
             ahead += 1
@@ -187,7 +188,7 @@ def column_rates(
                 g, scheme, ring[place(j - 2, 0) :], before, here, ring[place(j + 1, 0) :], ring[place(j + 2, 0) :],
                 low, deep[:n],
             )  # fmt: skip
-        if j < 0:
+        if j < begin:
             continue
         # faces between rows j - 1 and j
         south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], sides[was * SIDE + HIGH :]
@@ -208,7 +209,7 @@ def column_rates(
         if through.size > 0 and (j == 0 or j == ny):
             at = 2 * ny + first + (nx if j > 0 else 0)
             put_inward(-1.0 if j > 0 else 1.0, kx[first:last], north, through[at : at + n])
-        if j == 0:
+        if j == begin:
             continue
         # row j - 1 : faces along it, and its rates
         whole = (n + 9) // 8 * 8  # more than is looked at, so that nothing is left over of a vector

@@ -51,7 +51,7 @@ class FreeSurfaceRows(BasinRows):
     """Shallow water, states depth [m] and flows per width [m2/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
-    deep, far_ends = True, False
+    deep, far_ends, banded = True, False, True
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)

@@ -1,5 +1,6 @@
 """Rates of the cells of water with a free surface. Knows the tables; knows no flux."""
 
+from fvsolve.basins.bands import cells_of
 from fvsolve.basins.free_surface import faces, grid
 from fvsolve.basins.free_surface.friction import FASTEST, add_friction
 from fvsolve.basins.kinds import kind_of
@@ -13,16 +14,16 @@ MINE = kind_of(__package__)
 
 
 @njit
-def through_faces(kx, ky, flow_x, flow_y):
-    """Make flows per width of faces, row by row, flows through them."""
+def through_faces(begin, stop, kx, ky, flow_x, flow_y):
+    """Make flows per width of faces of rows `begin` to `stop` flows through them."""
     nx = kx.size
-    for j in range(ky.size):
+    for j in range(begin, stop):
         high = 1.0 / ky[j]
         for i in range(nx + 1):
             flow_x[j * (nx + 1) + i] *= high
     for i in range(nx):
         wide = 1.0 / kx[i]
-        for j in range(ky.size + 1):
+        for j in range(begin, stop + 1):
             flow_y[j * nx + i] *= wide
 
 
@@ -37,10 +38,13 @@ def finish_water(tables, b, rate, y, rates, out):
             seen_of(basin, tables.seen, y),
             tables.basins["roughness"][b : b + 1],
         )
+        a, z = cells_of(tables, b)
+        east, north = o + n, o + 2 * n
         fades = add_friction(
-            basin["friction"], st["gravity"], roughness, FASTEST, tables.plane[basin["plan"] :], seen[o : o + n],
-            seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n],
-            rates[n : 2 * n], rates[2 * n :],
+            basin["friction"], st["gravity"], roughness, FASTEST, tables.plane[basin["plan"] + a :],
+            seen[o + a : o + z], seen[east + a : east + z], seen[north + a : north + z],
+            y[east + a : east + z], y[north + a : north + z],
+            rates[n + a : n + z], rates[2 * n + a : 2 * n + z],
         )  # fmt: skip
         out[RATE] = max(out[RATE], fades)
     book_open(tables, b, st["rho"], out)
@@ -61,13 +65,16 @@ def on_grid(tables, b, y, dydt, out, moves):
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
     rate = grid.grid_rates(
-        g, basin["scheme"], basin["limiter"], nx, ny, plane[k : k + nx], plane[k + nx : k + nx + ny],
+        g, basin["scheme"], basin["limiter"], nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1],
+        plane[k : k + nx], plane[k + nx : k + nx + ny],
         plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
         work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rates[n : 2 * n],
         rates[2 * n :], moves,
     )  # fmt: skip
     if f >= 0:
-        through_faces(plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y)
+        through_faces(
+            tables.bands[2 * b], tables.bands[2 * b + 1], plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y
+        )
     finish_water(tables, b, rate, y, rates, out)
 
 

@@ -209,10 +209,12 @@ def turn_row(c, ny, j, up, down, along, moves):
 
 @njit
 def grid_rates(
-    c, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y, moves
-):
-    """Rates of all cells; returns the greatest c (kx + ky) [1/s].
+    c, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
+    moves,
+):  # fmt: skip
+    """Rates of the cells of rows `begin` to `stop`; returns the greatest c (kx + ky) of all [1/s].
 
+    Rows are those of the whole grid; beside a side, and beyond the band, the next `EDGE` of them are looked at too.
     c : wave speed [m/s]; small : a flow density too small to mean anything, squared [kg2/(m4 s2)]
     kx, ky : float64[nx], float64[ny]  1/width of columns, 1/height of rows [1/m]
     reflect : float64[2 (nx + ny)]  share of a wave that a side sends back: west, east, south, north; empty: walls
@@ -227,14 +229,17 @@ def grid_rates(
     between, work = work[: 4 * nx], work[4 * nx :]
     east, west, work = work[:wide], work[wide : 2 * wide], work[2 * wide :]
     fe, fw, spare = work[:f], work[f : 2 * f], work[2 * f :]
-    half, rows = 0.5 * c, 0
+    half, rows = 0.5 * c, max(min(begin - BEYOND, ny - EDGE), 0)
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
     to_w, to_e, to_s, to_n = side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
     along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
-    for j in range(ny + 1):  # faces between rows j - 1 and j
+    for j in range(begin, stop + 1):  # faces between rows j - 1 and j
         while rows < min(max(j + BEYOND, EDGE), ny):
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             put_waves(half, r[a:z], my[a:z], up[at : at + nx], down[at : at + nx])
+            if rows < begin or rows >= stop:
+                rows += 1
+                continue
             put_waves(half, r[a:z], mx[a:z], east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
             if moves is None or moves[0].size == 0:
                 mirror(nx, east, west)
@@ -271,7 +276,8 @@ def grid_rates(
                 driven.settle_row(kx, speeds, fe, fw, my[a:z], rate_r[a:z], rate_x[a:z], rate_y[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
-            if (side == 0 and j > 0) or (side == 1 and j != max(ny - BEYOND + 1, 0)):
+            first = j == begin and begin < BEYOND if side == 0 else j == max(ny - BEYOND + 1, begin)
+            if not first:
                 continue
             for k in range(BEYOND):
                 row = ny + k if side == 1 else -1 - k
@@ -316,14 +322,14 @@ def grid_rates(
                     at = 2 * ny + (nx if j > 0 else 0)
                     for i in range(nx):
                         through[at + i] = 0.0
-            if j > 0:
+            if j > begin:
                 driven.settle_column(
                     ky[j - 1], moves[1][j - 1], moves[1][j], between[before:], between[before + nx :], fu, fd,
                     mx[max(j - 2, 0) * nx :], mx[a:], mx[min(j, ny - 1) * nx :],
                     rate_r[a:z], rate_y[a:z], rate_x[a:z],
                 )  # fmt: skip
-        elif j > 0:
+        elif j > begin:
             settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])
-        if moves is not None and j > 0:
+        if moves is not None and j > begin:
             swell_row(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
     return c * steepest(kx, ky)

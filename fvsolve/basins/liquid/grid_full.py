@@ -205,10 +205,10 @@ def work_size(nx, ny):
 
 @njit
 def grid_rates(
-    c0, rho, table, small, scheme, limiter, nx, ny, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
-    moves, phi,
+    c0, rho, table, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r,
+    rate_x, rate_y, moves, phi,
 ):  # fmt: skip
-    """Rates of all cells; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
+    """Rates of the cells of rows `begin` to `stop`; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
     table : of `waves`, or None for law `log`; small : a velocity too small to mean anything, squared
@@ -221,13 +221,13 @@ def grid_rates(
     w, v, top, work = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx], work[3 * nx :]
     east, west, over, work = work[:wide], work[wide : 2 * wide], work[2 * wide : 3 * wide], work[3 * wide :]
     fe, fw, ft, spare = work[:f], work[f : 2 * f], work[2 * f : 3 * f], work[3 * f :]
-    rows = 0
+    rows = max(min(begin - BEYOND, ny - EDGE), 0)
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
     to_w, to_e, to_s, to_n = side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
     along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
     for i in range(nx):
         top[i] = 0.0
-    for j in range(ny + 1):  # faces between rows j - 1 and j
+    for j in range(begin, stop + 1):  # faces between rows j - 1 and j
         while rows < min(max(j + BEYOND, EDGE), ny):
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             u, v = aside[at : at + nx], over[BEYOND : nx + BEYOND]
@@ -235,6 +235,9 @@ def grid_rates(
             if phi is not None:
                 raise_row(c0, rho, table, phi[0][a:z], w)
             put_waves(0.5, w, v, up[at : at + nx], down[at : at + nx])
+            if rows < begin or rows >= stop:
+                rows += 1
+                continue
             put_waves(0.5, w, u, east[BEYOND : nx + BEYOND], west[BEYOND : nx + BEYOND])
             if moves is None or moves[0].size == 0:
                 mirror(nx, east, west)
@@ -279,7 +282,8 @@ def grid_rates(
                 hold_row(c0, rho, table, kx, 1, r[a:z], phi[0][a:z], low, high, rate_x[a:z])
             rows += 1
         for side in range(2):  # rows beyond the southern and the northern side
-            if (side == 0 and j > 0) or (side == 1 and j != max(ny - BEYOND + 1, 0)):
+            first = j == begin and begin < BEYOND if side == 0 else j == max(ny - BEYOND + 1, begin)
+            if not first:
                 continue
             for k in range(BEYOND):
                 row = ny + k if side == 1 else -1 - k
@@ -332,7 +336,7 @@ def grid_rates(
             put_inward(1.0, kx, gu, through[2 * ny : 2 * ny + nx])
         if through.size > 0 and j == ny:
             put_inward(-1.0, kx, gu, through[2 * ny + nx :])
-        if j > 0:
+        if j > begin:
             a, z = (j - 1) * nx, j * nx
             settle_column(
                 ky[j - 1], between[before:], between[before + nx :], between[before + 2 * nx :], gu, gd, gt,

@@ -30,6 +30,7 @@ class LiquidRows(BasinRows):
     """
 
     units = {"pressure": "Pa", "velocity": "m/s"}
+    banded = True
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)

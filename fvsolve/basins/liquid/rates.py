@@ -69,8 +69,9 @@ def linear_grid(tables, b, y, dydt, out, moves, raised):
     if raised is not None:
         r = raised
     rate = grid.grid_rates(
-        basin["speed"], basin["small"], basin["scheme"], basin["limiter"], basin["nx"], basin["ny"], kx, ky, reflect,
-        r, mx, my, through, work, rate_r, rate_x, rate_y, moves,
+        basin["speed"], basin["small"], basin["scheme"], basin["limiter"], basin["nx"], basin["ny"],
+        tables.bands[2 * b], tables.bands[2 * b + 1], kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
+        moves,
     )  # fmt: skip
     finish_liquid(tables, b, rate, out)
 
@@ -93,7 +94,8 @@ def full_grid(tables, b, table, y, dydt, out, moves, phi):
     reflect, through, work = outside_of(tables, basin)
     rate = grid_full.grid_rates(
         basin["speed"], basin["density"], table, basin["small"], basin["scheme"], basin["limiter"], basin["nx"],
-        basin["ny"], kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y, moves, phi,
+        basin["ny"], tables.bands[2 * b], tables.bands[2 * b + 1], kx, ky, reflect, r, mx, my, through, work, rate_r,
+        rate_x, rate_y, moves, phi,
     )  # fmt: skip
     finish_liquid(tables, b, rate, out)
 

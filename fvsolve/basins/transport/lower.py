@@ -16,7 +16,7 @@ from fvsolve.kernels.phases import Pieces
 class TransportRows(BasinRows):
     """Nothing moves but what is carried; depth 1."""
 
-    given = True
+    given = banded = True
 
     def pieces(self, valves: bool) -> Iterator[Pieces]:
         yield Pieces(home=__package__, observe="observe: observe_given_flows")

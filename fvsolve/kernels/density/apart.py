@@ -1,16 +1,13 @@
 """What keeps machine code of a law in one place: the ladder stays small enough to be part of its callers."""
 
-import os
+from fvsolve.jit import COMPILING, Intrinsic, njit
 
-from fvsolve.jit import njit
+if COMPILING:
 
-if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
-    from numba.core import types
-    from numba.extending import intrinsic
-
-    @intrinsic
+    @Intrinsic
     def outside(typingctx):
         """Keep LLVM from copying the function around this call into its callers: halves what it adds to compiling."""
+        from numba.core import types
 
         def generate(context, builder, kind, args):
             builder.function.attributes.add("noinline")

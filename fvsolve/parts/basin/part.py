@@ -212,7 +212,8 @@ class Physics(Table):
                     raise FvsolveError(f"{said}; wanted the same, or another name")
         for table, keys in both:
             table.model_fields.update(keys)
-            table.model_rebuild(force=True)
+            if table.__pydantic_complete__:  # else it is built when a case first has one
+                table.model_rebuild(force=True)
         Physics.kinds[cls.name] = cls
         Basin.__doc__ = "\n".join([ABOUT, "", *(f"{name}: {one.__doc__}" for name, one in Physics.kinds.items())])
 
@@ -315,6 +316,11 @@ class Basin(Rider, kind="basin"):
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
         patches = given.get("patches")
         return tuple(patches) if isinstance(patches, dict) else ()
+
+    @property
+    def turn(self) -> np.ndarray:
+        """How it stands in the axes of its body : float64[3, 3]."""
+        return np.eye(3) if self.attitude is None else self.attitude.rotation
 
     @property
     def lumped(self) -> bool:

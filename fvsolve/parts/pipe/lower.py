@@ -25,6 +25,9 @@ class PipeRows(Lowering, kind="pipe"):
         draft.ends(link, row)
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
         row["quicker"] = quicker(draft.case.numerics.scheme, n)
+        delayed = draft.followed[name].line == "delay"
+        if delayed:
+            row["cells"], row["quicker"] = 0, draft.followed[name].rate * link.length / n / speed
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
         row["cell"], draft.cells = draft.cells, draft.cells + n
         z = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
@@ -34,8 +37,11 @@ class PipeRows(Lowering, kind="pipe"):
         draft.hydraulics.friction(name, link, row, draft.fault)
         if link.friction.model == "unsteady":
             reserve(draft, row)
-        names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
-        row["y"] = draft.states(names, 0.5e5 * row["admittance"])
+        if delayed:
+            row["y"] = draft.states([f"{name}.mass"], 1e5 * row["admittance"] * link.length / speed)
+        else:
+            names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
+            row["y"] = draft.states(names, 0.5e5 * row["admittance"])
         x = (np.arange(n) + 0.5) * (link.length / n)
         draft.meshes.append(
             PipeMesh(
@@ -47,4 +53,8 @@ class PipeRows(Lowering, kind="pipe"):
     def probe(self, draft, name, probe, row) -> None:
         row["index"] = draft.pipe_names.index(name)
         row["kind"] = rec.PIPE_FLOW if probe.quantity in ("flow", "velocity") else rec.PIPE_PRESSURE
-        along(draft, row, probe.fraction)
+        if draft.pipe_table[row["index"]]["delay"] >= 0 and probe.fraction not in (0.0, 1.0):
+            row["weights"] = len(draft.floats)
+            draft.floats.append(probe.fraction)
+        else:
+            along(draft, row, probe.fraction)

@@ -8,10 +8,11 @@ from typing import Annotated, Any, ClassVar, Literal
 from fvsolve.parts.conduit import Conduit
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import COUNTED, Number, Quantity, Setting, Usual, Value, Whole, between, positive
+from fvsolve.parts.value import COUNTED, Choice, Number, Quantity, Setting, Usual, Value, Whole, between, positive
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
+LINES = ("cells", "delay", "auto")  # how waves in a pipe are followed
 
 
 MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
@@ -72,6 +73,15 @@ class Pipe(Conduit, kind="pipe"):
     cells: Annotated[
         int | None,
         Whole(between(1, MOST_CELLS), "finite volumes along it; as many as its travel time over cell_time if left out"),
+    ] = None
+    line: Annotated[
+        str | None,
+        Choice(
+            "line",
+            LINES,
+            "waves by cells, or as a delay line, whose cells are but places where fields and envelopes are told; auto: "
+            "a delay line where its bound is below numerics.accuracy; numerics.line if left out",
+        ),
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
 

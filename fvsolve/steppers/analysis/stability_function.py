@@ -34,8 +34,14 @@ class StabilityFunction:
     def __call__(self, s):
         """R(s) in floating point, s a complex number or an array of them."""
         s = np.asarray(s, dtype=np.complex128)
-        up, down = ([float(x) for x in p.coefficients][::-1] for p in (self.numerator, self.denominator))
+        up, down = self.floats
         return np.polyval(up, s) / np.polyval(down, s)
+
+    @functools.cached_property
+    def floats(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients of both, the highest first."""
+        up, down = ([float(x) for x in p.coefficients][::-1] for p in (self.numerator, self.denominator))
+        return np.array(up), np.array(down)
 
     @functools.cached_property
     def pade(self) -> tuple[int, int] | None:
@@ -58,7 +64,11 @@ class StabilityFunction:
 
 def stability_function(method: str | Method) -> StabilityFunction:
     """R of a method by the determinants of (26), which is (16) for explicit ones, in lowest terms."""
-    method = method_named(method)
+    return _lowest(method_named(method))
+
+
+@functools.lru_cache(maxsize=256)
+def _lowest(method: Method) -> StabilityFunction:
     numerator, denominator = by_determinants(method.exact.a, method.exact.b)
     doubts = (NOTHING, NOTHING)
     if method.rounding:

@@ -21,7 +21,7 @@ from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, 
 from fvsolve.studies.accuracy.setting import MethodSetting, adaptive, cell_keys, longest
 from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
 from fvsolve.studies.distance import Distance, distance, moving
-from fvsolve.studies.outcome import Progress, names, prepared, refusal
+from fvsolve.studies.outcome import Progress, names, prepared, refusal, without_lines
 from fvsolve.studies.points import Points
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.studies.truth import Truth, truth
@@ -149,6 +149,7 @@ class _Study:
         from fvsolve.case import load
 
         self.case: Case = load(case, set)
+        without_lines(self.case, "chart")
         if from_files(self.case):
             what = f"chart refines cells, and those of {listing(from_files(self.case))} are a file's"
             raise FvsolveError(f"{what}; order --refine time does without")

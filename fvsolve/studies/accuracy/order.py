@@ -9,7 +9,7 @@ from fvsolve.doors import CALL, COUNT, NAMES, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.rows import Order
-from fvsolve.studies.outcome import Progress, names, without_basins
+from fvsolve.studies.outcome import Progress, names, without_basins, without_lines
 from fvsolve.studies.points import OUT, Points, kept_in
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
@@ -69,6 +69,7 @@ def _order(case, settings: Mapping, refine, key, levels, cells, against, given, 
     from fvsolve.case import load
 
     case = load(case, settings)
+    without_lines(case, "order")
     made = affordable(case, refine, key, levels, cells, against, points)
     if given == (None, None, None):
         from fvsolve.studies.accuracy.judge import Judge

@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
+from fvsolve.model.delay import what_needs_cells
 from fvsolve.studies.outcome import prepared
 
 SLOSHING = ("frozen", "modes", "cells")
@@ -33,12 +34,12 @@ def structures(case) -> list[str]:
     most = max(pipe.cells for pipe in pipes)
     counts = [2**k for k in range(20) if 2 ** (k + 1) <= most]
     cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
-    return ["rigid column", "lumped volume", "column and volume", *cells, "full line"]
+    return ["rigid column", "lumped volume", "column and volume", "delay lines", *cells, "full line"]
 
 
 def tanks(case) -> dict[str, Any]:
-    """Basins that ride on bodies."""
-    return {name: node for name, node in case.nodes.items() if node.kind == "basin" and node.on}
+    """Basins with a free surface that ride on bodies."""
+    return {name: one for name, one in case.nodes.items() if one.kind == "basin" and one.on and one.own.sloshes}
 
 
 def finer(case, doublings: int) -> list[str]:
@@ -60,6 +61,8 @@ def restated(case, rung: str) -> dict[str, Any]:
         times, step = int(rung.split()[0]), case.numerics.step
         found = {f"links.{name}.cells": times * pipe.cells for name, pipe in pipes.items()}
         return found if step is None else found | {"numerics.step": step / times}
+    if rung == "delay lines":
+        return delayed(case, pipes)
     if rung.endswith(("cell", "cells")):
         count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
         return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}
@@ -95,6 +98,14 @@ def sloshing(case, rung: str) -> dict[str, Any]:
     return found if step is None else found | {"numerics.step": step / times}
 
 
+def delayed(case, pipes: dict[str, Any]) -> dict[str, Any]:
+    """All pipes as delay lines."""
+    for name, pipe in pipes.items():
+        if lacks := what_needs_cells(case, pipe):
+            raise Unsayable(f"{name} is no delay line: {lacks}")
+    return {f"links.{name}.line": "delay" for name in pipes}
+
+
 def _survives(probe, pipes: dict) -> bool:
     return probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
 
@@ -114,7 +125,7 @@ def resistance(case, model, name: str) -> dict[str, Any]:
     """A pipe as the drop that its friction takes from the flow of the start, dp = zeta rho v^2 / 2."""
     row = model.tables.pipes[[pipe.name for pipe in model.pipes].index(name)]
     law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
-    flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * row["dx"] * row["cells"]
+    flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * case.links[name].length
     if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
         raise Unsayable(f"{name} is at rest at the start, so what its friction takes is not known")
     zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))

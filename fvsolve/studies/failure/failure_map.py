@@ -16,7 +16,7 @@ from fvsolve.studies.failure.columns import Columns, columns, default_schemes
 from fvsolve.studies.failure.eigen_limit import greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.outcome import Progress, names, without_basins
+from fvsolve.studies.outcome import Progress, names, without_basins, without_lines
 from fvsolve.studies.points import OUT, Points, kept_in
 from fvsolve.studies.truth import Truth, truth
 
@@ -107,6 +107,7 @@ def failures(
 
     case = load(case, dict(set or {}))
     without_basins(case, "map")
+    without_lines(case, "map")
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}

@@ -11,7 +11,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
 from fvsolve.kernels.schedules import POLYNOMIAL, piece_at, piece_slopes, value_until
 from fvsolve.schemes import LIMITED, SCHEMES
-from fvsolve.studies.outcome import outcome, prepared
+from fvsolve.studies.outcome import outcome, prepared, without_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +46,7 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
+    without_lines(case, "linearise")
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
         linear = "upwind" if case.meshes else SCHEMES[case.numerics.scheme].twin
         case = load(case, {"numerics.scheme": linear})

@@ -159,10 +159,7 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
 
 
 def _rhs():
-    from numba import types
-
     from fvsolve.kernels.periodic import rhs_periodic
-    from fvsolve.steppers.signatures import compiled_as
+    from fvsolve.steppers.signatures import RHS, compiled_as
 
-    v = types.float64[::1]
-    return compiled_as(rhs_periodic, (types.float64, v, v, v, types.int64[::1]))
+    return compiled_as(rhs_periodic, RHS)

@@ -15,7 +15,7 @@ NONE = 1e-6  # share of its weight that is rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
 
-class Swings:
+class Unfelt:
     """How high water in modes rises, and by how much bodies that forces move take the weight of water away.
 
     Modes swing under gravity, cells under what driven joints make of it; what a free body adds is in no wave.
@@ -30,9 +30,8 @@ class Swings:
             modal = basin.on is not None and basin.sloshing == "modes"
             free = basin.on is not None and basin.own.sloshes and any(free_joints(basin.on, case.nodes))
             if modal or (free and not basin.lumped):
-                middle = np.array([*mesh.centre.mean(axis=0), 0.0])
-                place = np.array(basin.at or (0.0, 0.0, 0.0)) + sloshing.turn_of(basin) @ middle
-                about = model.body_names.index(basin.on), place, sloshing.turn_of(basin)[:, 2]
+                place = np.array(basin.place) + basin.turn[:, :2] @ mesh.centroid
+                about = model.body_names.index(basin.on), place, basin.turn[:, 2]
                 self.tanks.append((name, modal, about, *(rises(model, name) if modal else ())))
         self.kept = np.zeros((len(self.tanks), 4))
 
@@ -76,10 +75,8 @@ class Swings:
                 text += 'sloshing = "cells" knows great waves where water is shallow'
                 found.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", high, SMALL))
             if lost > LIGHT:
-                text = (
-                    f"{name}: at {then:.4g} s its body's rise or fall changes what its water weighs by {lost:.2g} of "
-                )
-                text += "that, which its waves do not feel: they swing as if it did not"
+                text = f"{name}: at {then:.4g} s its body's rise or fall changes what its water weighs by {lost:.2g} "
+                text += "of that, which its waves do not feel: they swing as if it did not"
                 found.append(Notice("weight", f"nodes.{name}", text, None, lost, LIGHT))
         return found
 
@@ -93,7 +90,7 @@ def rises(model, name: str) -> tuple:
     lifts = np.zeros((2, len(every)))
     lifts[[one.along for one in every], range(len(every))] = [one.rise for one in every]
     at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
-    return np.array(at), start, lifts / sloshing.depth_of(basin), sloshing.outline_of(mesh).is_round
+    return np.array(at), start, lifts / sloshing.depth_of(basin, mesh), sloshing.outline_of(mesh).is_round
 
 
 def rise(y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is_round: bool) -> float:

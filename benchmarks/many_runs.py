@@ -1,0 +1,89 @@
+"""Scenarios per second and core: fresh runs, models varied in place, rows of sweeps, and what Dask costs beside them.
+
+python benchmarks/many_runs.py            valve-closure, 20 cells, 10 s; CPU time, the mean of the quicker half
+python benchmarks/many_runs.py --dask     the same rows on one process of a LocalCluster
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from fvsolve import build, load, run, vary
+from fvsolve.studies.many import many
+from fvsolve.studies.row import Rows
+
+CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
+CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
+DELAY = {"numerics.line": "delay", "numerics.step": 0.01, "numerics.method": "rk4", "output.fields": 0}
+TIMES, RUNS = 200, 2000
+
+
+def area(k: int) -> dict[str, float]:
+    """Values that no run had before."""
+    return {KEY: 0.0017 + 1e-7 * k}
+
+
+def cost(one) -> float:
+    """CPU seconds of one call, the mean of the quicker half of TIMES: others use the machine too."""
+    spent = []
+    for k in range(TIMES + 5):
+        began = time.process_time()
+        one(area(k))
+        spent.append(time.process_time() - began)
+    quick = sorted(spent[5:])[: TIMES // 2]
+    return sum(quick) / len(quick)
+
+
+def told(name: str, seconds: float, goal: float | None = None) -> None:
+    """A line of the table."""
+    wanted = "" if goal is None else f"  (goal {goal:.0f})"
+    print(f"{name:44} {1e3 * seconds:8.2f} ms {1.0 / seconds:8.0f} a second and core{wanted}", flush=True)
+
+
+def by(base: dict, name: str, goal: float | None) -> None:
+    """Ways to the same numbers."""
+    model, rows = build(load(CASE, base)), Rows(CASE, base)
+    result = run(model)
+    steps, seconds = result.summary["steps"], result.summary["seconds"]
+    print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them")
+    told("  fresh: run(case, set)", cost(lambda values: run(CASE, base | values)))
+    told("  in place: run(vary(model, set))", cost(lambda values: run(vary(model, values))))
+    told("  of it vary(model, set)", cost(lambda values: vary(model, values)))
+    told("  a row of a sweep", cost(rows), goal)
+
+
+def dask() -> None:
+    """Rows here, and on a worker of Dask's, by the CPU time of either process."""
+    from distributed import Client, LocalCluster
+
+    rows, points = Rows(CASE, CELLS), [area(k) for k in range(RUNS)]
+    rows(points[0])
+    began = time.process_time()
+    for _ in many(rows, points):
+        pass
+    here = (time.process_time() - began) / RUNS
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
+        for _ in many(Rows(CASE, CELLS), points[:50], dask=cluster.scheduler_address):
+            pass  # which compiles there
+        before, began = sum(client.run(time.process_time).values()), time.process_time()
+        for _ in many(Rows(CASE, CELLS), points, dask=cluster.scheduler_address):
+            pass
+        there = (sum(client.run(time.process_time).values()) - before) / RUNS
+        beside = (time.process_time() - began) / RUNS
+    told(f"{RUNS} rows here", here)
+    told("the same on a worker of Dask's", there)
+    print(f"{'share of the rate':44} {here / there:8.2f}  (goal {SHARE})")
+    print(f"{'scheduler and parent':44} {1e3 * beside:8.2f} ms a run")
+
+
+def main() -> None:
+    """All, or Dask alone."""
+    if "--dask" in sys.argv:
+        return dask()
+    by(CELLS, "20 cells, upwind5 and rk4", GOAL)
+    by(DELAY, "delay line, steps of 10 ms", 2 * GOAL)
+
+
+if __name__ == "__main__":
+    main()

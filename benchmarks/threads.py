@@ -1,0 +1,234 @@
+"""What threads and ranks are worth in the plane: speed-ups, weak scaling, speed by size; sixteen cores modelled.
+
+Wall times per step, the least of many, both numbers of threads in turn: on shared cores nothing else says anything, and
+where they are never free not even that. So CPU times stand beside them: twice that of one thread over that of two is
+what free cores would allow, but for memory that they share. Run with --quick for the smaller grids alone, --large for
+4096^2 too.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+from measure import against, machine
+from planes_scenes import BASINS, scene, square
+
+from fvsolve.case import load
+from fvsolve.jit import njit
+from fvsolve.kernels import joint
+from fvsolve.model import build
+from fvsolve.model.slate import lined
+from fvsolve.run import ranks
+from fvsolve.solve import initial_state
+from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.team import yielding
+
+END = 1e6  # [s] that no run here comes to
+WATER = "free surface with bed"
+SIZES, GOAL_TWO, GOAL_SIXTEEN, GOAL_WEAK = (256, 512, 1024), 1.8, 12.0, 0.85
+FLAT = {"advection": 1.25, "liquid": 1.25, WATER: 1.2}
+CHUNK, ROUNDS = 0.02, 60  # [s] of a call, and how many of each
+
+
+def model_of(name: str, nx: int, ny: int):
+    """A basin of nx by ny square cells."""
+    basin = square(nx) | BASINS[name] | {"cells": [nx, ny], "size": [10.0, 10.0 * ny / nx]}
+    return build(load(scene(basin, END)))
+
+
+def begun(model, **team) -> Loop:
+    """A loop at the start of a model, warm."""
+    loop = Loop(model, **team)
+    loop.now[:] = initial_state(model).y
+    loop.begin(END, NO_LIMIT)
+    loop.run(2.0)
+    return loop
+
+
+def steps_of(loop: Loop) -> float:
+    """Steps of a call."""
+    start = perf_counter()
+    loop.run(2.0)
+    return max(2.0, np.ceil(2.0 * CHUNK / (perf_counter() - start)))
+
+
+def least(loops: list[Loop], rounds: int) -> list[np.ndarray]:
+    """(wall, CPU) time of a step of each [s], in turn, the least of many calls."""
+    found, steps = [np.full(2, np.inf) for _ in loops], [steps_of(loop) for loop in loops]
+    for _ in range(rounds):
+        for k, loop in enumerate(loops):
+            start = perf_counter(), process_time()
+            loop.run(steps[k])
+            took = perf_counter() - start[0], process_time() - start[1]
+            found[k] = np.minimum(found[k], np.array(took) / steps[k])
+    return found
+
+
+def by_threads(models, counts, rounds: int) -> list[np.ndarray]:
+    """The same of models by so many threads."""
+    loops = [begun(model, threads=many) for model, many in zip(models, counts, strict=True)]
+    found = least(loops, rounds)
+    for loop in loops:
+        loop.close()
+    return found
+
+
+@njit
+def meet(own, times):
+    """Wait for each other so often."""
+    for _ in range(times):
+        joint.wait(own)
+
+
+def waiting(times: int = 2000, rounds: int = 200) -> float:
+    """Wall time [s] in which two threads find that both are there, the least."""
+    best = np.inf
+    for _ in range(rounds):
+        board, owns = lined(2 * joint.LINE), np.zeros((2, joint.HEAD), dtype=np.int64)
+        owns[:, joint.ME], owns[:, joint.MANY], owns[:, joint.BOARD] = (0, 1), 2, board.ctypes.data
+        owns[:, joint.YIELD] = yielding()
+        threads = [threading.Thread(target=meet, args=(own, times)) for own in owns]
+        start = perf_counter()
+        for one in threads:
+            one.start()
+        for one in threads:
+            one.join()
+        best = min(best, (perf_counter() - start) / times)
+    return best
+
+
+def two_threads(sizes, rounds: int) -> None:
+    """Speed-ups of two threads, by physics and size."""
+    print("\nWall time of a step [us] by one thread and by two: speed-up (by CPU time what free cores would allow)")
+    print("| |" + "".join(f" {n}^2 |" for n in sizes))
+    print("|---|" + "---|" * len(sizes))
+    for name in BASINS:
+        row, ups = f"| {name} |", {}
+        for n in sizes:
+            model = model_of(name, n, n)
+            (one, cpu), (two, both) = by_threads([model, model], (1, 2), rounds)
+            ups[n] = one / two
+            row += f" {1e6 * one:.0f}, {1e6 * two:.0f}: {ups[n]:.2f} ({2.0 * cpu / both:.2f}) |"
+        print(row, flush=True)
+        if 512 in ups:
+            print(f"  {name} at 512^2: {ups[512]:.2f}, {against(GOAL_TWO, ups[512])}", flush=True)
+
+
+def weak(rounds: int) -> None:
+    """Twice the rows by twice the threads."""
+    models = [model_of(WATER, 512, rows) for rows in (256, 512)]
+    (one, cpu), (two, both) = by_threads(models, (1, 2), rounds)
+    print(f"\nWeak scaling, 512 x 256 cells a thread: {1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
+          f"{against(GOAL_WEAK, one / two)}; by CPU time {2.0 * cpu / both:.2f}", flush=True)  # fmt: skip
+
+
+def by_size(sizes) -> None:
+    """Speed per cell on one thread, CPU time."""
+    print(
+        "\nMillion cell-steps a second of CPU time, one thread\n| |" + "".join(f" {n}^2 |" for n in sizes) + " spread |"
+    )
+    print("|---|" + "---|" * (len(sizes) + 1))
+    for name in BASINS:
+        row, speeds = f"| {name} |", []
+        for n in sizes:
+            loop = begun(model_of(name, n, n))
+            steps, best = steps_of(loop), np.inf
+            for _ in range(20 if n < 2048 else 3):
+                start = process_time()
+                loop.run(steps)
+                best = min(best, (process_time() - start) / steps)
+            speeds.append(n * n / best / 1e6)
+            row += f" {speeds[-1]:.1f} |"
+        spread = max(speeds) / min(speeds)
+        print(f"{row} {spread:.2f}, goal {FLAT[name]}: {'met' if spread <= FLAT[name] else 'missed'} |", flush=True)
+
+
+def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
+    """What so many cores would give: their rates are measured on bands one after the other, waiting is scaled up.
+
+    A wait of n looks at n lines: n / 2 times that of two. Memory that cores share is not in it.
+    """
+    model = model_of(WATER, size, size)
+    loop, y, out = begun(model), initial_state(model).y, model.new_out()
+    dydt, step = np.empty_like(y), least([loop], 20)[0][1]
+    bands, cuts = loop.slate.written.bands, np.arange(many + 1) * size // many
+
+    def rates(begin: int, stop: int) -> float:
+        bands[:], best = (begin, stop), np.inf
+        for _ in range(60):
+            start = process_time()
+            model.functions.rhs(0.0, y, dydt, out, loop.slate.handle)
+            best = min(best, process_time() - start)
+        return best
+
+    slowest = max(rates(cuts[k], cuts[k + 1]) for k in range(many))
+    rest = max(step - stages * rates(0, size), 0.0) / many
+    rows = 2 * 5 * 3 * size * 8 / 5e9  # taken from both neighbours [s], at 5 GB/s
+    waits = (3 * stages + 1) * wait * many / 2.0
+    found = stages * (slowest + rows) + rest + waits
+    print(f"MODELLED, {many} cores, {WATER}, {size}^2: rates of the slowest band {1e6 * slowest:.0f} us (measured), "
+          f"rows {1e6 * rows:.1f} us, waits {1e6 * waits:.1f} us a step (a wait of two {1e9 * wait:.0f} ns, measured): "
+          f"{step / found:.1f} times one core, {against(GOAL_SIXTEEN, step / found)}", flush=True)  # fmt: skip
+
+
+def rank(sizes, rounds: int) -> None:
+    """What one rank of MPI does: rank 0 prints its wall times of steps."""
+    comm = ranks.world()
+    for n in sizes:
+        model = model_of(WATER, n, n)
+        loop = Loop(model, comm=comm)
+        if comm.rank > 0:
+            loop.team.serve(*loop.functions)
+            continue
+        loop.now[:] = initial_state(model).y
+        loop.begin(END, NO_LIMIT)
+        loop.run(2.0)
+        found = least([loop], rounds)[0][0]
+        loop.close()
+        print(f"{n} {found}", flush=True)
+
+
+def two_ranks(sizes, rounds: int) -> None:
+    """Speed-ups of two ranks."""
+    start = Path(sys.executable).with_name("mpiexec")
+    command = [start, "-n", "2", sys.executable, __file__, "--rank", *map(str, sizes)]
+    try:
+        found = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        print(f"\nno ranks of MPI here: {error}")
+        return
+    print(f"\nTwo ranks, {WATER}: wall time of a step [us] by one process and by two ranks, speed-up")
+    for line in found.splitlines():
+        n, two = int(line.split()[0]), float(line.split()[1])
+        model = model_of(WATER, n, n)
+        one = by_threads([model], (1,), rounds)[0][0]
+        print(f"  {n}^2: {1e6 * one:.0f}, {1e6 * two:.0f}: {one / two:.2f}", flush=True)
+
+
+def main() -> None:
+    if "--rank" in sys.argv:
+        rank([int(one) for one in sys.argv[2:]], ROUNDS)
+        return
+    quick = "--quick" in sys.argv
+    sizes, rounds = SIZES[:2] if quick else SIZES, ROUNDS // 4 if quick else ROUNDS
+    print(machine("fvsolve", "numba", "mpi4py"))
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} when this began")
+    wait = waiting()
+    print(f"two threads find each other in {1e9 * wait:.0f} ns, the least")
+    two_threads(sizes, rounds)
+    weak(rounds)
+    two_ranks(sizes, rounds)
+    print()
+    for n in (512, 1024):
+        sixteen(n, wait)
+    by_size((64, 128, 256, 512, 1024, *((2048, 4096) if "--large" in sys.argv else ())))
+
+
+if __name__ == "__main__":
+    main()

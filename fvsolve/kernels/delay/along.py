@@ -1,0 +1,127 @@
+"""Both waves anywhere along a delay line, for probes, fields and envelopes. Knows its history; changes nothing.
+
+At a share x of a stretch r(t, x) = sent(t - x tau) - x delta and l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta, with
+delta of its middle when what passes x now was there, or is yet to be: at both ends that is what arrives there.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.delay.history import (
+    CAPACITY,
+    COUNT,
+    HEAD,
+    ZEROS,
+    arrivals_at,
+    between,
+    both_waves,
+    clock_of,
+    jumps_at,
+    jumps_until,
+    read_both,
+    same_time,
+    stencil,
+    stretch_at,
+    time_of,
+)
+from fvsolve.kernels.delay.lines import rubbed
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import PIPE_FLOW, PIPE_PRESSURE
+
+
+@njit
+def sent(t, out, tables, which, q, wave, at):
+    """Wave that is sent into stretch q of a line at a time `at` <= t, which may be one of the step that ends at t."""
+    past, line = tables.past, tables.delays[which]
+    newest = int(past[COUNT]) - 1
+    if newest < 0:
+        return 0.0
+    s, last = line["stretch"] + q, time_of(past, newest)
+    until = at + same_time(past)
+    k, w = stencil(past, clock_of(past, newest), min(at, last))
+    both = both_waves(past, stretch_at(past, s), int(past[CAPACITY]) - 1, k, w)
+    value = (both[1] if wave == 1 else both[0]) + jumps_until(past, jumps_at(past, s, wave), until)
+    if at <= last or t <= last:
+        return value
+    if q == (line["stretches"] - 1 if wave == 1 else 0):  # by what its node sends now
+        now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
+        return value + (now - value) * (at - last) / (t - last)
+    pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
+    r, l = read_both(past, clock_of(past, newest), line["stretch"] + before, at - line["tau"])
+    delta = rubbed(pipe, line, r, l)
+    return l + delta if wave == 1 else r - delta
+
+
+@njit
+def waves_at(t, out, tables, which, share):
+    """(forward, backward) wave [kg/s] at a share of the length of a line from `from`."""
+    line = tables.delays[which]
+    pipe, many = tables.pipes[line["pipe"]], line["stretches"]
+    q = min(int(share * many), many - 1)
+    x, tau = share * many - q, line["tau"]
+    r = sent(t, out, tables, which, q, 0, t - x * tau)
+    l = sent(t, out, tables, which, q, 1, t - (1.0 - x) * tau)
+    then = t - max(x, 1.0 - x) * tau
+    near = r if x >= 0.5 else sent(t, out, tables, which, q, 0, then)
+    far = l if x < 0.5 else sent(t, out, tables, which, q, 1, then)
+    delta = rubbed(pipe, line, near, far)
+    return r - x * delta, l + (1.0 - x) * delta
+
+
+@njit
+def along_line(t, out, tables, which, r, l):
+    """Both waves in the middle of the cells that a line is told by."""
+    n = r.size
+    for j in range(n):
+        r[j], l[j] = waves_at(t, out, tables, which, (j + 0.5) / n)
+
+
+@njit(forceinline=True)
+def sketched(past, clock, at, wave, t):
+    """Wave that was sent into a stretch at t, by lines between entries; at : where its entries begin."""
+    last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
+    capacity, place = clock[4][0], (t - latest) * often
+    if place > -even:
+        back = int(place)
+        k, x = last + back - 1, place - back + 1.0
+    else:
+        k, x = between(past, last, t)
+        if k < ZEROS and x == 0.0:  # before all
+            return jumps_until(past, at + 2 * capacity + wave * clock[4][2], t + clock[5])
+    a, b = at + 2 * (k & (capacity - 1)) + wave, at + 2 * ((k + 1) & (capacity - 1)) + wave
+    jumps = at + 2 * capacity + wave * clock[4][2]
+    return past[a] + x * (past[b] - past[a]) + jumps_until(past, jumps, t + clock[5])
+
+
+@njit
+def sketch_line(t, tables, which, r, l):
+    """`along_line` at the time of the last entry, as envelopes want it: by lines, delta that of what arrives."""
+    past, line, clock = tables.past, tables.delays[which], clock_of(tables.past, int(tables.past[COUNT]) - 1)
+    n, many, tau, place = r.size, line["stretches"], line["tau"], arrivals_at(past)
+    first = HEAD + clock[4][0] + line["stretch"] * clock[4][1]
+    for j in range(n):
+        share = (j + 0.5) / n * many
+        q = min(int(share), many - 1)
+        x, at = share - q, first + q * clock[4][1]
+        delta = past[place + 3 * (line["stretch"] + q) + 2]
+        r[j] = sketched(past, clock, at, 0, t - x * tau) - x * delta
+        l[j] = sketched(past, clock, at, 1, t - (1.0 - x) * tau) + (1.0 - x) * delta
+
+
+@njit
+def along_lines(t, out, handle, which, r, l):
+    """The same, of one line by its number."""
+    along_line(t, out, open_tables(handle), which, r, l)
+
+
+@njit
+def observe_lines(t, y, out, handle, values):
+    """Probes within delay lines."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        probe = probes[k]
+        if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
+            pipe = tables.pipes[probe["index"]]
+            if pipe["delay"] >= 0:
+                r, l = waves_at(t, out, tables, pipe["delay"], tables.floats[probe["weights"]])
+                value = r + l if probe["kind"] == PIPE_PRESSURE else pipe["flow"] + (r - l)
+                values[k] = probe["scale"] * value + probe["offset"]

@@ -1,0 +1,246 @@
+"""What was sent into delay lines, by time, and how it is read back. Knows times and waves; knows no nodes.
+
+A wave is a smooth part u, kept at accepted times, and jumps, each with its time: w(t) = u(t) + sum of jumps up to t.
+So nothing is interpolated across a jump. u is read by Lagrange's polynomial through up to six entries around, as many
+before as behind, so that no wave is magnified; entries that a step has not yet accepted are never read.
+
+past = [head, times of entries, then for each stretch its entries (u forward, u backward) and its jumps of both waves:
+sum of those that have arrived, first, count, how many of them have arrived in the last step, times, sizes; and at last
+what arrives at the ends of stretches, at a time].
+"""
+
+from fvsolve.jit import njit
+
+HEAD = 16
+CAPACITY, COUNT, QUEUE, STARTED, STEP, EVEN = 0, 1, 2, 3, 4, 5
+GREATEST, DROPPED, PASSED, STRETCHES, STRIDE = 6, 7, 8, 9, 10
+KNOWN_TIME, KNOWN_COUNT = 11, 12  # of the arrivals that are kept
+STEP_BEFORE, EVEN_BEFORE = 13, 14  # STEP and EVEN without the last entry
+ZEROS = 8  # entries before the first, of the profile
+SUM, FIRST, MANY, ARRIVED, TIMES = 0, 1, 2, 3, 4  # of the jumps of a wave
+SAME = 1e-9  # of a step: times that are as good as one
+RATIO = 3.0  # of neighbouring steps, above which a polynomial through them is a line
+
+
+@njit(forceinline=True)
+def time_of(past, k):
+    """Time of entry k [s]."""
+    return past[HEAD + (k & (int(past[CAPACITY]) - 1))]
+
+
+@njit(forceinline=True)
+def stretch_at(past, s):
+    """Where the entries of stretch s begin."""
+    return HEAD + int(past[CAPACITY]) + s * int(past[STRIDE])
+
+
+@njit(forceinline=True)
+def jumps_at(past, s, wave):
+    """Where the jumps of a wave of stretch s begin."""
+    return stretch_at(past, s) + 2 * int(past[CAPACITY]) + wave * (TIMES + 2 * int(past[QUEUE]))
+
+
+@njit(forceinline=True)
+def arrivals_at(past):
+    """Where it is kept what arrives: of each stretch backward wave at its beginning, forward one at its end, delta."""
+    return stretch_at(past, int(past[STRETCHES]))
+
+
+@njit(forceinline=True)
+def same_time(past):
+    """Difference of times that is none [s]."""
+    return SAME * past[STEP]
+
+
+@njit(forceinline=True)
+def newest_before(past, t):
+    """The newest entry before t: what a step may read that ends there."""
+    k = int(past[COUNT]) - 1
+    while k > ZEROS and time_of(past, k) >= t - same_time(past):
+        k -= 1
+    return k
+
+
+@njit(forceinline=True)
+def six(x):
+    """Weights of entries -2 .. 3 at x in [0, 1)."""
+    a, b, d, e, f = x + 2.0, x + 1.0, x - 1.0, x - 2.0, x - 3.0
+    ab, de, ef = a * b, d * e, e * f
+    return (
+        b * x * d * ef / -120.0, a * x * d * ef / 24.0, ab * d * ef / -12.0, ab * x * ef / 12.0,
+        ab * x * d * f / -24.0, ab * x * de / 120.0,
+    )  # fmt: skip
+
+
+@njit(forceinline=True)
+def four(x):
+    """Weights of entries -1 .. 2 at x in [0, 1), as those of six."""
+    b, d, e = x + 1.0, x - 1.0, x - 2.0
+    return 0.0, x * d * e / -6.0, b * d * e / 2.0, b * x * e / -2.0, b * x * d / 6.0, 0.0
+
+
+@njit
+def between(past, newest, t):
+    """(entry k, share of the way to the next) where t lies; before the first entry that of the profile."""
+    low, high = max(ZEROS, int(past[COUNT]) - int(past[CAPACITY]) + ZEROS), newest
+    if t >= time_of(past, high):
+        return high - 1, 1.0
+    if t < time_of(past, low):
+        return ZEROS - 1, 0.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time_of(past, middle) <= t:
+            low = middle
+        else:
+            high = middle
+    return low, (t - time_of(past, low)) / (time_of(past, low + 1) - time_of(past, low))
+
+
+@njit
+def uneven(past, newest, t):
+    """(entry before t, weights) where steps differ: a cubic through four entries, or a line where they differ much."""
+    low, x = between(past, newest, t)
+    line = (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+    if low < ZEROS:
+        return low, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0) if x == 0.0 else line
+    t1, t2 = time_of(past, low), time_of(past, low + 1)
+    if low + 2 > newest or low - 1 < ZEROS:
+        return low, line
+    t0, t3 = time_of(past, low - 1), time_of(past, low + 2)
+    near, here, far = t1 - t0, t2 - t1, t3 - t2
+    if max(near, here, far) > RATIO * min(near, here, far):
+        return low, line
+    a, b, c, d = t - t0, t - t1, t - t2, t - t3
+    return low, (
+        0.0, b * c * d / ((t0 - t1) * (t0 - t2) * (t0 - t3)), a * c * d / (near * (t1 - t2) * (t1 - t3)),
+        a * b * d / ((t2 - t0) * here * (t2 - t3)), a * b * c / ((t3 - t0) * (t3 - t1) * far), 0.0,
+    )  # fmt: skip
+
+
+@njit(forceinline=True)
+def clock_of(past, newest):
+    """What every reading asks for: (newest entry, its time, 1 / step, how many steps were of this length, sizes, SAME).
+
+    It is the same whether an entry behind the newest is there already or not.
+    """
+    step, even = past[STEP], past[EVEN]
+    if newest != int(past[COUNT]) - 1:
+        step, even = past[STEP_BEFORE], past[EVEN_BEFORE]
+    sizes = int(past[CAPACITY]), int(past[STRIDE]), TIMES + 2 * int(past[QUEUE])
+    return newest, time_of(past, newest), 1.0 / step, even, sizes, same_time(past)
+
+
+@njit(forceinline=True)
+def stencil(past, clock, t):
+    """(entry k, weights of entries k - 2 .. k + 3) of a smooth part at t, none of them behind the newest of a clock."""
+    newest, latest, often, even = clock[0], clock[1], clock[2], clock[3]
+    place = (t - latest) * often
+    if place <= -even:
+        return uneven(past, newest, t)
+    whole = int(place) - 1 if place < int(place) else int(place)
+    k, x = newest + whole, place - whole
+    if k >= newest:
+        return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    if k + 3 <= newest and whole - 2 >= -even:
+        return k, six(x)
+    if k + 2 <= newest and whole - 1 >= -even:
+        return k, four(x)
+    if k + 2 <= newest:
+        return uneven(past, newest, t)
+    return k, (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+
+
+@njit(forceinline=True)
+def both_waves(past, at, mask, k, w):
+    """Smooth parts of both waves of a stretch by weights of entries k - 2 .. k + 3; at : where its entries begin."""
+    a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
+    d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
+    r = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
+    a, b, c, d, e, f = a + 1, b + 1, c + 1, d + 1, e + 1, f + 1
+    l = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
+    return r, l
+
+
+@njit
+def some_jumps(past, at, t):
+    """Sum of the jumps of a wave up to t, of which it has some."""
+    total, many, queue, first = past[at + SUM], int(past[at + MANY]), int(past[QUEUE]), int(past[at + FIRST])
+    for i in range(many):
+        place = at + TIMES + (first + i) % queue
+        if past[place] > t:
+            break
+        total += past[place + queue]
+    return total
+
+
+@njit(forceinline=True)
+def jumps_until(past, at, t):
+    """Sum of the jumps of a wave up to t."""
+    return some_jumps(past, at, t) if past[at + MANY] > 0.0 else past[at + SUM]
+
+
+@njit(forceinline=True)
+def read_both(past, clock, s, t):
+    """Both waves that were sent into stretch s at t [kg/s], forward from its beginning and backward from its end."""
+    capacity, stride, jumps = clock[4]
+    at = HEAD + capacity + s * stride
+    k, w = stencil(past, clock, t)
+    r, l = both_waves(past, at, capacity - 1, k, w)
+    until, ahead = t + clock[5], at + 2 * capacity
+    back = ahead + jumps
+    return r + jumps_until(past, ahead, until), l + jumps_until(past, back, until)
+
+
+@njit
+def push_jump(past, at, t, size):
+    """Note a jump of a wave; what is too many joins the smooth part."""
+    queue, first, many = int(past[QUEUE]), int(past[at + FIRST]), int(past[at + MANY])
+    i = many
+    while i > 0 and past[at + TIMES + (first + i - 1) % queue] > t + same_time(past):
+        i -= 1
+    before = at + TIMES + (first + i - 1) % queue
+    if i > int(past[at + ARRIVED]) and abs(past[before] - t) <= same_time(past):
+        past[before + queue] += size
+        return
+    if many == queue:
+        past[DROPPED] = max(past[DROPPED], abs(size))
+        return
+    for j in range(many, i, -1):
+        here, there = at + TIMES + (first + j) % queue, at + TIMES + (first + j - 1) % queue
+        past[here], past[here + queue] = past[there], past[there + queue]
+    here = at + TIMES + (first + i) % queue
+    past[here], past[here + queue] = t, size
+    past[at + MANY] = many + 1.0
+
+
+@njit
+def forget_jumps(past, at, t):
+    """Take those that have arrived, and were sent before t, out of the list."""
+    queue = int(past[QUEUE])
+    while past[at + ARRIVED] > 0.0 and past[at + TIMES + int(past[at + FIRST])] < t:
+        past[at + SUM] += past[at + TIMES + int(past[at + FIRST]) + queue]
+        past[at + FIRST] = (int(past[at + FIRST]) + 1) % queue
+        past[at + MANY] -= 1.0
+        past[at + ARRIVED] -= 1.0
+
+
+@njit
+def begin_entry(past, t):
+    """Make room for an entry at t; returns its number."""
+    mask, k = int(past[CAPACITY]) - 1, int(past[COUNT])
+    if k == 0:
+        past[COUNT], past[STARTED], past[EVEN], past[STEP] = ZEROS + 1.0, t, 1e18, 1e-300
+        past[STEP_BEFORE], past[EVEN_BEFORE] = past[STEP], past[EVEN]
+        past[HEAD + ZEROS] = t
+        return ZEROS
+    h = t - time_of(past, k - 1)
+    past[STEP_BEFORE], past[EVEN_BEFORE] = past[STEP], past[EVEN]
+    if k == ZEROS + 1:
+        past[STEP] = h
+    elif abs(h - past[STEP]) <= 1e-9 * h:
+        past[EVEN] += 1.0
+    else:
+        past[EVEN], past[STEP] = 1.0, h
+    past[HEAD + (k & mask)] = t
+    past[COUNT] = k + 1.0
+    return k

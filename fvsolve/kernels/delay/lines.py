@@ -1,0 +1,174 @@
+"""Delay lines in a scene's right-hand side, under the linear density law. Knows the tables; closes no node.
+
+Along a stretch both waves travel unchanged to its middle, where friction takes delta = tau / 2 (drag(M) - drag0) from
+the forward wave and gives it to the backward one, M being the flow there: so M + delta = M0 + r - l of what was sent
+tau ago (the midpoint rule along the way; passive, as friction is). A line that is shorter than the longest step h
+delivers the share 1 - tau / h of what is sent at once, the rest after h: its mean delay is tau, it magnifies no wave,
+and its ends know each other, p' as between two admittances Y tau / (2 h - tau) and a conductance between them.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.delay.history import (
+    COUNT,
+    KNOWN_COUNT,
+    KNOWN_TIME,
+    arrivals_at,
+    clock_of,
+    newest_before,
+    read_both,
+)
+from fvsolve.kernels.friction import EXPONENT, drag, power_of_square
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH
+
+ENOUGH = 1e-7  # of a flow that Newton leaves
+ROUGH = 0.2  # of its slope, by which that of a factor that hangs on the flow is off
+MOST = 60
+
+
+@njit(forceinline=True)
+def drag_and_slope(pipe, flow):
+    """(drag [kg/s2], d drag / d flow [1/s]), the slope of a factor that hangs on the flow as if it did not."""
+    size = abs(flow)
+    if pipe["friction"] == FRICTION_HAZEN:
+        loss, rough, p = pipe["loss"], pipe["rough"], power_of_square(size * size)  # and rounds as `drag` does
+        return loss * (size * flow) + rough * (p * flow), 2.0 * loss * size + (1.0 + EXPONENT) * rough * p
+    force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+    return force, 2.0 * abs(force) / size if size > 0.0 else 0.0
+
+
+@njit(forceinline=True)
+def rubbed(pipe, line, r, l):
+    """delta [kg/s] where waves r and l meet in the middle of a stretch, by Newton: what takes it is monotone."""
+    if pipe["friction"] == FRICTION_NONE and pipe["drag"] == 0.0:
+        return 0.0
+    kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
+    rough = ROUGH if pipe["friction"] == FRICTION_ROUGH else 0.0
+    m, least = x, ENOUGH * (abs(x) + 1e-3 * abs(flow))
+    for _ in range(MOST):
+        force, slope = drag_and_slope(pipe, flow + m)
+        step = (m + kappa * (force - drag0) - x) / (1.0 + kappa * slope)
+        m -= step
+        left = abs(step) * kappa * slope  # by how much the slope was another on the way: what remains
+        if not left * (abs(step) + rough * abs(flow + m)) > least * abs(flow + m):
+            break
+    return x - m
+
+
+@njit(forceinline=True)
+def arrive(past, clock, line, pipe, q, t, place):
+    """What arrives at the ends of stretch q of a line at t, into past from `place` on.
+
+    Of a short line both waves are those at p' = 0 at its ends.
+    """
+    r, l = read_both(past, clock, line["stretch"] + q, t - line["hold"])
+    delta, beta = rubbed(pipe, line, r, l), line["now"]
+    back, ahead = l + delta, r - delta
+    if beta > 0.0:
+        ahead, back = ahead - beta * r, back - beta * l
+        per = 1.0 / (1.0 - beta * beta)
+        ahead, back = per * (ahead - beta * back), per * (back - beta * ahead)
+    past[place], past[place + 1], past[place + 2] = back, ahead, delta
+
+
+@njit
+def arrive_all(past, tables, t):
+    """What arrives at the ends of all lines at t; nodes are closed several times at one time, which is read once."""
+    if past[KNOWN_TIME] == t and past[KNOWN_COUNT] == past[COUNT]:
+        return
+    place, clock = arrivals_at(past), clock_of(past, newest_before(past, t))
+    delays, pipes = tables.delays, tables.pipes
+    for i in range(delays.size):
+        line = delays[i]
+        pipe, first, last = pipes[line["pipe"]], place + 3 * line["stretch"], line["stretches"] - 1
+        for q in range(0, last + 1, max(1, last)):
+            arrive(past, clock, line, pipe, q, t, first + 3 * q)
+    past[KNOWN_TIME], past[KNOWN_COUNT] = t, past[COUNT]
+
+
+@njit
+def offer_lines(t, y, dydt, out, handle):
+    """Waves that leave delay lines into out[ends], and what they carry into their nodes into out[net]."""
+    tables = open_tables(handle)
+    past, layout, lines = tables.past, tables.layout[0], tables.delays
+    started, place = past[COUNT] > 0.0, arrivals_at(past)
+    if started:
+        arrive_all(past, tables, t)
+    for i in range(lines.size):
+        line, pipe = lines[i], tables.pipes[lines[i]["pipe"]]
+        at, first = layout["ends"] + 4 * line["pipe"], place + 3 * line["stretch"]
+        left, right = 0.0, 0.0
+        if started:
+            left, right = past[first], past[first + 3 * line["stretches"] - 2]
+        out[at + 1], out[at + 2] = left, right
+        out[layout["net"] + pipe["from_node"]] += 2.0 * left
+        out[layout["net"] + pipe["to_node"]] += 2.0 * right
+
+
+@njit
+def answer_lines(t, y, dydt, out, handle):
+    """Waves that the nodes send into delay lines: Y p' less what arrives, which in short lines they decide too."""
+    tables = open_tables(handle)
+    layout, lines = tables.layout[0], tables.delays
+    for i in range(lines.size):
+        line, pipe = lines[i], tables.pipes[lines[i]["pipe"]]
+        at = layout["ends"] + 4 * line["pipe"]
+        near = pipe["admittance"] * out[layout["pressure"] + pipe["from_node"]]
+        far = pipe["admittance"] * out[layout["pressure"] + pipe["to_node"]]
+        if line["now"] > 0.0:
+            beta = line["now"]
+            per = beta / (1.0 - beta * beta)
+            out[at + 1] += per * (far - beta * near)
+            out[at + 2] += per * (near - beta * far)
+        out[at], out[at + 3] = near - out[at + 1], far - out[at + 2]
+
+
+@njit
+def fill_lines(t, y, dydt, out, handle):
+    """d/dt of what delay lines hold [kg/s]: what flows in at both ends."""
+    tables = open_tables(handle)
+    layout, lines = tables.layout[0], tables.delays
+    if dydt.size == 0:
+        return
+    for i in range(lines.size):
+        at = layout["ends"] + 4 * lines[i]["pipe"]
+        dydt[tables.pipes[lines[i]["pipe"]]["y"]] = (out[at] - out[at + 1]) - (out[at + 2] - out[at + 3])
+
+
+@njit
+def couple_clusters(t, y, dydt, out, handle):
+    """Nodes that short lines join and no valve: p' by the inverse of their admittances."""
+    tables = open_tables(handle)
+    layout, integers, work = tables.layout[0], tables.integers, tables.scratch
+    for which in range(tables.clusters.size):
+        cluster = tables.clusters[which]
+        if cluster["inverse"] < 0:
+            continue
+        n, first = cluster["nodes"], cluster["first_node"]
+        for i in range(n):
+            work[i] = out[layout["net"] + integers[first + i]]
+        for c in range(cluster["couples"]):
+            line = tables.delays[integers[cluster["first_couple"] + c]]
+            pipe = tables.pipes[line["pipe"]]
+            for side in range(2):
+                here, there = (
+                    pipe["to_node"] if side else pipe["from_node"],
+                    pipe["from_node"] if side else pipe["to_node"],
+                )
+                i, j = row_of(tables, which, here), row_of(tables, which, there)
+                if i >= 0 and j < 0:
+                    work[i] += line["couple"] * out[layout["pressure"] + there]
+        for i in range(n):
+            total, at = 0.0, cluster["inverse"] + i * n
+            for j in range(n):
+                total += tables.floats[at + j] * work[j]
+            out[layout["pressure"] + integers[first + i]] = total
+
+
+@njit(forceinline=True)
+def row_of(tables, which, i):
+    """Row of node i in a cluster, -1 where it is none of its nodes."""
+    cluster, row = tables.clusters[which], tables.nodes[i]["row"]
+    if tables.nodes[i]["solve"] != 2 or row < 0 or row >= cluster["nodes"]:
+        return -1
+    return row if tables.integers[cluster["first_node"] + row] == i else -1

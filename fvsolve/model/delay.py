@@ -1,0 +1,264 @@
+"""Which pipes are followed as delay lines, into how many stretches they are cut, and how far off that may be.
+
+Bounds, in units of the greatest jump that a schedule makes: friction in the middle of stretches, a quarter of what it
+takes of a wave there; interpolation of what schedules smooth over a time T, by derivatives of half a cosine; a line
+shorter than the longest step h, the curvature of that over its delay, tau (h - tau) / 2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.kernels import records as rec
+from fvsolve.kernels.delay.history import HEAD, TIMES
+from fvsolve.kernels.delay.lines import drag_and_slope
+from fvsolve.kernels.schedules import WAVE
+
+FELT = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start where friction is looked at
+DRIVEN = 1e-9  # of a bar's wave: what friction leaves of a drop
+ROUGH = 0.5  # of a wave: friction of a line shorter than a step may take no more
+JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024  # kept in all lines together, and of each wave
+SPARE = 64  # entries beyond those of a travel time
+
+
+@dataclass(frozen=True)
+class Followed:
+    """How a pipe is followed: "cells" or "delay", why, and what steps go by.
+
+    rate : of lines that ask for steps [1/s]; longest : step that lines are cut for [s]
+    """
+
+    line: str
+    why: str
+    rate: float = 0.0
+    longest: float = math.inf
+
+
+def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
+    """Pipe -> how it is followed; unfit : those that `auto` has found to be off by more than `numerics.accuracy`."""
+    pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
+    found, lines = {}, []
+    for name, link in pipes.items():
+        line = link.line or case.numerics.line
+        lacks = "" if line == "cells" else what_needs_cells(case, link)
+        if line == "cells" or lacks:
+            found[name] = Followed("cells", lacks or f'line = "{line}"')
+        elif name in unfit:
+            found[name] = Followed("cells", "its bound as a delay line is above numerics.accuracy")
+        else:
+            lines.append(name)
+    if not lines:
+        return {name: found[name] for name in pipes}
+    travel = {name: link.length / case.wave_speed(name) for name, link in pipes.items()}
+    slowest = max(lines, key=travel.get)
+    rate = pipes[slowest].cells / travel[slowest]
+    cells = max((pipes[name].cells / travel[name] for name in found), default=0.0)
+    numerics = case.numerics
+    longest = 1.0 / rate  # under error control, see `solve.loop.longest_step`
+    if numerics.step is not None or numerics.courant is not None:
+        longest = numerics.step or numerics.courant / max(rate, cells)
+    for name in lines:
+        why = "waves travel along it unchanged but for friction"
+        if travel[name] < longest:
+            why += f", and faster than a step of {longest:.4g} s"
+        found[name] = Followed("delay", why, rate, longest)
+    return {name: found[name] for name in pipes}
+
+
+def what_needs_cells(case, link) -> str:
+    """What in a pipe changes its waves as they travel; "" for nothing."""
+    if not case.law.linear:
+        return f'law = "{case.law.name}" changes waves as they travel'
+    if case.scalars:
+        return "scalars are carried in cells"
+    if link.friction.model == "unsteady":
+        return "unsteady friction remembers the flow of every cell"
+    if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
+        return "a body that it rides on drives its cells"
+    return ""
+
+
+def lower_delays(draft) -> None:
+    """Rows of delay lines, and the faults of those that cannot be one."""
+    case, rows = draft.case, []
+    for k, name in enumerate(draft.pipe_names):
+        link, chosen = case.links[name], draft.followed[name]
+        asked = link.line or case.numerics.line
+        if asked == "delay" and chosen.line == "cells":
+            key = f"links.{name}.line" if link.line else "numerics.line"
+            draft.fault(key, f'"delay" does not fit links.{name}: {chosen.why}; wanted "cells", or "auto"')
+        if chosen.line == "cells":
+            continue
+        row = np.zeros((), rec.DELAY)
+        pipe = draft.pipe_table[k]
+        pipe["delay"], row["pipe"], row["places"] = len(rows), k, link.cells
+        row["tau"] = row["hold"] = link.length / pipe["speed"]
+        row["stretch"], row["stretches"] = len(rows), 1
+        if row["tau"] < chosen.longest * (1.0 - 1e-9):
+            row["hold"], beta = chosen.longest, 1.0 - row["tau"] / chosen.longest
+            row["now"], row["couple"] = beta, 2.0 * beta * pipe["admittance"] / (1.0 - beta * beta)
+        rows.append(row)
+    draft.delay_table = np.array(rows, rec.DELAY)
+    ends: list[list[int]] = [[] for _ in draft.node_table] if rows else []
+    for d, row in enumerate(rows):
+        for side, end in enumerate(("from_node", "to_node")):
+            ends[draft.pipe_table[row["pipe"]][end]].append(2 * d + side)
+    for i, there in enumerate(ends):
+        draft.node_table["lines"][i], draft.node_table["line_count"][i] = len(draft.integers), len(there)
+        draft.integers += there
+
+
+def at_ends(draft, pipe) -> float:
+    """Admittance of a pipe's ends over that of its waves: less of a line whose ends know each other."""
+    beta = draft.delay_table["now"][pipe["delay"]] if pipe["delay"] >= 0 else 0.0
+    return float((1.0 - beta) / (1.0 + beta))
+
+
+def cut_lines(draft) -> list[str]:
+    """Stretches of all lines, by friction at the start; names of those whose bound is above the accuracy under auto."""
+    case, at, unfit = draft.case, 0, []
+    found = draft.steady["lines"] = {}
+    for name, chosen in draft.followed.items():
+        found[name] = {"line": chosen.line, "line_bound": None, "line_why": chosen.why}
+    scale = time_scale(draft)
+    for row in draft.delay_table:
+        name = draft.pipe_names[row["pipe"]]
+        pipe, chosen = draft.pipe_table[row["pipe"]], draft.followed[name]
+        travel = float(row["tau"] * row["stretches"])
+        flow = abs(float(pipe["flow"])) + float(pipe["admittance"]) * FELT
+        takes = travel * float(drag_and_slope(pipe, flow)[1])
+        most = max(1, math.floor(travel / chosen.longest * (1.0 + 1e-9)))
+        many = min(most, max(1, math.ceil(0.5 * takes / case.numerics.accuracy)))
+        if row["now"] > 0.0:
+            many = 1
+        row["stretches"], row["stretch"], row["slope"] = many, at, drag_and_slope(pipe, float(pipe["flow"]))[1]
+        row["tau"] = travel / many
+        row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
+        at += many
+        off = 0.25 * takes / many + by_interpolation(float(row["tau"]), chosen.longest, scale)
+        found[name]["line_bound"] = off
+        force = float(drag_and_slope(pipe, float(pipe["flow"]))[0])
+        if abs(float(pipe["drag"]) - force) > DRIVEN * float(pipe["admittance"]) * 1e5 / travel:
+            off = math.inf
+            unfit.append(name)
+            if (case.links[name].line or case.numerics.line) == "delay":
+                draft.fault(f"links.{name}.line", '"delay" does not fit: at the start friction does not hold the drop '
+                            'of pressure along it, which drives every part of it; wanted "cells"')  # fmt: skip
+            continue
+        if row["now"] > 0.0 and takes > ROUGH:
+            off = math.inf
+            found[name]["line_why"] += ", where friction takes too much of a wave"
+        asked = case.links[name].line or case.numerics.line
+        if asked == "auto" and off > case.numerics.accuracy:
+            unfit.append(name)
+        elif off == math.inf:
+            draft.fault(f"links.{name}.line", f'"delay" does not fit: friction takes {takes:.3g} of a wave in a line '
+                        f'shorter than a step of {chosen.longest:.4g} s; wanted shorter steps, or "cells"')  # fmt: skip
+    draft.shapes = draft.shapes._replace(past=past_of(draft))
+    return unfit
+
+
+def by_interpolation(tau: float, step: float, scale: float) -> float:
+    """Bound of what reading between steps is off by, of half a cosine of duration `scale` [s]."""
+    bend = math.pi * step / scale if scale > 0.0 else 0.0
+    if tau < step:
+        return 0.25 * (math.pi / scale) ** 2 * tau * (step - tau) if scale > 0.0 else 0.0
+    if abs(tau / step - round(tau / step)) < 1e-9:
+        return 0.0
+    if tau >= 3.0 * step:
+        return 0.5 * 0.0049 * bend**6
+    return 0.5 * (0.0234 * bend**4 if tau >= 2.0 * step else 0.125 * bend**2)
+
+
+def time_scale(draft) -> float:
+    """The shortest time in which a schedule changes its value [s]; 0 where none does but by jumps, which are kept."""
+    found, schedules = math.inf, draft.schedules
+    for first, count in schedules.records:
+        rows = schedules.rows[first : first + count]
+        for k, row in enumerate(rows):
+            if row[1] == WAVE:
+                found = min(found, math.pi / row[5]) if row[4] != 0.0 else found
+            elif 0 < k < count - 1 and (row[1] != 0 or any(row[4:7])):
+                found = min(found, rows[k + 1][0] - row[0])
+    return found if math.isfinite(found) else 0.0
+
+
+def past_of(draft) -> int:
+    """Numbers that a run keeps of what was sent into lines."""
+    many = int(draft.delay_table["stretches"].sum())
+    if not many:
+        return 0
+    longest = min(one.longest for one in draft.followed.values() if one.line == "delay")
+    return past_size(many, capacity_of(draft.delay_table, longest))
+
+
+def capacity_of(delays, longest: float) -> int:
+    """Entries of a ring that holds the longest delay in steps of this length, a power of two."""
+    return 1 << math.ceil(math.log2(2.0 * float(delays["hold"].max()) / longest + SPARE))
+
+
+def queue_of(many: int) -> int:
+    """Jumps of each wave that are kept at once."""
+    return max(LEAST_JUMPS, min(MOST_JUMPS, JUMPS // many))
+
+
+def past_size(many: int, capacity: int) -> int:
+    """Numbers of `many` stretches, see `kernels.delay.history`."""
+    return HEAD + capacity + many * (stride_of(many, capacity) + 3)
+
+
+def stride_of(many: int, capacity: int) -> int:
+    """Numbers of one of `many` stretches."""
+    return 2 * capacity + 2 * (TIMES + 2 * queue_of(many))
+
+
+def begin_past(past: np.ndarray, delays) -> None:
+    """Say the sizes of an empty past."""
+    many = int(delays["stretches"].sum())
+    if many:
+        fixed = HEAD + many * (stride_of(many, 0) + 3)
+        past[:], capacity = 0.0, (past.size - fixed) // (1 + 2 * many)
+        past[[0, 2, 9, 10]] = capacity, queue_of(many), many, stride_of(many, capacity)
+        past[11] = np.nan
+
+
+def without_past(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What a state remembers beside the past of delay lines, and that; ValueError where it is not such a memory."""
+    size = int(memory[-1]) if memory.size and np.isfinite(memory[-1]) else -1
+    if not 0 <= size < memory.size:
+        raise ValueError("no such past")
+    return memory[: memory.size - 1 - size], memory[memory.size - 1 - size : -1]
+
+
+def room_left(past: np.ndarray, delays) -> int:
+    """Steps that can be taken before an entry is lost that is still to be read."""
+    capacity, count = int(past[0]), int(past[1])
+    if count == 0:
+        return capacity - 32
+    first = max(8, count - capacity)
+    ring = np.arange(first, count)
+    times = past[HEAD + (ring & (capacity - 1))]
+    wanted = np.searchsorted(times, times[-1] - 1.1 * float(delays["hold"].max()))
+    return capacity - (count - first) + max(0, int(wanted) - 8)
+
+
+def doubled(past: np.ndarray, delays) -> np.ndarray:
+    """The same past with room for twice as many entries."""
+    many, capacity, count = int(past[9]), int(past[0]), int(past[1])
+    wider = np.zeros(past_size(many, 2 * capacity))
+    wider[:HEAD] = past[:HEAD]
+    wider[0], wider[10], wider[11] = 2 * capacity, stride_of(many, 2 * capacity), np.nan
+    kept = np.arange(max(0, count - capacity), count)
+    old, new = kept & (capacity - 1), kept & (2 * capacity - 1)
+    wider[HEAD + new] = past[HEAD + old]
+    own = 2 * (TIMES + 2 * queue_of(many))
+    for s in range(many):
+        a, b = HEAD + capacity + s * (2 * capacity + own), HEAD + 2 * capacity + s * (4 * capacity + own)
+        for wave in range(2):
+            wider[b + 2 * new + wave] = past[a + 2 * old + wave]
+        wider[b + 4 * capacity :][:own] = past[a + 2 * capacity :][:own]
+    return wider

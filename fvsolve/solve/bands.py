@@ -1,0 +1,178 @@
+"""How the state of a model is cut into bands of rows, a thread each, and what these need of each other. Knows tables.
+
+A band steps its own rows of every basin that can be cut, and beside these all else, as every other band does; what its
+own rows hang on beyond them it takes from whose rows these are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.basins.bands import REACH
+from fvsolve.errors import FvsolveError, Notice, listing
+from fvsolve.kernels import records as rec
+from fvsolve.model import Model
+from fvsolve.steppers import automatic
+from fvsolve.steppers.tableau import method_named
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A model's basins cut into `many` bands.
+
+    basins : numbers of those that are cut; firsts : int64[basins, many + 1]  first rows of bands, and how many rows
+    """
+
+    model: Model
+    many: int
+    basins: tuple[int, ...]
+    firsts: np.ndarray
+
+    @property
+    def sums(self) -> int:
+        """How many sums all bands make together."""
+        rows = self.model.tables.basins["ny"][[*self.basins]] * [quantities(self.model, b) for b in self.basins]
+        return len(self.alike()) + int(sum(rows))
+
+    def alike(self) -> list[tuple[int, int]]:
+        """Where states lie that all bands step."""
+        found, at = [], 0
+        for b in sorted(self.basins, key=lambda b: self.model.tables.basins[b]["y"]):
+            row = self.model.tables.basins[b]
+            found.append((at, int(row["y"])))
+            at = int(row["y"] + quantities(self.model, b) * row["n"])
+        found.append((at, self.model.y_size))
+        return [one for one in found if one[1] > one[0]] or [(0, 0)]
+
+    def spans(self, k: int) -> np.ndarray:
+        """What band k steps, as `steppers.step` has it, those that are alike first : int64[q, 4]."""
+        alike = self.alike()
+        found, first = [(*one, m, 1) for m, one in enumerate(alike)], len(alike)
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin = self.model.tables.basins[b]
+            n, nx, ny, y = (int(basin[key]) for key in ("n", "nx", "ny", "y"))
+            for q in range(quantities(self.model, b)):
+                begin, stop = (y + q * n + nx * int(row) for row in rows[k : k + 2])
+                found.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
+                first += ny
+        return np.array(found, dtype=np.int64)
+
+    def bands(self, k: int) -> np.ndarray:
+        """Rows of all basins that band k steps, as `Slate` has them : int64[2 basins]."""
+        table = self.model.tables.basins
+        found = np.zeros((len(table), 2), dtype=np.int64)
+        found[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            found[b] = rows[k : k + 2]
+        return found.ravel()
+
+    def states(self, k: int) -> np.ndarray:
+        """Runs of states that band k takes from others, (owner, first, beyond the last) : int64[r, 3]."""
+        found = []
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin = self.model.tables.basins[b]
+            nx, ny = int(basin["nx"]), int(basin["ny"])
+            near = np.arange(max(rows[k] - REACH, 0), min(rows[k + 1] + REACH, ny))
+            cells = [(nx * near[:, None] + np.arange(nx)).ravel(), *looked_at(self.model, b)]
+            for q in range(quantities(self.model, b)):
+                found.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
+        return np.concatenate(found)
+
+    def flows(self, k: int) -> np.ndarray:
+        """Likewise of flows through open boundaries, which lie in `work`."""
+        found = [np.zeros((0, 3), dtype=np.int64)]
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin = self.model.tables.basins[b]
+            nx, ny, at = int(basin["nx"]), int(basin["ny"]), int(basin["through"])
+            if at < 0:
+                continue
+            row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
+            owner = np.searchsorted(rows, row, "right") - 1
+            found.append(joined(np.arange(row.size), owner, k, at))
+        return np.concatenate(found)
+
+    @property
+    def together(self) -> bool:
+        """Whether something passes a boundary that several bands have."""
+        return bool((self.model.tables.basins["through"][[*self.basins]] >= 0).any())
+
+
+def quantities(model: Model, b: int) -> int:
+    """Number of states of a cell of a basin."""
+    return len(model.basins[b].quantities) + len(model.basins[b].scalars)
+
+
+def looked_at(model: Model, b: int):
+    """Cells of a basin that all bands look at: behind its patches, and where probes are."""
+    integers = model.tables.integers
+    for patch in model.tables.patches[model.tables.patches["basin"] == b]:
+        yield integers[patch["first"] : patch["first"] + patch["count"]]
+    probes = model.tables.probes
+    for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == b)]:
+        yield integers[probe["cell"] : probe["cell"] + probe["count"]]
+
+
+def runs(cells: np.ndarray, nx: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
+    """Runs of cells that are not of band k, with whose they are; at : where cell 0 lies."""
+    cells = np.unique(cells)
+    return joined(cells, np.searchsorted(rows, cells // nx, "right") - 1, k, at)
+
+
+def joined(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray:
+    """Runs of neighbours of one owner, but k : int64[r, 3]."""
+    places, owner = places[owner != k], owner[owner != k]
+    if not places.size:
+        return np.zeros((0, 3), dtype=np.int64)
+    new = np.flatnonzero((np.diff(places) != 1) | (np.diff(owner) != 0)) + 1
+    first, last = places[np.append(0, new)], places[np.append(new - 1, places.size - 1)]
+    return np.column_stack([owner[np.append(0, new)], at + first, at + last + 1]).astype(np.int64)
+
+
+def cut(model: Model, many: int) -> Cut:
+    """A model's basins that can be cut, in so many bands of as many rows each."""
+    which = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
+    rows = model.tables.basins["ny"][[*which]] if which else np.zeros(0, dtype=np.int64)
+    return Cut(model, many, which, np.arange(many + 1) * rows[:, None] // many)
+
+
+def alone(model: Model) -> str:
+    """Why a model is stepped by one thread, "" where several can."""
+    method = model.case.numerics.method
+    if method == automatic.AUTO or not method_named(automatic.first_method(method)).explicit:
+        return f"{method} solves for all states at once; explicit methods can be shared out"
+    if len(model.tables.delays):
+        return "it has delay lines, whose past one thread writes"
+    if not model.basins:
+        return "there is no basin; what is shared out is rows of basins"
+    return "" if not all(basin.whole for basin in model.basins) else said_whole(model)
+
+
+def said_whole(model: Model) -> str:
+    """Basins of which each thread steps all, and why."""
+    return "; ".join(f"{basin.name}: {basin.whole}" for basin in model.basins if basin.whole)
+
+
+def shared(model: Model) -> dict:
+    """What threads can share out: rows of basins, at most so many threads, and why not of others; for `check`."""
+    why = alone(model)
+    rows = {} if why else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
+    kept = {basin.name: basin.whole for basin in model.basins if basin.whole}
+    return {"rows": rows, "whole": kept, "most": min(rows.values(), default=1), "why": why}
+
+
+def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
+    """How many threads step a model that is given so many, and what is to be known; FvsolveError where too many."""
+    if threads == 1:
+        return 1, []
+    found = shared(model)
+    if why := found["why"]:
+        return 1, [Notice("threads", "numerics", f"one thread steps it, not {threads}: {why}", "threads")]
+    few = [f"{name} has {rows} rows" for name, rows in found["rows"].items() if rows < threads]
+    if few:
+        raise FvsolveError(
+            f"threads = {threads}: {listing(few)}, and each thread needs one; wanted {found['most']} at most"
+        )
+    text = f"each thread steps the whole of {said_whole(model)}"
+    return threads, [Notice("threads", "numerics", text, "threads")] if found["whole"] else []

@@ -1,0 +1,154 @@
+"""Processes that step bands of one state together, by messages of MPI. Knows arrays; knows no physics.
+
+Rank 0 runs; the others follow: each takes what Python may have changed there, marches when rank 0 does, and sends its
+rows when both are back. So what a clock or a signal decides is decided in one place.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import time
+import traceback
+
+import numpy as np
+
+from fvsolve.kernels import joint
+from fvsolve.solve.bands import Cut
+from fvsolve.solve.team import SMALL, WRITTEN, Member, banded, undisturbed, yielding
+from fvsolve.steppers import slots
+
+TOLD = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+MARCH, WHOLE, CLOSE = range(3)  # what rank 0 asks for
+FAREWELL = CLOSE, None
+
+
+class Exchange:
+    """Places of an array that ranks take from each other, and what they are sent in."""
+
+    def __init__(self, comm, runs: list[np.ndarray]) -> None:
+        me, self.comm = comm.rank, comm
+        self.takes = {k: places(runs[me], k) for k in range(comm.size) if k != me}
+        self.gives = {k: places(runs[k], me) for k in range(comm.size) if k != me}
+        self.rooms = {k: np.zeros(at.size) for k, at in self.takes.items()}
+
+    def __call__(self, values: np.ndarray) -> None:
+        """Bring what others have into place."""
+        from mpi4py import MPI
+
+        asked = [self.comm.Irecv(self.rooms[k], k) for k, at in self.takes.items() if at.size]
+        asked += [self.comm.Isend(values[at], k) for k, at in self.gives.items() if at.size]
+        MPI.Request.Waitall(asked)
+        for k, at in self.takes.items():
+            values[at] = self.rooms[k]
+
+
+def places(runs: np.ndarray, owner: int) -> np.ndarray:
+    """All places of the runs that are an owner's : int64[n]."""
+    mine = runs[runs[:, 0] == owner]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(begin, stop) for _, begin, stop in mine)])
+
+
+class Ranks:
+    """The bands of all ranks, as seen by one of them: rank 0's loop calls, the others `serve`."""
+
+    def __init__(self, loop, cut: Cut, comm) -> None:
+        self.loop, self.cut, self.comm, self.seconds = loop, cut, comm, 0.0
+        self.functions, self.join = banded(cut)
+        self.told = TOLD(self.tell_others)  # which lives as long as its address is known
+        self.tell, self.yielding = ctypes.cast(self.told, ctypes.c_void_p).value, yielding()
+        self.board = self.room = np.zeros(0)
+        self.member = Member(self, comm.rank, loop.slate, loop.stepper)
+        ranks = range(comm.size)
+        self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
+        self.others = np.ones(cut.sums, dtype=bool)
+        for _, _, first, many in self.member.stepper.spans[len(cut.alike()) if comm.rank > 0 else 0 :]:
+            self.others[first : first + many] = False
+        self.rows = [[slice(*one[:2]) for one in cut.spans(k)[len(cut.alike()) :].tolist()] for k in ranks]
+        self.stale = True
+
+    def tell_others(self, what: int, address: int, size: int) -> None:
+        """What compiled code calls in the middle of a step; all ranks do, or none goes on."""
+        try:
+            values = np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
+            if what in (joint.OF_STATES, joint.OF_FLOWS):
+                self.exchanges[what](values)
+            elif what == joint.OF_RATES:
+                values[0] = self.greatest(values[0])
+            else:
+                values[self.others] = 0.0
+                from mpi4py import MPI
+
+                self.comm.Allreduce(MPI.IN_PLACE, values, MPI.SUM)
+        except BaseException:
+            traceback.print_exc()
+            self.comm.Abort(1)
+
+    def greatest(self, rate: float) -> float:
+        """Of all ranks; infinite where one has no number."""
+        from mpi4py import MPI
+
+        return self.comm.allreduce(math.inf if math.isnan(rate) else float(rate), MPI.MAX)
+
+    def call(self, functions: tuple, where: int) -> int:
+        """March on with all ranks; returns one of the codes of `steppers.slots`."""
+        loop = self.loop
+        now = loop.flags[slots.NOW]
+        whole = [(0, loop.model.y_size)] if self.stale else self.cut.alike()
+        small = {name: getattr(loop.stepper, name) for name in SMALL}
+        written = {name: getattr(loop.slate.written, name) for name in WRITTEN}
+        states = [loop.stepper.y[now, begin:stop] for begin, stop in whole]
+        self.stale = False
+        with undisturbed():
+            self.comm.bcast((MARCH, (small, written, whole, states)))
+            code = self.member.march(functions, where)
+            self.gather("y", loop.flags[slots.NOW])
+            if code == slots.FIELD:
+                self.gather("y_out", ...)
+            self.seconds += sum(self.comm.gather(0.0))  # beside its own
+        return code
+
+    def gather(self, name: str, at) -> None:
+        """Bring the rows of all ranks to rank 0."""
+        values = getattr(self.loop.stepper, name)[at]
+        if self.comm.rank > 0:
+            for one in self.rows[self.comm.rank]:
+                self.comm.Send(values[one], 0)
+            return
+        for k in range(1, self.comm.size):
+            for one in self.rows[k]:
+                self.comm.Recv(values[one], k)
+
+    def whole(self, at: int) -> None:
+        """Bring row `at` of the states of all ranks to rank 0."""
+        with undisturbed():
+            self.comm.bcast((WHOLE, int(at)))
+            self.gather("y", at)
+
+    def close(self) -> None:
+        """Let the other ranks go."""
+        with undisturbed():
+            self.comm.bcast(FAREWELL)
+
+    def serve(self, functions: tuple, where: int) -> None:
+        """Follow rank 0 until it has no more to ask."""
+        stepper, written = self.loop.stepper, self.loop.slate.written
+        while True:
+            asked, given = self.comm.bcast(None)
+            if asked == CLOSE:
+                return
+            if asked == WHOLE:
+                self.gather("y", given)
+                continue
+            small, others, whole, states = given
+            for to, arrays in ((stepper, small), (written, others)):
+                for name, array in arrays.items():
+                    getattr(to, name)[...] = array
+            for (begin, stop), values in zip(whole, states, strict=True):
+                stepper.y[stepper.flags[slots.NOW], begin:stop] = values
+            before = time.thread_time()
+            code = self.member.march(functions, where)
+            self.gather("y", stepper.flags[slots.NOW])
+            if code == slots.FIELD:
+                self.gather("y_out", ...)
+            self.comm.gather(time.thread_time() - before)

@@ -1,0 +1,186 @@
+"""Threads that step bands of one state together, all by the same compiled loop. Knows arrays; knows no physics.
+
+Every member has arrays of its own, of the size of all, of which only what it looks at is ever touched. Python works on
+those of the loop, which are the first member's; before members go on they take from there what Python may have changed,
+and when they come back each brings its rows.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from queue import SimpleQueue
+
+import numpy as np
+
+from fvsolve.kernels import joint
+from fvsolve.kernels.functions import functions
+from fvsolve.kernels.handle import make_handle
+from fvsolve.model import Slate
+from fvsolve.model.slate import lined
+from fvsolve.solve.bands import Cut
+from fvsolve.steppers import slots
+from fvsolve.steppers.signatures import JOIN, compiled_as
+from fvsolve.steppers.stepper import Stepper
+
+SMALL = ("memory", "orders", "flags", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "supply")
+WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes")
+
+
+def yielding() -> int:
+    """Address of the system's function that lets other threads run."""
+    name = "SwitchToThread" if os.name == "nt" else "sched_yield"
+    library = ctypes.windll.kernel32 if os.name == "nt" else ctypes.CDLL(None)
+    return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+
+
+class Member:
+    """One band: its arrays, and the handle that opens them.
+
+    team : a `Team` of threads or `Ranks`: board, room, yielding and tell are what `kernels.joint` is to know of it
+    """
+
+    def __init__(self, team, k: int, slate: Slate, stepper: Stepper) -> None:
+        cut, loop = team.cut, team.loop
+        self.loop, self.number, self.slate, self.stepper = loop, k, slate, stepper
+        self.stepper.join, self.stepper.spans = team.join, cut.spans(k)
+        self.stepper.sums = np.zeros(cut.sums)
+        self.own = [slice(begin, stop) for begin, stop, *_ in self.stepper.spans[len(cut.alike()) :].tolist()]
+        states, flows = cut.states(k), cut.flows(k)
+        own = np.zeros(joint.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
+        own[joint.ME], own[joint.MANY], own[joint.YIELD], own[joint.TELL] = k, cut.many, team.yielding, team.tell
+        own[joint.BOARD], own[joint.ROOM] = team.board.ctypes.data, team.room.ctypes.data
+        own[joint.ALIKE], own[joint.STATES], own[joint.FLOWS] = len(cut.alike()), len(states), len(flows)
+        own[joint.HEAD :] = np.concatenate([states, flows]).ravel()
+        self.written = self.slate.written._replace(bands=cut.bands(k), joint=own)
+        self.tables = (*self.slate.tables, *self.written, team.functions.calls, team.functions.hooks)
+        self.handle = make_handle(self.tables)
+        at, by = loop.stepper.within
+        mine = np.zeros(loop.model.y_size, dtype=bool)
+        for begin, stop, *_ in self.stepper.spans.tolist():
+            mine[begin:stop] = True
+        kept = mine[at[::3]]
+        self.within = np.ascontiguousarray(at.reshape(-1, 3)[kept]).ravel(), by[kept]
+
+    def follow(self, states: list[slice]) -> None:
+        """Take over what Python may have changed in the arrays of the loop, and these states."""
+        if self.number == 0:
+            return
+        for name in SMALL:
+            getattr(self.stepper, name)[...] = getattr(self.loop.stepper, name)
+        for name in WRITTEN:
+            getattr(self.slate.written, name)[...] = getattr(self.loop.slate.written, name)
+        self.stepper.times, now = self.loop.stepper.times, self.loop.flags[slots.NOW]
+        for one in states:
+            self.stepper.y[now, one] = self.loop.stepper.y[now, one]
+
+    def march(self, functions: tuple, where: int) -> int:
+        """Go on until there is something to do, and bring what the loop has not."""
+        stepper = self.stepper
+        within, stepper.within = stepper.within, self.within
+        code = stepper.call(*functions, self.handle, where, self.slate.armed)
+        stepper.within = within
+        return code
+
+    def bring(self, name: str, at) -> None:
+        """Copy the rows of this band to the arrays of the loop."""
+        if self.number > 0:
+            mine, whole = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
+            for one in self.own:
+                whole[one] = mine[one]
+
+
+def twin(stepper: Stepper) -> Stepper:
+    """Another of the same method, with arrays of its own but for what steps only read."""
+    found = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale)
+    found.stored, found.carry, found.within = stepper.stored, stepper.carry.copy(), stepper.within
+    for name in ("out", "out_row", "values", "g", "g_new", "rows"):
+        setattr(found, name, getattr(stepper, name).copy())
+    return found
+
+
+def banded(cut: Cut) -> tuple:
+    """Functions of a model whose bands tell each other, and by what they bring sums together."""
+    cast = replace(cut.model.functions.cast, bands=True, together=cut.together)
+    return functions(cast), compiled_as(joint.share, JOIN)
+
+
+class Team:
+    """All members of a loop, each but none of them in the thread that asks."""
+
+    def __init__(self, loop, cut: Cut) -> None:
+        self.loop, self.cut, self.yielding, self.tell, self.seconds = loop, cut, yielding(), 0, 0.0
+        self.functions, self.join = banded(cut)
+        self.board = lined(joint.LINE * cut.many)
+        self.room = lined(2 * cut.sums)
+        self.members = [Member(self, 0, loop.slate, loop.stepper)]
+        self.members += [Member(self, k, Slate(loop.model), twin(loop.stepper)) for k in range(1, cut.many)]
+        self.stale = True  # whether rows of the loop are not those of the members
+        self.asked = [SimpleQueue() for _ in self.members]
+        self.answers: SimpleQueue = SimpleQueue()
+        tasks = zip(self.members, self.asked, strict=True)
+        self.threads = [threading.Thread(target=self.serve, args=one, daemon=True, name="band") for one in tasks]
+        for thread in self.threads:
+            thread.start()
+
+    def serve(self, member: Member, asked: SimpleQueue) -> None:
+        """What a thread does: march when it is asked to."""
+        while (task := asked.get()) is not None:
+            before = time.thread_time()
+            try:
+                answer = member.march(*task)
+                member.bring("y", member.stepper.flags[slots.NOW])
+                if answer == slots.FIELD:
+                    member.bring("y_out", ...)
+            except BaseException as error:  # for whoever asked
+                answer = error
+            self.answers.put((answer, time.thread_time() - before))
+
+    def call(self, functions: tuple, where: int) -> int:
+        """March on with all members; returns one of the codes of `steppers.slots`."""
+        for member in self.members:
+            alike = [slice(*one) for one in self.cut.alike()]
+            member.follow(alike + (member.own if self.stale else []))
+        self.stale = False
+        with undisturbed():
+            for asked in self.asked:
+                asked.put((functions, where))
+            answers = [self.answers.get() for _ in self.members]
+        self.seconds += sum(seconds for _, seconds in answers)
+        for answer, _ in answers:
+            if isinstance(answer, BaseException):
+                raise answer
+        return answers[0][0]
+
+    def whole(self, at: int) -> None:
+        """Bring row `at` of the states of all members to the loop."""
+        for member in self.members:
+            member.bring("y", at)
+
+    def close(self) -> None:
+        """Let the threads end."""
+        for asked in self.asked:
+            asked.put(None)
+        for thread in self.threads:
+            thread.join()
+
+
+@contextmanager
+def undisturbed():
+    """Put off Ctrl-C until all members are back, who wait for each other."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard, before = [], signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *given: heard.append(given))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if heard and callable(before):
+        before(*heard[0])

@@ -1,0 +1,54 @@
+"""`fvsolve warm` leaves nothing to compile, and says where it cannot."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from truth.folders import CASES
+
+from fvsolve import jit
+from fvsolve.run.warming import kept
+
+
+def warm(*words: str, **environment: str):
+    """A process that warms."""
+    command = [sys.executable, "-m", "fvsolve", "warm", *words]
+    return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not jit.COMPILING, reason="JIT is off")
+def test_what_has_been_warmed_is_compiled_no_more():
+    first, second = (json.loads(warm("--for", "two-tanks", "--json").stdout) for _ in range(2))
+    assert second["compiled"] == 0 and second["functions"] >= first["functions"] > 20
+    assert second["directory"].endswith(second["target"]) and second["bytes"] > 1e5
+    assert json.loads((Path(second["directory"]) / "target.json").read_text())["name"] == second["target"]
+    before = kept(Path(second["directory"]))
+    code = "import sys, fvsolve; fvsolve.run('two-tanks.toml', {'output.fields': 0}); print('numba' in sys.modules)"
+    told = subprocess.run([sys.executable, "-c", code], cwd=CASES, capture_output=True, text=True, check=True)
+    assert told.stdout == "False\n" and kept(Path(second["directory"])) == before
+
+
+@pytest.mark.parametrize(
+    "environment, named",
+    [
+        ({"FVSOLVE_CACHE": os.devnull + "/code"}, "FVSOLVE_CACHE = /dev/null/code: cannot be written; wanted a folder"),
+        ({"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set"),
+    ],
+)
+def test_where_nothing_can_be_kept_is_said_and_nothing_compiled(environment, named):
+    done = warm("--for", "two-tanks", **environment)
+    assert done.returncode == 2 and named in done.stderr and done.stdout == ""
+
+
+def test_all_cases_are_read_before_any_is_compiled(tmp_path, fvs):
+    (tmp_path / "bad.toml").write_text("schema = 1\nnonsense = 2\n")
+    code, _, err = fvs("warm", "--for", "two-tanks", "--for", str(tmp_path / "bad.toml"))
+    assert code == 2 and "nonsense" in err
+    code, _, err = fvs("warm", "--for", "two-tankz")
+    assert code == 2 and "two-tanks" in err

@@ -1,0 +1,83 @@
+"""Hazen-Williams: its power against Decimal's, its mean over a cell against quadrature, and its signs to the bit."""
+
+from decimal import Decimal, localcontext
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from fvsolve.kernels.friction import drag, power_of_square
+from fvsolve.kernels.pipes import rub_hazen
+from fvsolve.kernels.records import FRICTION_HAZEN
+
+FLOWS = [*2.0 ** np.random.default_rng(5).uniform(-490.0, 490.0, 300), *np.linspace(0.99, 2.01, 103), 1e-150, 1e150]
+
+
+def exact(flow: float) -> Decimal:
+    """|M|^0.852 M in 50 digits."""
+    with localcontext() as context:
+        context.prec = 50
+        size = abs(Decimal(float(flow)))
+        return (size ** Decimal("1.852")).copy_sign(Decimal(float(flow)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_drag_is_the_power_of_the_flow_over_three_hundred_decades(sign):
+    found = [Decimal(float(drag(FRICTION_HAZEN, 0.0, 1.0, 0.0, 1.0, sign * flow))) for flow in FLOWS]
+    wanted = [exact(sign * flow) for flow in FLOWS]
+    assert max(abs(a / b - 1) for a, b in zip(found, wanted, strict=True)) < 2e-14
+
+
+def test_no_flow_has_no_drag_and_what_is_not_finite_stays_so():
+    assert drag(FRICTION_HAZEN, 3.0, 2.0, 0.0, 1.0, 0.0) == 0.0
+    assert not np.isfinite(power_of_square(np.inf)) and not np.isfinite(power_of_square(np.nan))
+
+
+def test_the_drag_is_odd_to_the_bit():
+    for flow in FLOWS:
+        forth, back = (drag(FRICTION_HAZEN, 0.3, 1.7, 0.0, 1.0, sign * flow) for sign in (1.0, -1.0))
+        assert forth == -back
+
+
+def rubbed(flows, leans, loss=0.0, rough=1.0):
+    """Mean drag over cells of these flows at their middles, and half the difference of their ends."""
+    forward, backward = np.array(flows, dtype=float), np.zeros(len(flows))
+    dr, dl = np.array(leans, dtype=float), np.zeros(len(flows))
+    before = dr.copy()
+    rub_hazen(
+        0.5, 0.0, loss, rough, 0.0, forward, backward, dr, dl
+    )  # lean = 2 GAUSS (dr + dl): leans are half differences
+    assert before - dr == pytest.approx(dl, rel=1e-9)
+    return 2.0 * dl
+
+
+def test_a_cell_of_one_flow_has_the_drag_of_that_flow_to_the_bit_at_any_place_of_a_pipe():
+    """Steady states rest on it: vectors of cells, the last ones and one alone round alike."""
+    for n in (1, 3, 4, 7, 47):
+        flow = 7.3 * 1.9 ** np.arange(n)
+        alone = [drag(FRICTION_HAZEN, 0.3, 1.7, 0.0, 1.0, m) for m in flow]
+        assert rubbed(flow, np.zeros(n), 0.3, 1.7).tolist() == alone
+
+
+def test_the_mean_over_a_cell_is_fourth_order_in_its_slope():
+    leans = np.array([0.4, 0.2, 0.1])  # half difference of the flows at both ends
+    wanted = [quad(lambda x, e=e: abs(1 + e * x) ** 0.852 * (1 + e * x), -1, 1, epsabs=1e-14)[0] / 2 for e in leans]
+    error = np.abs(rubbed(np.ones(3), leans) - wanted)
+    assert np.log2(error[:-1] / error[1:]) == pytest.approx([4.0, 4.0], abs=0.2)
+    assert error[0] < 2e-3
+
+
+def test_where_the_flow_turns_within_a_cell_the_mean_is_within_3_percent_of_the_greatest_drag_there():
+    """Two points are within 2.4."""
+    for m in np.linspace(-1.5, 1.5, 13):
+        wanted = quad(lambda x, m=m: abs(m + x) ** 0.852 * (m + x), -1, 1, epsabs=1e-14, limit=200)[0] / 2
+        assert abs(rubbed([m], [1.0])[0] - wanted) < 0.03 * (abs(m) + 1) ** 1.852
+
+
+def test_a_mirrored_pipe_rubs_the_same_to_the_bit():
+    rng = np.random.default_rng(2)
+    ahead = list(rng.normal(size=(4, 47)))  # both waves, then their rates
+    mirrored = [ahead[k][::-1].copy() for k in (1, 0, 3, 2)]
+    rub_hazen(0.7, 0.2, 0.3, 1.7, 0.1, *ahead)
+    rub_hazen(0.7, -0.2, 0.3, 1.7, -0.1, *mirrored)
+    assert np.array_equal(ahead[2], mirrored[3][::-1]) and np.array_equal(ahead[3], mirrored[2][::-1])

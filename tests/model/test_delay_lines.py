@@ -1,0 +1,377 @@
+"""Delay lines: what travels unchanged is exact at any step, friction is that of telegraphers, and nothing is lost."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from truth.delays import AREA, BORE, FLOW, JUMP, LENGTH, SPEED, STOP, TRAVEL, beside_jumps, fork, main, pipe, square
+from truth.scenes import RHO, scene
+
+import fvsolve
+from fvsolve import studies
+from fvsolve.case.text import write
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
+
+METHODS = {
+    "euler": {"step": 0.04}, "rk4": {"step": 0.037}, "ssp-rk3": {"step": 0.7}, "implicit-midpoint": {"step": 0.1},
+    "gauss-4": {"step": 0.05}, "radau-iia-5": {"rtol": 1e-5}, "dormand-prince": {"rtol": 1e-6},
+    "rodas-5p": {"rtol": 1e-4}, "heun": {"courant": 0.9}, "auto": {"rtol": 1e-5},
+}  # fmt: skip
+
+
+def known(found, probe):
+    """Times and values of a probe, the last of two rows at a jump."""
+    last = np.append(np.diff(found.t) > 0.0, True)
+    return found.t[last], found[probe][last]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_instant_stop_is_exact_at_any_step(method):
+    """A square wave at the gate, at rest in the middle every other quarter, under every method and step control."""
+    found = fvsolve.run(main(numerics={"method": method, **METHODS[method]}))
+    assert found.reason == "finished" and found.ledger["mass"]["relative"] < 1e-14
+    t, p = known(found, "gate.pressure")
+    away = beside_jumps(t, 0.5, 2.0 * TRAVEL)
+    assert p[0] + JUMP * square(t, 0.5, 4.0 * TRAVEL)[away] == pytest.approx(p[away], abs=1e-9 * JUMP)
+    t, p = known(found, "main.pressure@0.5")
+    away = beside_jumps(t, 0.5 + 0.5 * TRAVEL, TRAVEL)
+    exact = 0.5 * (square(t, 0.5 + 0.5 * TRAVEL, 4.0 * TRAVEL) - square(t, 0.5 + 1.5 * TRAVEL, 4.0 * TRAVEL))
+    exact += np.where((t > 0.5 + 0.5 * TRAVEL) & (t < 0.5 + 1.5 * TRAVEL), 0.5, 0.0)
+    assert (p[0] + JUMP * exact)[away] == pytest.approx(p[away], abs=1e-9 * JUMP)
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "dormand-prince"])
+def test_jumps_pass_a_fork_at_their_own_time(method):
+    """Characteristics at Courant 1, with 0.1 s a cell, are exact; 25 reflections reach the lake, fork and dead ends."""
+    truth = fvsolve.run(fork({"scheme": "upwind", "method": "euler", "courant": 1.0}, every=0.1))
+    found = fvsolve.run(fork({"line": "delay", "accuracy": 1e-6, "method": method, **METHODS[method]}, every=0.05))
+    for probe in ("gate.pressure", "fork.pressure", "dead.pressure"):
+        times, right = known(truth, probe)
+        t, p = known(found, probe)
+        here = np.searchsorted(t, times[:-1] + 0.05 - 1e-9)  # between the jumps
+        assert p[here] == pytest.approx(right[:-1], abs=1e-8 * JUMP)
+
+
+def telegrapher(omega: float, drag: float) -> complex:
+    """p / M at the end of a pipe from a reservoir, M into the pipe: s + drag in place of s in the momentum balance."""
+    s = 1j * omega
+    gamma = np.sqrt(s * (s + drag)) / SPEED
+    return (s + drag) / (AREA * gamma) * np.tanh(gamma * LENGTH)
+
+
+@pytest.mark.parametrize(("friction", "exponent"), [
+    ({"model": "steady", "factor": 0.2}, 2.0), ({"model": "hazen-williams", "coefficient": 40}, 1.852),
+])  # fmt: skip
+def test_friction_is_that_of_telegraphers(friction, exponent):
+    """A demand that swings a little about a flow: response at two periods, twice as near by half the accuracy."""
+    mean, swing, errors = 0.05, 1e-5, []
+    for accuracy in (0.05, 0.0125):
+        worst = 0.0
+        for period in (2.0, 4.6):
+            omega = 2.0 * np.pi / period
+            demand = {"mean": mean, "amplitude": swing, "period": period}
+            numerics = {"step": 0.01, "method": "euler", "accuracy": accuracy}
+            found = fvsolve.run(main(24.0 * period, numerics, demand, period / 64, friction=friction))
+            p, t = found["gate.pressure"], found.t
+            late = t > 19.99 * period
+            basis = np.column_stack([np.sin(omega * t[late]), np.cos(omega * t[late]), np.ones(late.sum())])
+            a, b, _ = np.linalg.lstsq(basis, p[late], rcond=None)[0]
+            model = fvsolve.build(fvsolve.load(main(1.0, numerics, mean, friction=friction)))
+            drag = exponent * model.tables.pipes["drag"][0] / model.tables.pipes["flow"][0]
+            exact = -telegrapher(omega, float(drag)) * swing * RHO
+            worst = max(worst, abs(complex(a, b) - exact) / abs(exact))
+        errors.append(worst)
+    assert errors[1] < 2e-3 and errors[1] < 0.15 * errors[0]
+
+
+def test_what_a_line_holds_is_what_travels_in_it():
+    """The state by mass balance, beside the integral of both waves along the line."""
+    smooth = {"time": [0.0, 0.2, 0.9, 9.0], "value": [FLOW, FLOW, 0.2 * FLOW, 0.2 * FLOW], "kind": "smooth"}
+    case = main(
+        4.3, {"method": "dormand-prince", "rtol": 1e-7}, smooth, friction={"model": "steady", "factor": 0.05}, cells=400
+    )
+    model = fvsolve.build(fvsolve.load(case))
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), None)
+    ended = run.go()
+    assert ended.ledgers["mass"]["relative"] < 1e-14
+    out = run.slate.evaluate(run.loop.t, run.loop.now, np.inf)[1]
+    r, l = run.slate.along(run.loop.t, out)[0]  # noqa: E741
+    held = float(np.sum(r + l)) * LENGTH / SPEED / r.size
+    assert float(run.loop.now[0]) == pytest.approx(held, rel=2e-3)
+
+
+def test_envelopes_are_taken_along_the_line():
+    """Of two waves that meet in the middle neither end feels the sum."""
+    nodes = {"a": {"type": "junction", "demand": {"time": [0.0, 0.5], "value": [0.0, -FLOW], "kind": "step"}},
+             "b": {"type": "junction", "demand": {"time": [0.0, 0.5], "value": [0.0, -FLOW], "kind": "step"}},
+             "lake": {"type": "reservoir", "pressure": 6e6}}  # fmt: skip
+    links = {"main": pipe("a", "b", cells=30), "far": pipe("b", "lake", 30e3)}
+    found = fvsolve.run(scene(nodes, links, 1.2, {"method": "euler", "line": "delay", "step": 0.01}, ["a.pressure"]))
+    greatest = found.summary["extremes"]["a.pressure"]["greatest"] if "extremes" in found.summary else None
+    envelope = found.envelope["main"]["greatest_pressure"]
+    assert envelope[14] - found["a.pressure"][0] == pytest.approx(1.5 * JUMP, rel=1e-6)
+    assert greatest is None or greatest < found["a.pressure"][0] + 1.4 * JUMP
+
+
+S = np.linspace(0.0, 1.0, 41)
+SLOW = {"time": (0.2 + 0.4 * S).tolist(), "value": (FLOW * (1.0 - S**3 * (10.0 - 15.0 * S + 6.0 * S * S))).tolist(),
+        "kind": "smooth"}  # fmt: skip
+
+
+def short(line: str, **numerics) -> dict:
+    """A stub of 3 m and one of 5 m between longer pipes, one of them at a valve; a demand that stops in 0.2 s."""
+    nodes = {"lake": {"type": "reservoir", "pressure": 6e5}, "a": {"type": "junction"}, "b": {"type": "junction"},
+             "c": {"type": "junction"}, "sink": {"type": "reservoir", "pressure": 1e5},
+             "gate": {"type": "junction", "demand": SLOW}}  # fmt: skip
+    links = {"up": pipe("lake", "a", 300.0, cells=50), "stub": pipe("a", "b", 3.0, cells=1),
+             "down": pipe("b", "gate", 240.0, cells=40), "spur": pipe("b", "c", 5.0, cells=1),
+             "tap": {"type": "valve", "from": "c", "to": "sink", "area": 2e-4}}  # fmt: skip
+    return scene(
+        nodes, links, 3.0, {"line": line, **numerics}, ["gate.pressure", "b.pressure", "c.pressure", "tap.flow"], 0.05
+    )
+
+
+def test_lines_shorter_than_a_step_know_each_other():
+    """Beside cells of 2.5 ms and true lengths; the error is that of the bound, and falls with the step's square."""
+    truth, errors = fvsolve.run(short("cells", scheme="upwind5", method="rk4", courant=0.8)), []
+    for step in (0.02, 0.01):
+        found = fvsolve.run(short("delay", method="euler", step=step))
+        assert found.reason == "finished" and found.ledger["mass"]["relative"] < 1e-14
+        errors.append(
+            max(np.abs(known(found, one)[1] - known(truth, one)[1]).max() for one in ("gate.pressure", "c.pressure"))
+        )
+    assert errors[0] < 0.02 * JUMP and errors[1] < 0.4 * errors[0]
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "rodas-5p"])
+def test_stores_beside_lines_are_as_beside_cells(method):
+    """A chamber and a tank at both ends of lines, through a valve, under explicit, implicit and Rosenbrock methods."""
+    nodes = {"lake": {"type": "reservoir", "pressure": 6e5}, "mid": {"type": "chamber", "volume": 0.5},
+             "end": {"type": "junction"}, "pool": {"type": "tank", "area": 0.2, "level": 10.0}}  # fmt: skip
+    shut = {"start": 0.2, "duration": 0.6, "value": [1.0, 0.2]}
+    links = {"up": pipe("lake", "mid", 480.0, cells=160, friction={"model": "steady", "factor": 0.02}),
+             "down": pipe("mid", "end", 360.0, cells=120),
+             "tap": {"type": "valve", "from": "end", "to": "pool", "area": 1e-3, "opening": shut}}  # fmt: skip
+    probes = ["mid.pressure", "end.pressure", "pool.level", "tap.flow"]
+    step = {"rtol": 1e-7} if method == "rodas-5p" else {"step": 5e-4 if method == "euler" else 0.005}
+    one = fvsolve.run(scene(nodes, links, 3.0, {"line": "delay", "method": method, **step}, probes, 0.05))
+    two = fvsolve.run(scene(nodes, links, 3.0, {"scheme": "upwind5", "method": "rk4", "courant": 0.8}, probes, 0.05))
+    assert one.reason == "finished" and one.ledger["mass"]["relative"] < 1e-13
+    for probe in probes:
+        a, b = known(one, probe)[1], known(two, probe)[1]
+        assert np.abs(a - b).max() < 3e-3 * np.ptp(b)
+
+
+def case_of(name: str) -> dict:
+    """A line that is broken off: with friction, jumps, a short stub and error control, or given steps."""
+    if name == "fork":
+        return fork({"line": "delay", "method": "rk4", "step": 0.013}, friction={"model": "steady", "factor": 0.02})
+    if name == "short":
+        return short("delay", method="euler", step=0.01)
+    return main(
+        6.0, {"method": "dormand-prince", "rtol": 1e-5}, friction={"model": "hazen-williams", "coefficient": 100}
+    )
+
+
+@pytest.mark.parametrize("name", ["fork", "short", "controlled"])
+def test_broken_off_and_resumed(name):
+    """To the bit, ledgers and envelopes too: what is on its way is remembered."""
+    case = case_of(name)
+    model, early = fvsolve.build(fvsolve.load(case)), 0.4 * case["numerics"]["end"]
+
+    def late(t, seconds, steps):
+        run.budget = 1.0
+        if t > early:
+            raise KeyboardInterrupt
+
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
+    run.left = 1.0
+    assert run.go().reason.startswith("interrupted") and early < run.state().t < case["numerics"]["end"]
+    again, whole = (Run(model, state, MemorySink(model), None) for state in (run.state(), fvsolve.initial_state(model)))
+    ended = again.go(), whole.go()
+    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
+    ends = again.state(), whole.state()
+    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+    assert np.array_equal(again.slate.envelope, whole.slate.envelope, equal_nan=True)
+
+
+def test_advanced_in_pieces():
+    """A controller's loop: the state it hands on carries the past."""
+    model = fvsolve.build(fvsolve.load(main(numerics={"step": 0.01})))
+    state = fvsolve.initial_state(model)
+    for until in np.arange(0.25, 3.01, 0.25):
+        state = fvsolve.advance(model, state, float(until))
+    found = model.observe(state)[0] - model.observe(fvsolve.initial_state(model))[0]
+    assert found == pytest.approx(-JUMP, rel=1e-6)  # between 2.0 and 3.5 s
+    assert model.rhs(state).shape == (1,)
+
+
+def test_more_steps_than_were_foreseen():
+    """Error control takes far shorter steps than lines are cut for: the past makes room."""
+    case = main(
+        3.0,
+        {"method": "bogacki-shampine", "rtol": 1e-10},
+        {"mean": FLOW, "amplitude": 0.1 * FLOW, "period": 0.1},
+        cells=1,
+    )
+    found = fvsolve.run(case)
+    assert found.reason == "finished" and found.summary["steps"] > 2000
+
+
+def turned(case: dict) -> dict:
+    """Every pipe drawn the other way."""
+    for link in case["links"].values():
+        if link["type"] == "pipe":
+            link["from"], link["to"] = link["to"], link["from"]
+    return case
+
+
+def test_drawn_the_other_way():
+    one = fvsolve.run(short("delay", method="euler", step=0.01))
+    other = fvsolve.run(turned(short("delay", method="euler", step=0.01)))
+    for probe in ("gate.pressure", "c.pressure", "tap.flow"):
+        assert other[probe] == pytest.approx(one[probe], rel=1e-12)
+
+
+def test_other_rows_do_not_change_it():
+    few, many = (
+        fvsolve.run(fork({"line": "delay", "method": "euler", "step": 0.03}, every=every)) for every in (0.2, 0.05)
+    )
+    t, p = known(many, "gate.pressure")
+    times, right = known(few, "gate.pressure")
+    assert np.array_equal(p[np.searchsorted(t, times - 1e-9)], right)
+
+
+def test_at_rest_nothing_moves():
+    """Not by one bit, with friction and slopes."""
+    for friction in ({"model": "steady", "factor": 0.02}, {"model": "quasi-steady", "roughness": 1e-4},
+                     {"model": "hazen-williams", "coefficient": 120}):  # fmt: skip
+        found = fvsolve.run(main(3.0, demand=FLOW, friction=friction))
+        assert np.ptp(found["gate.pressure"]) == 0.0 and np.ptp(found["main.pressure@0.3"]) == 0.0
+
+
+def test_random_networks_do_not_grow():
+    """Lossless ones for fifty travel times, short stubs among them: no pressure beyond what jumps add up to."""
+    random = np.random.default_rng(7)
+    for _ in range(12):
+        many = int(random.integers(3, 7))
+        nodes = {f"n{i}": {"type": "junction"} for i in range(many)}
+        nodes["lake"] = {"type": "reservoir", "pressure": 6e6}
+        nodes["n0"]["demand"] = {"start": 0.1, "duration": 0.05, "value": [FLOW, 0.0]}
+        links = {"l0": pipe("lake", f"n{many - 1}", float(random.uniform(20.0, 200.0)), cells=4)}
+        for i in range(many - 1):
+            links[f"p{i}"] = pipe(f"n{i}", f"n{i + 1}", float(10.0 ** random.uniform(0.3, 2.3)), cells=1)
+        a, b = random.choice(many, 2, replace=False)
+        links["loop"] = pipe(f"n{a}", f"n{b}", float(10.0 ** random.uniform(0.3, 2.3)), cells=2)
+        found = fvsolve.run(scene(nodes, links, 12.0, {"line": "delay", "method": "euler", "step": 0.01},
+                                  [f"n{i}.pressure" for i in range(many)], 0.01))  # fmt: skip
+        early, late = ([np.abs(found[f"n{i}.pressure"][part] - 6e6).max() for i in range(many)]
+                       for part in (found.t < 4.0, found.t > 8.0))  # fmt: skip
+        assert found.reason == "finished" and max(late) <= 1.05 * max(early) and max(early) < 4.0 * JUMP
+
+
+def test_auto_takes_cells_where_a_line_is_too_rough():
+    """Of a short and of a long pipe under friction, by the stated bound; check says which and why."""
+    case = fork({"line": "auto", "method": "rk4", "courant": 0.9, "accuracy": 1e-3})
+    case["links"]["down"]["friction"] = {"model": "steady", "factor": 0.5}
+    found = fvsolve.build(fvsolve.load(case)).checks["pipes"]
+    assert [found[name]["line"] for name in ("up", "down", "side")] == ["delay", "cells", "delay"]
+    assert found["up"]["line_bound"] <= 1e-3 and found["down"]["line_bound"] is None
+    assert "numerics.accuracy" in found["down"]["line_why"]
+    mixed = fvsolve.run(case | {"numerics": case["numerics"] | {"scheme": "upwind5"}})
+    assert mixed.reason == "finished" and mixed.ledger["mass"]["relative"] < 1e-13
+
+
+def test_check_says_how_pipes_are_followed(fvs, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(write(main()))
+    code, said, _ = fvs("check", path, "--json")
+    pipe = json.loads(said)["pipes"]["main"]
+    assert code == 0 and (pipe["line"], pipe["line_bound"]) == ("delay", 0.0) and "travel along it" in pipe["line_why"]
+
+
+BAD = {
+    "law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes waves as they travel'),
+    "unsteady": ({}, "unsteady friction remembers the flow of every cell"),
+    "rough": ({}, "friction takes"),
+}
+
+
+@pytest.mark.parametrize("which", BAD)
+def test_a_line_that_cannot_be_one(which):
+    changes, message = BAD[which]
+    case = main(1.0) | changes
+    if which == "unsteady":
+        case["links"]["main"]["friction"] = {"model": "unsteady", "roughness": 1e-4}
+    if which == "rough":
+        case["links"]["main"] |= {"length": 12.0, "minor_loss": 5e5, "friction": {"model": "steady", "factor": 0.02}}
+        case["nodes"]["lake"]["pressure"] = 6e8
+    with pytest.raises(CaseError, match="does not fit") as raised:
+        fvsolve.build(fvsolve.load(case))
+    assert message in str(raised.value)
+
+
+def test_what_knows_no_lines_says_so():
+    case = main(1.0)
+    model = fvsolve.build(fvsolve.load(case))
+    for call in (lambda: model.rhs(0.0, model.start), lambda: model.jacobian(0.0, model.start)):
+        with pytest.raises(FvsolveError, match="delay lines"):
+            call()
+    for study in (studies.linearise, studies.stability, studies.energy, studies.order):
+        with pytest.raises(FvsolveError, match="does not know delay lines yet; main would be"):
+            study(case)
+
+
+def test_an_unknown_word_and_a_bad_share():
+    case = main(1.0)
+    case["links"]["main"]["line"] = "delays"
+    case["numerics"]["accuracy"] = 2.0
+    with pytest.raises(CaseError) as raised:
+        fvsolve.load(case)
+    assert 'did you mean "delay"?' in str(raised.value) and "numerics.accuracy" in str(raised.value)
+
+
+def test_a_line_of_the_case_is_a_rung():
+    from fvsolve.studies.accuracy.rungs import restated, structures
+
+    case = fvsolve.load(main(1.0) | {"numerics": {"end": 1.0}})
+    assert "delay lines" in structures(case) and restated(case, "delay lines") == {"links.main.line": "delay"}
+
+
+def test_stops_are_the_same_said_otherwise():
+    """In other units, at a later time, and by key of the pipe in place of the case."""
+    one = fvsolve.run(main(3.0))
+    other = main(3.0, {"step": "40 ms"})
+    other["numerics"].pop("line")
+    other["links"]["main"] |= {"line": "delay", "length": "0.9 km", "diameter": f"{1e3 * BORE} mm"}
+    assert fvsolve.run(other)["gate.pressure"] == pytest.approx(one["gate.pressure"], rel=1e-12)
+    later = main(67.0)
+    later["numerics"]["start"] = 64.0
+    later["nodes"]["gate"]["demand"] = STOP | {"time": [64.0, 64.5]}
+    assert fvsolve.run(later)["gate.pressure"] == pytest.approx(one["gate.pressure"], abs=1e-9 * JUMP)
+
+
+def test_a_start_from_rest_drives_every_part_of_a_pipe():
+    """Which one lump in its middle would not: a line is refused by name, and auto takes cells."""
+    nodes = {"high": {"type": "reservoir", "pressure": 6e6}, "low": {"type": "reservoir", "pressure": 5e6}}
+    links = {"one": pipe("high", "low")}
+    case = scene(nodes, links, 1.0, {"initial": "rest", "line": "delay"}, ["one.flow"], 0.05)
+    with pytest.raises(CaseError, match="drives every part of it"):
+        fvsolve.build(fvsolve.load(case))
+    case["numerics"]["line"] = "auto"
+    assert fvsolve.build(fvsolve.load(case)).checks["pipes"]["one"]["line"] == "cells"
+
+
+def test_steps_by_tolerance_beside_cells_of_a_quicker_pipe():
+    """A stub shorter than a step, and cells that are quicker still: lines are cut for the steps that are taken."""
+    case = short("delay", method="dormand-prince", rtol=1e-7)
+    case["links"]["up"] |= {"line": "cells", "cells": 400}
+    case["numerics"]["scheme"] = "upwind5"
+    truth = fvsolve.run(short("cells", scheme="upwind5", method="rk4", courant=0.8))
+    found = fvsolve.run(case)
+    assert found.reason == "finished"
+    assert np.abs(known(found, "gate.pressure")[1] - known(truth, "gate.pressure")[1]).max() < 0.02 * JUMP

@@ -1,0 +1,152 @@
+"""A model with keys changed is, to the bit, that of a fresh reading; of a run before nothing is left."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from case.test_changes import DYED, LARGE, OTHERS, leaves, others, raw_case, spoken
+from truth.folders import CASES
+
+import fvsolve
+from fvsolve.case.changes import declared
+from fvsolve.errors import CaseError, FvsolveError
+
+
+@pytest.fixture(autouse=True)
+def beside_their_files(monkeypatch):
+    monkeypatch.chdir(CASES)
+
+
+def said(model) -> dict[str, bytes]:
+    """All that a model holds, as bytes."""
+    tables = {name: table.tobytes() for name, table in zip(model.tables._fields, model.tables, strict=True)}
+    arrays = {"scale": model.scale, "start": model.start, "profiles": np.concatenate([[0.0], *model.profiles.values()])}
+    words = (model.breaks, model.step_max, model.shapes, model.state_names, model.node_names, model.link_names,
+             model.events, model.laws, model.elevation, [probe.text for probe in model.probes], model.steady,
+             [one.plain() for one in model.warnings], model.case.table(), model.case.copies)  # fmt: skip
+    numbers = {name: array.tobytes() for name, array in arrays.items()}
+    return tables | numbers | {"words": pickle.dumps(repr(words))}
+
+
+def told(make) -> tuple:
+    """What comes of making a model: what it holds, or what is wrong, line by line."""
+    try:
+        return "made", said(make())
+    except CaseError as error:
+        return "faults", [str(fault) for fault in error.faults]
+    except FvsolveError as error:
+        return "refused", str(error)
+
+
+def settings(table: dict, keys: tuple, to) -> dict:
+    """One key set, or where it lies in a list the whole list."""
+    words = tuple(key for key in keys if isinstance(key, str))
+    if words == keys:
+        return {spoken(keys): to}
+    at = next(k for k, key in enumerate(keys) if not isinstance(key, str))
+    found = table
+    for key in keys[:at]:
+        found = found[key]
+    found = copy.deepcopy(found)
+    inner = found
+    for key in keys[at:-1]:
+        inner = inner[key]
+    inner[keys[-1]] = to
+    return {spoken(keys[:at]): found}
+
+
+def compare(name: str, table: dict, done: set, every: bool) -> list[str]:
+    """Keys of a case that say another thing by `vary` than read anew; of each kind one, of all cases or of each."""
+    model, wrong = fvsolve.build(fvsolve.load(table)), []
+    for keys, _ in leaves(table):
+        value = declared(table, tuple(key for key in keys if isinstance(key, str)))
+        kind = (name if every else "", str(type(value)), getattr(value, "about", ""), keys[-1])
+        if kind in done:
+            continue
+        done.add(kind)
+        for to in others(table, keys, value, far=True)[: 3 if every else 1]:
+            given = settings(table, keys, to)
+            anew = told(lambda given=given: fvsolve.build(fvsolve.load(table, given)))
+            if told(lambda given=given: fvsolve.vary(model, given)) != anew:
+                wrong.append(f"{name}: {given}")
+    return wrong
+
+
+def test_each_kind_of_key_of_the_shipped_cases_gives_the_model_of_a_fresh_reading():
+    done: set = set()
+    names = [path.stem for path in sorted(CASES.glob("*.toml")) if path.stem not in LARGE]
+    assert [line for name in names for line in compare(name, raw_case(name), done, every=False)] == []
+    assert [line for table in (OTHERS, DYED) for line in compare("others", table, done, every=False)] == []
+    assert len(done) > 150
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [path.stem for path in sorted(CASES.glob("*.toml")) if path.stem not in LARGE])
+def test_every_key_of_every_shipped_case_gives_the_model_of_a_fresh_reading(name):
+    assert compare(name, raw_case(name), set(), every=True) == []
+
+
+SMALL = {"links.main.cells": 12, "numerics.end": 2.0, "output.fields": 0, "expect": {}}
+MOVES = [
+    {"links.valve.area": 0.001}, {"links.valve.opening.duration": 0.3}, {"nodes.lake.head": "30 m"},
+    {"links.main.cells": 7}, {"numerics.method": "rk4", "numerics.courant": 0.5}, {"ambient_pressure": "0.9 atm"},
+    {"links.main.friction": {"model": "none"}, "links.main.initial_flow": 0.02}, {"fluid.temperature": 300.0},
+    {"output.probes": ["gate.pressure"]},
+]  # fmt: skip
+
+
+def test_runs_one_after_another_leave_nothing_to_each_other():
+    """Each of them, forth and back, is a fresh run to the bit: rows, extremes, envelopes, ledgers, notices."""
+    model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
+    before = said(model)
+    for move in (*MOVES, *reversed(MOVES)):
+        ours, fresh = fvsolve.run(fvsolve.vary(model, move)), fvsolve.run("valve-closure", SMALL | move)
+        assert ours._table.tobytes() == fresh._table.tobytes(), move
+        for key, value in fresh.summary.items():
+            if key not in ("seconds", "seconds_setup", "cost"):
+                assert repr(ours.summary[key]) == repr(value), (move, key)
+    assert said(model) == before
+
+
+def test_one_model_follows_from_another_that_was_varied_itself():
+    model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
+    twice = fvsolve.vary(fvsolve.vary(model, {"links.valve.area": 0.001}), {"nodes.lake.head": 30.0})
+    once = fvsolve.build(fvsolve.load("valve-closure", SMALL | {"links.valve.area": 0.001, "nodes.lake.head": 30.0}))
+    assert said(twice) == said(once)
+
+
+def test_what_files_and_signals_say_is_read_again(tmp_path):
+    """A file may have changed since the model was made, as it may between two runs."""
+    closing = tmp_path / "closing.csv"
+    closing.write_text("t [s],opening [-]\n0,1\n1,1\n1.5,0\n")
+    table = raw_case("valve-closure")
+    table["links"]["valve"]["opening"] = {"file": str(closing)}
+    model = fvsolve.build(fvsolve.load(table, SMALL))
+    closing.write_text("t [s],opening [-]\n0,1\n1,1\n1.2,0\n")
+    moved = SMALL | {"nodes.lake.head": 30.0}
+    assert said(fvsolve.vary(model, {"nodes.lake.head": 30.0})) == said(fvsolve.build(fvsolve.load(table, moved)))
+    driven = fvsolve.build(fvsolve.load("rigid-column"))
+    for move in ({"signals.stroke.value": [1.0, 0.5]}, {"nodes.lake.head": 30.0}):
+        assert told(lambda move=move: fvsolve.vary(driven, move)) == told(
+            lambda move=move: fvsolve.build(fvsolve.load("rigid-column", move))
+        )
+
+
+def test_faults_are_those_of_a_fresh_run():
+    model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
+    for move in (
+        {"links.valve.area": -1.0}, {"links.valve.aera": 1.0}, {"links.valv.area": 1.0}, {"links.main.cells": 2.5},
+        {"links.main.cells": True}, {"numerics.end": -1.0, "links.main.length": "3 kg"}, {"output.probes": ["x.y"]},
+        {"links.main.friction": {"model": "rough"}}, {"links.main.initial_flow": "1 m"},
+        {"expect": {"max(x.y)": {"value": 1}}},
+    ):  # fmt: skip
+        fresh = told(lambda move=move: fvsolve.build(fvsolve.load("valve-closure", SMALL | move)))
+        assert fresh[0] != "made" and told(lambda move=move: fvsolve.vary(model, move)) == fresh
+
+
+def test_what_is_no_model_and_no_table_is_named():
+    with pytest.raises(FvsolveError, match="model = .*; wanted a Model"):
+        fvsolve.vary(fvsolve.load("valve-closure"), {"links.valve.area": 1.0})
+    with pytest.raises(FvsolveError, match="wanted a table, for example"):
+        fvsolve.vary(fvsolve.build(fvsolve.load("valve-closure", SMALL)), ["links.valve.area"])

@@ -1,0 +1,110 @@
+"""Pictures drawn beside a run are those drawn after it; however the second process ends, nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from truth.fork import branched
+
+import fvsolve
+from fvsolve.draw.beside import processors
+
+BEGIN = """
+import sys
+from pathlib import Path
+from fvsolve.draw.beside import Painter, Picture
+t = [0.0, 1.0]
+arguments = {"t": t, "values": __import__("numpy").array([t, t]).T, "probes": [("a.level", "m"), ("b.level", "m")]}
+wanted = [Picture(Path(name), "history_figure", arguments) for name in ("one.png", "two.png")]
+"""
+alone = pytest.mark.skipif(processors() < 2, reason="one processor draws in one process")
+
+
+def python(code: str, folder: Path) -> str:
+    done = subprocess.run([sys.executable, "-c", BEGIN + code], cwd=folder, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    return done.stdout
+
+
+@pytest.fixture
+def fork(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("fork.toml").write_text(fvsolve.load(branched(fields=0)).resolved())
+
+
+def command(*words: str):
+    done = subprocess.run([sys.executable, "-m", "fvsolve", "run", "fork.toml", *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def test_pictures_of_a_command_are_those_of_its_result(fork):
+    said = command("--json")
+    run = fvsolve.open_run("runs/fork")
+    run.plot("history.png"), run.plot_envelope("envelope.png")
+    for name in ("history.png", "envelope.png"):
+        assert Path(name).read_bytes() == (run.directory / name).read_bytes()
+    assert said.stderr == "" and said.stdout.startswith('{"') and said.stdout.count("\n") == 1
+    assert not {path.name for path in run.directory.iterdir()} & {".lock", "fresh-history.png", "fresh-envelope.png"}
+
+
+def test_without_pictures_there_are_none_until_they_are_asked_for(fork):
+    assert ".png" not in command("--no-pictures").stdout
+    assert not list(Path("runs/fork").glob("*.png"))
+    assert fvsolve.run("fork.toml", out="other", pictures=False).ok and not list(Path("other").glob("*.png"))
+    before = Path("runs/fork/history.csv").stat().st_mtime_ns
+    assert "history.png" in command("--resume").stdout.splitlines()[-1]
+    assert Path("runs/fork/history.csv").stat().st_mtime_ns == before
+
+
+@alone
+def test_a_second_process_draws_and_is_gone_at_the_end(tmp_path):
+    code = """
+with Painter(beside=True) as painter:
+    process = painter.process
+    print(painter.draw(wanted), "matplotlib" in sys.modules, process.poll(), Path("two.png").stat().st_size > 5000)
+print(process.poll() is None)
+"""
+    assert python(code, tmp_path).split("\n")[:2] == ["{} False None True", "False"]
+
+
+@alone
+def test_a_second_process_that_dies_loses_nothing(tmp_path):
+    code = """
+with Painter(beside=True) as painter:
+    painter.process.kill()
+    print(painter.draw(wanted), Path("one.png").stat().st_size > 5000, Path("two.png").stat().st_size > 5000)
+"""
+    assert python(code, tmp_path) == "{} True True\n"
+
+
+@pytest.mark.parametrize("beside", [pytest.param(True, marks=alone), False])
+def test_what_cannot_be_drawn_is_named_and_the_rest_is_drawn(tmp_path, beside):
+    (tmp_path / "fresh-one.png").mkdir()
+    code = f"""
+with Painter(beside={beside}) as painter:
+    failed = painter.draw(wanted)
+print(*failed, "IsADirectoryError" in failed[Path("one.png")], Path("two.png").stat().st_size > 5000)
+"""
+    assert python(code, tmp_path) == "one.png True True\n"
+    assert sorted(os.listdir(tmp_path)) == ["fresh-one.png", "two.png"]
+
+
+def test_what_breaks_off_the_drawing_leaves_no_half_picture(tmp_path):
+    code = """
+Path("fresh-two.png").touch()
+class Broken:
+    def __iter__(self):
+        raise KeyboardInterrupt
+arguments["probes"] = Broken()
+with Painter(beside=False) as painter:
+    try:
+        painter.draw(wanted)
+    except KeyboardInterrupt:
+        print(list(Path(".").iterdir()))
+"""
+    assert python(code, tmp_path) == "[]\n"

@@ -1,0 +1,113 @@
+"""Networks of delay lines said in another way tell the same, as those of cells do (`test_networks`).
+
+Where what is rounded decides whether a jump is kept as one, or smoothed over a step, the two are answers that differ by
+such a jump, a quarter of `numerics.accuracy` of the greatest: it is asked to be small.
+"""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fvsolve
+from restated import sayings
+from restated.drawing import drawn, networks
+from restated.telling import alike, told
+from restated.test_networks import EXPERIMENTAL, near
+
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
+SMALL = 1e-9  # accuracy: jumps are kept down to a quarter of it
+
+
+def followed(case: dict, line: str) -> dict:
+    """All pipes as lines, or as `auto` finds them."""
+    return sayings.changed(case, "numerics", line=line, accuracy=SMALL if line == "delay" else 1e-2)
+
+
+def lines(*ways: str) -> st.SearchStrategy[dict]:
+    """Networks under the law that lines know, some of whose pipes are shorter than a step."""
+    return st.builds(followed, networks(laws=("linear",)), st.sampled_from(ways or ("delay", "auto")))
+
+
+def given_steps() -> st.SearchStrategy[dict]:
+    """Without error control: it sees nothing of what is read between steps, and rounding decides which these are."""
+    return lines("delay").filter(lambda case: "rtol" not in case["numerics"])
+
+
+def told_lines(case: dict):
+    """What a scene tells, refused where friction is too much for a line of a single step."""
+    try:
+        return told(case)
+    except fvsolve.CaseError as error:
+        if not all("does not fit" in str(fault) for fault in error.faults):
+            raise
+        return None
+
+
+def same(one, other, *how, **more) -> None:
+    """Both are refused, or tell the same."""
+    assert (one is None) == (other is None)
+    if one is not None:
+        alike(one, other, *how, **more)
+
+
+@drawn(5)
+@given(case=lines())
+def test_run_again(case):
+    first = told_lines(case)
+    same(first, told_lines(case))
+    if first is not None and first.result:
+        model = fvsolve.build(fvsolve.load(case))
+        fvsolve.run(model)
+        alike(first, told(model))
+
+
+@drawn(4)
+@given(case=lines())
+def test_other_rows(case):
+    """Common ones agree to the bit."""
+    few = told_lines(sayings.changed(case, "output", every=1 / 16))
+    many = told_lines(sayings.changed(case, "output", every=1 / 64))
+    assert (few is None) == (many is None)
+    if few is not None and few.result:
+        assert few.ended == many.ended
+        for name, values in few.rows.items():
+            found = dict(zip(many.t, many.rows[name], strict=True))
+            wanted = dict(zip(few.t, values, strict=True))
+            assert {t: found[t] for t in wanted} == wanted
+
+
+@drawn(4)
+@given(case=given_steps(), data=st.data())
+def test_other_order(case, data):
+    nodes = data.draw(st.permutations(list(case["nodes"])))
+    links = data.draw(st.permutations(list(case["links"])))
+    same(told_lines(case), told_lines(sayings.reordered(case, nodes, links)), 10 * near(case))
+
+
+@drawn(4)
+@given(case=given_steps(), data=st.data())
+def test_links_drawn_from_the_other_end(case, data):
+    able = [name for name, link in case["links"].items() if link["type"] in sayings.STRAIGHT]
+    chosen = data.draw(st.sets(st.sampled_from(able), min_size=1))
+
+    def sign(probe, values):
+        return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
+
+    def name(probe):
+        return sayings.from_other_end(probe, case, chosen)
+
+    same(told_lines(case), told_lines(sayings.swapped(case, chosen)), 10 * near(case), name=name, change=sign)
+
+
+@drawn(3)
+@given(case=given_steps(), height=st.sampled_from([16.0, 1000.0]))
+def test_everything_higher(case, height):
+    same(told_lines(case), told_lines(sayings.raised(case, height)), 10 * near(case))
+
+
+@drawn(3)
+@given(case=given_steps())
+def test_other_units(case):
+    same(told_lines(case), told_lines(sayings.in_other_units(case)), 10 * near(case))

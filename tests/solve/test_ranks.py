@@ -1,0 +1,135 @@
+"""Ranks of MPI share out rows of basins as threads do, to the same bits; what cannot run so is named."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from solve.test_threads import SCENES, water
+
+import fvsolve
+
+pytest.importorskip("mpi4py", reason="the extra mpi is not there")
+MPIEXEC = Path(sys.executable).with_name("mpiexec")
+if not MPIEXEC.exists():
+    pytest.skip("no mpiexec beside Python", allow_module_level=True)
+SCRIPT = """
+import json, sys
+import fvsolve
+from fvsolve.run import ranks
+cases, out, options = json.loads(sys.argv[1]), sys.argv[2], json.loads(sys.argv[3])
+for name, case in cases.items():
+    fvsolve.run(case, out=f"{out}/{name}", **options)
+"""
+NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "a liquid", "a dye in water")
+
+
+def ranks(many: int, *command, timeout=60, **environment) -> subprocess.CompletedProcess:
+    command = [str(MPIEXEC), "-n", str(many), *map(str, command)]
+    environment = os.environ | environment
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)
+
+
+def same(one: Path, other: Path) -> bool:
+    """Whether two runs have the same history, ledgers and frames, of which the last is their end."""
+    said, again = (json.loads((run / "summary.json").read_text()) for run in (one, other))
+    keys = ("ledgers", "extremes", "steps", "reason", "marks")
+    frames = [[path.read_bytes() for path in sorted(run.rglob("*.vtu"))] for run in (one, other)]
+    history = [(run / "history.csv").read_bytes() for run in (one, other)]
+    kept = all(said[key] == again[key] for key in keys)
+    return kept and frames[0] == frames[1] != [] and history[0] == history[1]
+
+
+@pytest.mark.parametrize("many", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_ranks_give_the_bits_of_one_process(tmp_path, many):
+    cases = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 2}} for name in NAMES}
+    found = ranks(many, sys.executable, "-c", SCRIPT, json.dumps(cases), tmp_path / "ranks", "{}")
+    assert found.returncode == 0, found.stderr
+    for name, case in cases.items():
+        run = fvsolve.run(case, out=tmp_path / "one" / name)
+        assert same(tmp_path / "one" / name, tmp_path / "ranks" / name), name
+        said = json.loads((tmp_path / "ranks" / name / "summary.json").read_text())
+        assert said["threads"] == many and run.summary["threads"] == 1
+
+
+@pytest.mark.slow
+def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
+    case = water(end=0.6, step=1e-4)
+    whole = fvsolve.run(case, out=tmp_path / "whole")
+    stopping = SCRIPT.replace("**options", "progress=stop").replace("import json", """
+import importlib
+importlib.import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.0
+def stop(t, *given):
+    if t > 0.15:
+        raise KeyboardInterrupt
+import json""", 1)  # fmt: skip
+    found = ranks(3, sys.executable, "-c", stopping, json.dumps({"run": case}), tmp_path, "{}")
+    assert found.returncode == 0, found.stderr
+    said = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert said["reason"].startswith("interrupted") and 0.0 < np.load(tmp_path / "run" / "restart.npz")["t"] < 0.6
+    found = ranks(2, sys.executable, "-m", "fvsolve", "run", tmp_path / "run" / "case.toml", "--out", tmp_path / "run",
+                  "--resume")  # fmt: skip
+    assert found.returncode == 0 and found.stdout.count("finished at") == 1, found.stdout + found.stderr
+    assert whole.ok and same(tmp_path / "whole", tmp_path / "run")
+
+
+def test_ranks_with_different_cases_are_named(tmp_path):
+    differing = SCRIPT.replace("for name", """
+from mpi4py import MPI
+cases["run"]["nodes"]["pool"]["manning"] += 0.01 * MPI.COMM_WORLD.rank
+for name""", 1)  # fmt: skip
+    found = ranks(2, sys.executable, "-c", differing, json.dumps({"run": water()}), tmp_path, "{}")
+    assert found.returncode != 0 and "rank 1 has another case than rank 0; wanted the same file" in found.stderr
+
+
+def test_a_rank_that_cannot_read_its_case_ends_all_with_its_message(tmp_path):
+    failing = SCRIPT.replace("for name", """
+from mpi4py import MPI
+if MPI.COMM_WORLD.rank == 1:
+    cases["run"] = "nowhere.toml"
+for name""", 1)  # fmt: skip
+    found = ranks(2, sys.executable, "-c", failing, json.dumps({"run": water()}), tmp_path, "{}")
+    assert found.returncode != 0 and "rank 1: " in found.stderr and "nowhere.toml" in found.stderr
+
+
+def test_a_rank_that_fails_in_the_middle_ends_all_with_its_message(tmp_path):
+    failing = SCRIPT.replace("for name", """
+from mpi4py import MPI
+from fvsolve.solve.ranks import Ranks
+def fails(self, name, at):
+    raise MemoryError("planted")
+if MPI.COMM_WORLD.rank == 1:
+    Ranks.gather = fails
+for name""", 1)  # fmt: skip
+    found = ranks(2, sys.executable, "-c", failing, json.dumps({"run": water()}), tmp_path, "{}")
+    assert found.returncode != 0 and "rank 1: MemoryError: planted" in found.stderr
+
+
+def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_said_once(tmp_path, monkeypatch):
+    case = water(basin={"cells": [8, 2], "patches": {}}, link=None)
+    found = ranks(3, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path / "a", "{}")
+    assert found.returncode != 0 and found.stderr.count("wanted 2 at most") == 1
+    found = ranks(2, sys.executable, "-m", "fvsolve", "run", "dam-break", "--threads", "2", "--out", tmp_path / "b")
+    assert found.returncode != 0 and found.stderr.count("under MPI each of the 2 ranks is one thread") == 1
+    found = ranks(2, sys.executable, "-m", "fvsolve", "run", "dam-brake", "--out", tmp_path / "c")
+    assert found.returncode != 0 and found.stderr.count("dam-brake") >= 1
+
+
+def test_mpi_without_mpi4py_is_named(tmp_path):
+    without = "import sys; sys.modules['mpi4py'] = None\n" + SCRIPT
+    found = ranks(2, sys.executable, "-c", without, json.dumps({"run": water()}), tmp_path, "{}")
+    assert found.returncode != 0 and "MPI started 2 processes, and there is no mpi4py" in found.stderr
+    assert 'pip install "fvsolve[mpi]"' in found.stderr
+
+
+def test_what_one_process_steps_rank_0_steps_alone(tmp_path):
+    case = water(method="tr-bdf2", step=0.02)
+    found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path, "{}")
+    assert found.returncode == 0, found.stderr
+    said = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert said["threads"] == 1 and "one thread steps it, not 2" in json.dumps(said["warnings"])

@@ -1,0 +1,262 @@
+"""Threads that share out rows of basins give the bits of one: of states, ledgers, rows and frames, resumed too."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+from truth.scenes import reservoir, scene
+
+import fvsolve
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import joint
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve import initial_state
+from fvsolve.solve.bands import alone, shared
+from fvsolve.solve.loop import Loop
+from fvsolve.solve.solve import Run
+
+VALVE = {"type": "valve", "from": "pool.near", "to": "river", "area": 0.05}
+PIPE = {"type": "pipe", "from": "pool.near", "to": "river", "length": 10.0, "diameter": 0.3, "cells": 5,
+        "wave_speed": 100.0, "friction": {"model": "steady", "factor": 0.02}}  # fmt: skip
+POOL = {
+    "type": "basin", "size": [4.0, 3.0], "cells": [8, 12], "level": 0.5, "manning": 0.02,
+    "bed": "0.6*exp(-((x-2)^2 + (y-1.4)^2))", "start": {"level": "0.5 + where(y < 1.2, 0.2, 0) + 0.02*x"},
+    "patches": {"near": {"side": "west"}, "far": {"side": "east", "boundary": "open"},
+                "top": {"side": "north", "span": [1.0, 2.0], "boundary": "open"}},
+}  # fmt: skip
+PROBES = ["pool.near.head", "near.flow", "pool.depth@1.1,1.3", "pool.u@3,2.9"]
+
+
+def water(link=VALVE, basin=None, end=0.4, probes=PROBES, **numerics):
+    numerics = {"scheme": "muscl", "method": "ssp-rk2", **numerics}
+    numerics |= {} if {"step", "rtol"} & {*numerics} else {"courant": 0.5}
+    nodes = {"pool": POOL | (basin or {})} | ({"river": reservoir(AMBIENT + 2e3)} if link else {})
+    probes = probes if link else [one for one in probes if "@" in one]
+    return scene(nodes, {"near": link} if link else {}, end, numerics, probes, every=0.05)
+
+
+def liquid(law="linear", scheme="muscl", boundary="open"):
+    block = {"type": "basin", "physics": "liquid", "size": [0.4, 0.5], "cells": [7, 15],
+             "pressure": 1e7, "thickness": 0.1,
+             "patches": {"near": {"side": "west", "span": [0.1, 0.3]},
+                         "far": {"side": "north", "boundary": boundary}}}  # fmt: skip
+    valve = {"type": "valve", "from": "pool.near", "to": "river", "area": 1e-4}
+    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8, "initial": "rest"}
+    probes = ["near.flow", "pool.pressure@0.2,0.3", "pool.near.pressure"]
+    fluid = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
+    return scene({"pool": block, "river": reservoir(2e7)}, {"near": valve}, 6e-4, numerics, probes, every=1e-4,
+                 fluid=fluid | {"law": law})  # fmt: skip
+
+
+def dyed(scheme="muscl", **dye):
+    patches = {"near": {"side": "west", "span": [1.0, 2.0]}}
+    pool = {"patches": patches, "scalars": {"dye": "where(y < 1.5, 1, 0.2)"}}
+    found = water(VALVE, pool, probes=["pool.dye@1.1,1.4", "near.flow"], scheme=scheme)
+    return found | {"scalars": {"dye": {"unit": "mg/l", "initial": 0.4, **dye}}}
+
+
+def carried(scheme="muscl", diffusivity=0.0):
+    sheet = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [11, 12],
+             "velocity": {"expression": "swirl", "period": 1.0},
+             "scalars": {"dye": "exp(-20*((x-0.3)^2+(y-0.5)^2))"}}  # fmt: skip
+    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8}
+    dye = {"unit": "mg/l", "diffusivity": diffusivity}
+    return scene({"sheet": sheet}, {}, 0.5, numerics, ["sheet.dye@0.3,0.5"], every=0.1, scalars={"dye": dye})
+
+
+class Kept(MemorySink):
+    """What a run tells, and its state at the end."""
+
+    def field(self, t, values):
+        self.frames = [*getattr(self, "frames", []), values]
+
+
+def told(case, threads: int, state=None):
+    """(bits of state and memory, rows, summary) of a run."""
+    case = case | {"output": case["output"] | {"fields": 3}}
+    model = fvsolve.build(fvsolve.load(case))
+    sink, state = Kept(model), state or initial_state(model)
+    sink.begin(model, state)
+    run = Run(model, state, sink, None, threads)
+    summary = run.go()
+    assert summary.reason == "finished", summary.reason
+    loop = run.loop
+    cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet") if name in frame
+             for array in frame[name].values()]  # fmt: skip
+    kept = [loop.now, *loop.stepper.memories(), run.slate.marks, run.slate.extremes, sink.table(), *cells]
+    return [np.array(one).tobytes() for one in kept], summary
+
+
+AMBIENT = 101325.0
+SCENES = {
+    "upwind, euler": water(scheme="upwind", method="euler"),
+    "muscl, ssp-rk2": water(),
+    "muscl, a limiter of its own, rk4": water(limiter="minmod", method="rk4"),
+    "upwind5, ssp-rk3": water(scheme="upwind5", method="ssp-rk3"),
+    "weno5, ssp-rk3": water(scheme="weno5", method="ssp-rk3"),
+    "walls all around": water(basin={"patches": {"near": {"side": "west"}}}),
+    "given steps": water(step=2e-3),
+    "a tolerance": water(rtol=1e-3, method="bogacki-shampine", probes=()),
+    "a tolerance, first same as last": water(rtol=1e-4, method="dormand-prince"),
+    "a pipe": water(PIPE, end=0.2, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
+    "dense output of its own": water(method="rk4", end=0.3),
+    "a liquid": liquid(),
+    "a liquid between walls": liquid(boundary="wall"),
+    "a liquid, upwind5": liquid(scheme="upwind5"),
+    "a liquid, weno5, log": liquid("log", "weno5"),
+    "a liquid, log": liquid("log"),
+    "a dye in water": dyed(),
+    "a dye in water that spreads, upwind": dyed("upwind", diffusivity=1e-3),
+    "a dye": carried(),
+    "a dye that spreads, upwind": carried("upwind", 1e-3),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_any_number_of_threads_gives_the_bits_of_one(name):
+    case = SCENES[name]
+    assert not alone(fvsolve.build(fvsolve.load(case)))
+    bits, one = told(case, 1)
+    for threads in (2, 3, 4):
+        found, summary = told(case, threads)
+        assert found == bits, threads
+        assert summary.threads == threads and summary.ledgers == one.ledgers
+
+
+def test_as_many_threads_as_rows():
+    assert told(water(), 12)[0] == told(water(), 1)[0]
+
+
+def test_two_basins_and_one_that_each_steps_whole():
+    """Of meshes that are no rectangle all threads step all cells."""
+    case = water()
+    case["nodes"]["round"] = {"type": "basin", "size": [2.0, 2.0], "cells": [6, 6], "holes": [[0.0, 0.0, 1.0, 1.0]],
+                              "level": 0.4, "patches": {"near": {"side": "east"}}}  # fmt: skip
+    case["nodes"]["other"] = {"type": "basin", "size": [2.0, 2.0], "cells": [5, 7], "level": 0.7,
+                              "patches": {"near": {"side": "east"}}}  # fmt: skip
+    for name in ("round", "other"):
+        case["links"][name] = VALVE | {"from": f"{name}.near", "to": "pool.near"}
+    bits, _ = told(case, 1)
+    found, summary = told(case, 3)
+    assert found == bits
+    (notice,) = [one for one in summary.warnings if one.kind == "threads"]
+    assert notice.text == "each thread steps the whole of round: its mesh is no full rectangle"
+
+
+def stepped(case, threads: int, spoil=lambda team: None) -> bytes:
+    """The state at the end, where something may have been spoilt."""
+    model = fvsolve.build(fvsolve.load(case))
+    loop = Loop(model, threads=threads)
+    loop.now[:] = model.start
+    if loop.team is not None:
+        spoil(loop.team)
+    loop.begin(model.case.numerics.end, 1e308)
+    try:
+        loop.run(1e9)
+    finally:
+        loop.close()
+    return loop.now.tobytes()
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_a_row_that_is_not_taken_from_a_neighbour_is_seen(threads):
+    """So that equal bits say something: every row that is taken matters."""
+
+    def forget(team):
+        team.members[1].written.joint[joint.STATES] -= 1
+
+    case = water(basin={"patches": {}}, link=None)
+    whole = stepped(case, 1)
+    assert stepped(case, threads) == whole
+    assert stepped(case, threads, forget) != whole
+
+
+def test_bands_that_do_not_wait_for_each_other_are_seen():
+    """A race, planted: all wait for the first band alone, which so never waits."""
+
+    def race(team):
+        for member in team.members:
+            member.written.joint[joint.MANY] = 1
+            team.board.view(np.int64)[joint.LINE * member.number + joint.SHOWN] = member.stepper.y.ctypes.data
+
+    case = water(basin={"patches": {}, "cells": [40, 40]}, link=None, step=1e-3)
+    whole = stepped(case, 1)
+    assert stepped(case, 2) == whole
+    assert any(stepped(case, 2, race) != whole for _ in range(5))
+
+
+def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
+    case = water(end=0.6, step=1e-4)
+    whole = fvsolve.run(case, out=tmp_path / "whole")
+
+    monkeypatch.setattr(importlib.import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+
+    def stop(t, seconds, steps):
+        if t > 0.15:
+            raise KeyboardInterrupt
+
+    broken = fvsolve.run(case, out=tmp_path / "broken", threads=3, progress=stop)
+    assert broken.reason.startswith("interrupted") and 0.0 < np.load(tmp_path / "broken" / "restart.npz")["t"] < 0.6
+    broken = fvsolve.run(tmp_path / "broken" / "case.toml", out=tmp_path / "broken", resume=True, threads=2)
+    assert broken.ok and broken.summary["threads"] == 2
+    assert whole.ok and whole.ledger == broken.ledger
+    files = [
+        sorted([*(tmp_path / name).rglob("*.vtu"), tmp_path / name / "history.csv"]) for name in ("whole", "broken")
+    ]
+    assert len(files[0]) == len(files[1]) > 2
+    assert all(one.read_bytes() == other.read_bytes() for one, other in zip(*files, strict=True))
+
+
+def test_ctrl_c_while_threads_march_ends_a_run_cleanly(tmp_path):
+    """The signal comes while all are in compiled code, and is put off until they are back."""
+    case = water(basin={"cells": [80, 80]}, end=50.0)
+    timer = threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    found = fvsolve.run(case, out=tmp_path / "run", threads=2)
+    timer.join()
+    assert found.reason.startswith("interrupted")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert not [one for one in threading.enumerate() if one.name.startswith("band")]
+
+
+NETWORK = scene({"a": reservoir(AMBIENT), "b": reservoir(2 * AMBIENT)},
+                {"v": {"type": "valve", "from": "a", "to": "b", "area": 1e-3}}, 0.1,
+                {"method": "rk4", "step": 0.01})  # fmt: skip
+ALONE = {
+    "an implicit method": (water(method="tr-bdf2"), "tr-bdf2 solves for all states at once"),
+    "no basin": (NETWORK, "there is no basin"),
+    "fifth order of a dye": (carried("weno5"), "sheet: weno5 carries scalars"),
+    "a delay line": (water(PIPE | {"line": "delay"}, probes=["pool.near.head"]), "it has delay lines"),
+    "a dye that decays": (dyed(decay=0.1), "pool: dye decays"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_what_one_thread_steps_is_said(name):
+    case, why = ALONE[name]
+    model = fvsolve.build(fvsolve.load(case))
+    assert why in alone(model) and shared(model)["most"] == 1
+    run = fvsolve.run(model, threads=2)
+    (said,) = [one for one in run.summary["warnings"] if one["kind"] == "threads"]
+    assert run.summary["threads"] == 1 and "one thread steps it, not 2" in said["text"] and why in said["text"]
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, None])
+def test_a_number_of_threads_that_is_none_is_named(threads):
+    with pytest.raises(FvsolveError, match="threads = .*wanted a whole number from 1 on"):
+        fvsolve.run(water(), threads=threads)
+
+
+def test_more_threads_than_rows_are_named():
+    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs one; wanted 12 at most"):
+        fvsolve.run(water(), threads=13)
+
+
+def test_check_says_what_can_be_shared_out(fvs):
+    assert "threads: up to 50 share out 50 rows of tank" in fvs("check", "dam-break")[1]
+    assert "threads: one; plain: its mesh is no full rectangle" in fvs("check", "flooding")[1]

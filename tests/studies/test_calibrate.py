@@ -1,0 +1,114 @@
+"""What was planted in noisy data made by another method is found again, and what data cannot tell is said by name."""
+
+import json
+
+import numpy as np
+import pytest
+from pytest import approx
+from truth.scenes import junction, pipe, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.case.text import write
+from fvsolve.errors import FvsolveError
+from fvsolve.studies import calibrate
+
+LENGTH, CELLS, SPEED, LEAK, AREA = 600.0, 60, 1130.0, 217.0, 0.0008
+FRICTION = {"model": "steady", "factor": 0.02}
+
+
+def line(leak: float, speed: float, cells: int, numerics: dict) -> dict:
+    """A main with a leak on its way, whose valve shuts quickly: the leak answers after twice the way to it."""
+    nodes = {"lake": reservoir(4e6), "hole": junction(), "gate": junction(), "out": reservoir(101325.0)}
+    first = max(1, round(cells * leak / LENGTH))
+    links = {
+        "up": pipe("lake", "hole", leak, 0.2, speed, first, friction=FRICTION),
+        "down": pipe("hole", "gate", LENGTH - leak, 0.2, speed, cells - first, friction=FRICTION),
+        "leak": {"type": "leak", "from": "hole", "coefficient": 6e-6, "exponent": 0.5},
+        "valve": valve("gate", "out", 0.61 * AREA, {"start": 0.1, "duration": 0.1, "value": [1.0, 0.0]}),
+    }
+    return scene(nodes, links, 4.0, numerics, ["gate.pressure"], every=0.01)
+
+
+MODEL = {"scheme": "upwind5", "method": "rk4", "courant": 0.9}
+
+
+@pytest.fixture
+def measured(tmp_path, monkeypatch):
+    """Where series lie that were measured: by another scheme on four times the cells, with noise of two thousandths."""
+    monkeypatch.chdir(tmp_path)
+    fine = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
+    result = fvsolve.run(line(LEAK, SPEED, 4 * CELLS, fine))
+    noise = np.random.default_rng(7).normal(0.0, 0.002 * np.ptp(result["gate.pressure"]), result.t.size)
+    table = np.column_stack([result.t, result["gate.pressure"] + noise])
+    np.savetxt(tmp_path / "gate.csv", table, delimiter=",", header="t [s],p [Pa]", comments="")
+    return tmp_path
+
+
+def compared(case: dict) -> dict:
+    return case | {"compare": {"gate.pressure": {"file": "gate.csv", "time": "t [s]", "value": "p [Pa]"}}}
+
+
+def test_a_wave_speed_is_found_within_a_thousandth_from_noisy_data(measured):
+    free = {"links.down.wave_speed": [900.0, 1300.0], "links.valve.area": [0.0006, 0.001]}
+    found, true = calibrate(compared(line(LEAK, SPEED, CELLS, MODEL)), free), [SPEED, AREA]
+    assert found.values["links.down.wave_speed"] == approx(SPEED, rel=1e-3)
+    assert found.values["links.valve.area"] == approx(AREA, rel=5e-3)
+    assert found.doubts == []
+    off = [abs(value - own) for value, own in zip(found.values.values(), true, strict=True)]
+    assert all(one < 4.0 * sigma for one, sigma in zip(off, found.sigma.values(), strict=True))
+    assert 0.0018 * 3e6 < found.rms["gate.pressure"] < 0.01 * 3e6  # the noise, and fronts on few cells
+
+
+def test_a_planted_leak_is_found_within_a_cell_from_noisy_data(measured):
+    """Both lengths beside it are free, and its size."""
+    case = compared(line(300.0, SPEED, 40, MODEL))
+    free = {
+        "links.up.length": [100.0, 500.0],
+        "links.down.length": [100.0, 500.0],
+        "links.leak.coefficient": [1e-6, 1e-5],
+    }
+    found = calibrate(case, free, {"numerics.end": 1.6})
+    cell = LENGTH / 40
+    assert abs(found.values["links.up.length"] - LEAK) < cell
+    assert abs(found.values["links.down.length"] - (LENGTH - LEAK)) < cell
+    assert found.values["links.leak.coefficient"] == approx(6e-6, rel=0.1)
+    assert np.array(found.correlation).shape == (3, 3) and np.diag(found.correlation) == approx(np.ones(3))
+
+
+def test_what_cannot_be_told_apart_and_what_changes_nothing_is_named(measured):
+    """Area and coefficient of a valve are but a product; the end of the run has no say in what was before."""
+    case = compared(line(LEAK, SPEED, CELLS, MODEL))
+    free = {"links.valve.area": [0.0006, 0.001], "links.valve.discharge_coefficient": [0.5, 0.8],
+            "numerics.end": [4.0, 4.1]}  # fmt: skip
+    found = calibrate(case, free)
+    said = "; ".join(found.doubts)
+    assert "links.valve.area and links.valve.discharge_coefficient cannot be told apart" in said
+    assert "numerics.end changes nothing that was measured" in said and found.plain()["sigma"]["numerics.end"] is None
+
+
+def test_the_command_prints_values_with_their_sigma(measured, fvs):
+    (measured / "line.toml").write_text(write(compared(line(LEAK, SPEED, 20, MODEL))))
+    ask = ("fit", measured / "line.toml", "--free", "links.valve.area=0.0006,0.001")
+    code, out, _ = fvs(*ask, "--json")
+    said = json.loads(out)
+    assert code == 0 and said["values"]["links.valve.area"] == approx(AREA, rel=5e-3)
+    assert {"values", "sigma", "correlation", "rms", "doubts", "runs"} <= said.keys() and said["correlation"] == [[1.0]]
+    code, out, _ = fvs(*ask)
+    assert code == 0 and "links.valve.area" in out and "rms of gate.pressure" in out
+
+
+def test_a_value_at_an_end_of_its_range_is_named(measured):
+    found = calibrate(compared(line(LEAK, SPEED, 20, MODEL)), {"links.valve.area": [0.0009, 0.0012]})
+    assert found.doubts == ["links.valve.area lies at an end of its range"]
+
+
+def test_what_cannot_be_fitted_is_named(measured):
+    case = line(LEAK, SPEED, 20, MODEL)
+    with pytest.raises(FvsolveError, match="nothing to fit to: the case has no .compare."):
+        calibrate(case, {"links.valve.area": [0.0006, 0.001]})
+    with pytest.raises(FvsolveError, match="nothing is free"):
+        calibrate(compared(case), {})
+    with pytest.raises(FvsolveError, match="LOW below HIGH"):
+        calibrate(compared(case), {"links.valve.area": [0.001, 0.0006]})
+    with pytest.raises(FvsolveError, match="no run of the sample came to its end: .*halve it"):
+        calibrate(compared(case), {"links.valve.area": [0.0006, 0.001]}, {"numerics.courant": 5.0})

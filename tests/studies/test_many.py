@@ -1,0 +1,174 @@
+"""Tasks done in chunks by other processes, or by Dask's workers, give what they give here, whoever is killed."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from multiprocessing import active_children
+
+import pytest
+
+from fvsolve.errors import FvsolveError, RunError
+from fvsolve.studies import many as engine
+from fvsolve.studies.many import many, sized
+
+
+class Work:
+    """The square of a number; some end the process that is to do them, always or until a file is there."""
+
+    def __init__(self, deadly=(), once=None) -> None:
+        self.deadly, self.once, self.home = deadly, once, os.getpid()
+
+    def __call__(self, task):
+        if task in self.deadly and os.getpid() != self.home and not (self.once and os.path.exists(self.once)):
+            if self.once:
+                open(self.once, "w").close()
+            os.kill(os.getpid(), signal.SIGKILL)
+        if task == "fault":
+            raise ValueError("what a task raises")
+        return task * task, os.getpid()
+
+    def lost(self, task):
+        return "lost", task
+
+
+def squares(found) -> dict:
+    return {number: answer[0] for number, answer in found.items()}
+
+
+def test_all_tasks_are_done_the_first_one_here():
+    tasks = [3, 1, 4, 1, 5, 9, 2, 6]
+    found = dict(many(Work(), tasks, jobs=2))
+    assert squares(found) == {k: task * task for k, task in enumerate(tasks)}
+    assert found[0][1] == os.getpid() and os.getpid() not in {found[k][1] for k in range(1, 8)}
+    assert dict(many(Work(), tasks)) == {k: (task * task, os.getpid()) for k, task in enumerate(tasks)}
+    assert [*many(Work(), [], jobs=2)] == [] and squares(dict(many(Work(), [7], jobs=2))) == {0: 49}
+
+
+def test_a_process_that_is_killed_costs_its_chunk_which_another_does(tmp_path):
+    found = dict(many(Work({5}, str(tmp_path / "killed")), range(200), jobs=2))
+    assert (tmp_path / "killed").exists() and squares(found) == {k: k * k for k in range(200)}
+
+
+def test_what_kills_every_process_is_lost_and_nothing_else():
+    found = dict(many(Work({7, 30}), range(40), jobs=2))
+    assert {k for k, answer in found.items() if answer == ("lost", k)} == {7, 30}
+    rest = {*range(40)} - {7, 30}
+    assert squares({k: found[k] for k in rest}) == {k: k * k for k in rest}
+
+
+def test_processes_end_with_the_one_that_started_them(tmp_path):
+    """Killed, it can tell nobody; what they do would go on for hours."""
+    script = """if True:
+        import os, signal, sys, time
+        from fvsolve.studies.many import many
+        def said(task):
+            if task: open(f"{sys.argv[1]}/{os.getpid()}", "w").close(); time.sleep(60.0)
+        if __name__ == "__main__": [*many(said, [0, 1, 2], jobs=2)]"""
+    (tmp_path / "script.py").write_text(textwrap.dedent(script))
+    (tmp_path / "there").mkdir()
+    running = subprocess.Popen([sys.executable, tmp_path / "script.py", tmp_path / "there"])
+    until(lambda: len([*(tmp_path / "there").iterdir()]) == 2)
+    running.kill()
+    running.wait()
+    until(lambda: not any(os.path.exists(f"/proc/{one.name}") for one in (tmp_path / "there").iterdir()))
+
+
+def until(holds) -> None:
+    for _ in range(400):
+        if holds():
+            return
+        time.sleep(0.02)
+    raise AssertionError("it never came about")
+
+
+def test_what_a_task_raises_is_raised_here_and_no_process_stays():
+    before = {*active_children()}  # of Dask's
+    with pytest.raises(ValueError, match="what a task raises"):
+        dict(many(Work(), [1, 2, "fault", 4], jobs=2))
+    assert not {*active_children()} - before
+
+
+def test_chunks_take_about_a_second_and_grow_no_faster_than_that_can_be_known():
+    assert sized(1, 0.01, 1) == engine.LEAPS
+    assert sized(8, 0.08, 8) == 64 and sized(64, 0.64, 64) == 100
+    assert sized(100, 10.0, 100) == 10 and sized(1, 60.0, 1) == 1
+
+
+def test_workers_of_dask_give_what_processes_give(cluster):
+    tasks = [*range(50)]
+    found = dict(many(Work(), tasks, dask=cluster.scheduler_address))
+    assert squares(found) == {k: k * k for k in tasks}
+    assert os.getpid() not in {found[k][1] for k in range(1, 50)}
+    with pytest.raises(ValueError, match="what a task raises"):
+        dict(many(Work(), [1, 2, "fault", 4], dask=cluster.scheduler_address))
+
+
+def test_a_worker_of_dask_that_is_killed_costs_its_chunk(cluster, tmp_path):
+    found = dict(many(Work({5}, str(tmp_path / "killed")), range(60), dask=cluster.scheduler_address))
+    assert (tmp_path / "killed").exists() and squares(found) == {k: k * k for k in range(60)}
+
+
+def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
+    cluster_room = pytest.importorskip("fvsolve.studies.cluster")
+    pytest.importorskip("distributed", reason="Dask is an extra")
+    monkeypatch.setattr(cluster_room, "PATIENCE", 0.5)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+        for wrong in (address, "nowhere:at:all", "tcp://"):
+            said = f'no Dask scheduler answers at "{wrong}": .*; wanted one such as tcp'
+            with pytest.raises(FvsolveError, match=said):
+                dict(many(Work(), [1, 2, 3], dask=wrong))
+
+
+def test_a_scheduler_without_workers_is_named(monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="Dask is an extra")
+    from fvsolve.studies import cluster as room
+
+    monkeypatch.setattr(room, "PATIENCE", 0.5)
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
+        with pytest.raises(FvsolveError, match="has no workers; start some: dask worker tcp"):
+            dict(many(Work(), [1, 2, 3], dask=empty.scheduler_address))
+
+
+def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
+    from fvsolve.studies import cluster as room
+
+    own = room.programs()
+    assert room.strange(own) == [] and room.strange({**own, "sources": "other"}) == [
+        f"sources other (here {own['sources']})"
+    ]
+    assert room.strange(ModuleNotFoundError("No module named 'fvsolve'")) == ["no fvsolve (No module named 'fvsolve')"]
+    asked = []
+
+    def versions(said, own=room.versions):
+        asked.append(said)
+        return own(said) | ({} if len(asked) == 1 else {"distributed": "2019.1"})  # the first is that of here
+
+    monkeypatch.setattr(room, "versions", versions)
+    said = r"of another version, .*: the scheduler has distributed 2019.1 \(here .*worker .*; install the same there"
+    with pytest.raises(FvsolveError, match=said):
+        dict(many(Work(), [1, 2, 3], dask=cluster.scheduler_address))
+
+
+def test_a_scheduler_that_goes_away_is_told_and_nobody_waits_for_ever(monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="Dask is an extra")
+    from fvsolve.studies import cluster as room
+
+    monkeypatch.setattr(room, "PATIENCE", 3.0)
+    made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False)
+    found = many(Slow(), range(20), dask=made.scheduler_address)
+    next(found), next(found)
+    made.close()
+    with pytest.raises(RunError, match="the Dask scheduler at .* has gone; what is finished is kept"):
+        list(found)
+
+
+class Slow(Work):
+    def __call__(self, task):
+        time.sleep(0.2)
+        return super().__call__(task)

@@ -1,0 +1,109 @@
+"""Indices of a function that are known in closed form are found; those of runs are those of their own outcomes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from pytest import approx
+from truth.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
+
+from fvsolve.case.text import write
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.studies import sensitivity
+
+pytest.importorskip("SALib", reason="SALib is an extra")
+A, B = 7.0, 0.1
+CIRCLE = {name: (-math.pi, math.pi) for name in ("x1", "x2", "x3")}
+
+
+def ishigami(x: dict) -> float:
+    return math.sin(x["x1"]) + A * math.sin(x["x2"]) ** 2 + B * x["x3"] ** 4 * math.sin(x["x1"])
+
+
+def test_the_ishigami_function_has_its_known_indices():
+    """Ishigami and Homma 1990: variances of its terms in closed form."""
+    first = [0.5 * (1 + B * math.pi**4 / 5) ** 2, A**2 / 8, 0.0]
+    both = 8 * B**2 * math.pi**8 / 225  # of x1 and x3 together
+    whole = sum(first) + both
+    found = sensitivity(ishigami, CIRCLE, samples=4096)
+    assert found.S1 == approx([one / whole for one in first], abs=0.02)
+    assert found.ST == approx([(first[0] + both) / whole, first[1] / whole, both / whole], abs=0.02)
+    assert np.all(np.abs(np.array(found.S1) - [one / whole for one in first]) < 2.0 * np.array(found.S1_conf))
+    assert found.runs == 4096 * 5 + 1024 * 4 and found.outcome == "the function"
+    assert found.mu_star[1] > 0.0 and found.mu[1] == approx(0.0, abs=0.5)  # up and down alike
+
+
+def test_a_line_has_its_slopes_whatever_its_units():
+    """Of a sum S1 = ST, in the ratio of squares of slope times range; every effect is the same: no spread."""
+    found = sensitivity(lambda x: 1e9 + 3e-4 * x["a"] + 4e2 * x["b"], {"a": (0.0, 1e6), "b": (-0.5, 0.5)}, samples=256)
+    assert found.S1 == approx([0.36, 0.64], abs=0.02) and found.ST == approx([0.36, 0.64], abs=0.02)
+    assert found.mu_star == approx([300.0, 400.0], rel=1e-6) and found.sigma == approx([0.0, 0.0], abs=1e-3)
+
+
+def test_the_same_seed_gives_the_same_indices():
+    one, same, other = (sensitivity(ishigami, CIRCLE, samples=32, seed=seed) for seed in (1, 1, 2))
+    assert one.plain() == same.plain() != other.plain()
+
+
+@pytest.fixture
+def line() -> dict:
+    """A frictionless pipe shut at once: the first rise is rho a v."""
+    nodes = {"lake": reservoir(3e6), "gate": junction(), "out": reservoir(101325.0)}
+    main = pipe("lake", "gate", 100.0, 0.3, 1000.0, 5, friction=NO_FRICTION)
+    links = {"main": main, "valve": valve("gate", "out", 0.001, {"start": 0.05, "duration": 0.0, "value": [1.0, 0.0]})}
+    numerics = {"scheme": "upwind", "method": "euler", "courant": 1.0}
+    return scene(nodes, links, 0.15, numerics, ["gate.pressure"])
+
+
+def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has(line):
+    """p = p0 + rho a v, v by the valve's area: V = V_a + V_v + V_av, each by means and variances of the two."""
+    bounds = {"links.main.wave_speed": [900.0, 1300.0], "links.valve.area": [0.001, 0.002]}
+    a, s = ((sum(one) / 2, (one[1] - one[0]) ** 2 / 12) for one in bounds.values())
+    terms = a[1] * s[0] ** 2, s[1] * a[0] ** 2, a[1] * s[1]
+    found = sensitivity(line, bounds, "max(gate.pressure)", samples=128)
+    assert found.outcome == "max(gate.pressure) [Pa]"
+    assert found.S1 == approx([one / sum(terms) for one in terms[:2]], abs=0.03)
+    assert found.ST == approx([(one + terms[2]) / sum(terms) for one in terms[:2]], abs=0.03)
+    rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)  # of speed times area
+    assert found.mu_star == approx([rise * 0.0015 * 400.0, rise * 1100.0 * 0.001], rel=0.1)
+
+
+def test_the_command_says_it_and_finds_its_runs_again(line, fvs, tmp_path):
+    (tmp_path / "line.toml").write_text(write(line))
+    ask = ("sensitivity", tmp_path / "line.toml", "--vary", "links.main.wave_speed=900 m/s,1300",
+           "--vary", "nodes.out.pressure=1 atm,2 atm", "--outcome", "max(gate.pressure)", "--samples", 4, "--out",
+           tmp_path)  # fmt: skip
+    code, out, _ = fvs(*ask, "--json")
+    said = json.loads(out)
+    assert code == 0 and said["keys"] == ["links.main.wave_speed", "nodes.out.pressure"] and said["runs"] == 16 + 12
+    assert {"S1", "ST", "S1_conf", "mu_star", "sigma"} <= said.keys() and said["ST"][1] < 0.02 < said["ST"][0]
+    before = (tmp_path / "points.jsonl").read_bytes()
+    code, out, _ = fvs(*ask)
+    assert code == 0 and "28 runs" in out and (tmp_path / "points.jsonl").read_bytes() == before
+    assert (tmp_path / "sensitivity.csv").read_text().startswith("key,S1,S1_conf,ST,")
+    assert (tmp_path / "sensitivity.png").stat().st_size > 1000
+
+
+def test_what_cannot_be_asked_is_named(line):
+    bounds = {"links.main.wave_speed": [900.0, 1300.0]}
+    for given, said in (
+        ({"vary": bounds, "outcome": "max(gate.flow)"}, 'no outcome "max.gate.flow."'),
+        ({"vary": bounds}, "no outcome; wanted one such as"),
+        ({"vary": {}, "outcome": "max(gate.pressure)"}, "nothing varies"),
+        ({"vary": bounds, "outcome": "max(gate.pressure)", "samples": 1}, "samples = 1; wanted 2 or more"),
+        ({"vary": {"nodes.gate.position": [0.0, 1.0]}, "outcome": "max(gate.pressure)"}, "is no quantity"),
+        ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "outcome": "max(gate.pressure)"}, "no key moves it"),
+        ({"vary": bounds, "outcome": "t [s]"}, 'no outcome "t .s."'),
+    ):
+        with pytest.raises(FvsolveError, match=said):
+            sensitivity(line, **({"samples": 2} | given))
+    with pytest.raises(CaseError, match="LOW below HIGH"):
+        sensitivity(line, {"links.main.wave_speed": [1300.0, 900.0]}, "max(gate.pressure)")
+
+
+def test_runs_that_have_no_outcome_are_counted_and_the_first_is_named(line):
+    refused = {"links.main.wave_speed": [900.0, 1300.0]}
+    blown = {"numerics.courant": 4.0, "numerics.end": 20.0}
+    with pytest.raises(FvsolveError, match=r"runs have no max\(gate.pressure\).*the first at links.main.wave_speed = "):
+        sensitivity(line, refused, "max(gate.pressure)", 2, set=blown)
