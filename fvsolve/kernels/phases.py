@@ -137,7 +137,7 @@ MEMBERS = {
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
 DELAYS = Pieces(
-    offer="delay.lines: offer_lines", answer="delay.lines: answer_lines", rates="delay.lines: fill_lines",
+    offer="delay.lines: offer_lines", answer="delay.lines: answer_lines",
     observe="delay.along: observe_lines", record="delay.record: record_lines",
 )  # fmt: skip
 COUPLED = Pieces(close="delay.lines: couple_clusters")

@@ -126,6 +126,8 @@ DELAY = np.dtype(  # a pipe as a delay line: stretches of equal travel time, fri
         ("hold", "f8"),  # what is read was sent so long ago: tau, or of a shorter one the longest step [s]
         ("now", "f8"),  # share of a shorter one that arrives at once, 1 - tau / hold; 0 of others
         ("couple", "f8"),  # of a shorter one, flow between its ends per pressure [kg/s per Pa]
+        ("ring", "i8"),  # entries of its past before its own, and how many of each stretch, see `kernels.delay.history`
+        ("room", "i8"),
         ("slope", "f8"),  # d drag / d flow of the profile [1/s]
         ("places", "i8"),  # at which fields and envelopes are told
     ],

@@ -6,20 +6,20 @@ delta of its middle when what passes x now was there, or is yet to be: at both e
 
 from fvsolve.jit import njit
 from fvsolve.kernels.delay.history import (
-    CAPACITY,
+    ARRIVALS,
     COUNT,
-    HEAD,
+    HEADS,
     ZEROS,
-    arrivals_at,
     between,
     both_waves,
     clock_of,
     jumps_at,
     jumps_until,
+    places_of,
     read_both,
+    ring_of,
     same_time,
     stencil,
-    stretch_at,
     time_of,
 )
 from fvsolve.kernels.delay.lines import rubbed
@@ -34,18 +34,19 @@ def sent(t, out, tables, which, q, wave, at):
     newest = int(past[COUNT]) - 1
     if newest < 0:
         return 0.0
-    s, last = line["stretch"] + q, time_of(past, newest)
-    until = at + same_time(past)
+    last, places, until = time_of(past, newest), places_of(past), at + same_time(past)
     k, w = stencil(past, clock_of(past, newest), min(at, last))
-    both = both_waves(past, stretch_at(past, s), int(past[CAPACITY]) - 1, k, w)
-    value = (both[1] if wave == 1 else both[0]) + jumps_until(past, jumps_at(past, s, wave), until)
+    ring, mask = ring_of(places, line, q)
+    both = both_waves(past, ring, mask, k, w)
+    jumps = jumps_at(places, line["stretch"] + q, wave)
+    value = (both[1] if wave == 1 else both[0]) + jumps_until(past, places, jumps, until)
     if at <= last or t <= last:
         return value
     if q == (line["stretches"] - 1 if wave == 1 else 0):  # by what its node sends now
         now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
         return value + (now - value) * (at - last) / (t - last)
     pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
-    r, l = read_both(past, clock_of(past, newest), line["stretch"] + before, at - line["tau"])
+    r, l = read_both(past, places, clock_of(past, newest), line, before, at - line["tau"])
     delta = rubbed(pipe, line, r, l)
     return l + delta if wave == 1 else r - delta
 
@@ -75,35 +76,34 @@ def along_line(t, out, tables, which, r, l):
 
 
 @njit(forceinline=True)
-def sketched(past, clock, at, wave, t):
-    """Wave that was sent into a stretch at t, by lines between entries; at : where its entries begin."""
+def sketched(past, places, clock, ring, mask, jumps, wave, t):
+    """Wave that was sent into a stretch at t, by lines between entries of a ring; jumps : their head."""
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
-    capacity, place = clock[4][0], (t - latest) * often
+    place = (t - latest) * often
     if place > -even:
         back = int(place)
         k, x = last + back - 1, place - back + 1.0
     else:
         k, x = between(past, last, t)
         if k < ZEROS and x == 0.0:  # before all
-            return jumps_until(past, at + 2 * capacity + wave * clock[4][2], t + clock[5])
-    a, b = at + 2 * (k & (capacity - 1)) + wave, at + 2 * ((k + 1) & (capacity - 1)) + wave
-    jumps = at + 2 * capacity + wave * clock[4][2]
-    return past[a] + x * (past[b] - past[a]) + jumps_until(past, jumps, t + clock[5])
+            return jumps_until(past, places, jumps, t + clock[4])
+    a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
+    return past[a] + x * (past[b] - past[a]) + jumps_until(past, places, jumps, t + clock[4])
 
 
 @njit
-def sketch_line(t, tables, which, r, l):
+def sketch_line(t, tables, places, clock, which, r, l):
     """`along_line` at the time of the last entry, as envelopes want it: by lines, delta that of what arrives."""
-    past, line, clock = tables.past, tables.delays[which], clock_of(tables.past, int(tables.past[COUNT]) - 1)
-    n, many, tau, place = r.size, line["stretches"], line["tau"], arrivals_at(past)
-    first = HEAD + clock[4][0] + line["stretch"] * clock[4][1]
+    past, line = tables.past, tables.delays[which]
+    n, many, tau = r.size, line["stretches"], line["tau"]
     for j in range(n):
         share = (j + 0.5) / n * many
         q = min(int(share), many - 1)
-        x, at = share - q, first + q * clock[4][1]
-        delta = past[place + 3 * (line["stretch"] + q) + 2]
-        r[j] = sketched(past, clock, at, 0, t - x * tau) - x * delta
-        l[j] = sketched(past, clock, at, 1, t - (1.0 - x) * tau) + (1.0 - x) * delta
+        x, s = share - q, line["stretch"] + q
+        ring, mask = ring_of(places, line, q)
+        delta, jumps = past[places[0] + ARRIVALS * s + 2], jumps_at(places, s, 0)
+        r[j] = sketched(past, places, clock, ring, mask, jumps, 0, t - x * tau) - x * delta
+        l[j] = sketched(past, places, clock, ring, mask, jumps + HEADS, 1, t - (1.0 - x) * tau) + (1.0 - x) * delta
 
 
 @njit
