@@ -141,7 +141,6 @@ DELAYS = Pieces(
     observe="delay.along: observe_lines", record="delay.record: record_lines",
 )  # fmt: skip
 COUPLED = Pieces(close="delay.lines: couple_clusters")
-TOLD = Pieces(record="delay.record: record_places")
 BANDS = Pieces(meet="joint: meet", agree="joint: agree")
 TOGETHER = Pieces(home="fvsolve.basins", together="bands: book_together")
 MIXED = Pieces(mix="scalars: mix_scalars")
@@ -236,8 +235,6 @@ class Cast:
         yield from self.carried
         if self.pipes:
             yield MEMBERS["pipes"]
-        if self.delays:
-            yield TOLD
         yield ALWAYS
 
     def modules(self) -> list:

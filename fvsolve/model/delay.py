@@ -139,8 +139,8 @@ def cut_lines(draft) -> list[str]:
         many = min(most, max(1, math.ceil(0.5 * takes / case.numerics.accuracy)))
         if row["now"] > 0.0:
             many = 1
-        row["stretches"], row["stretch"], row["slope"] = many, at, drag_and_slope(pipe, float(pipe["flow"]))[1]
-        row["tau"] = travel / many
+        row["stretches"], row["stretch"], row["tau"] = many, at, travel / many
+        row["passes"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
         row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
         at += many
         off = 0.25 * takes / many + by_interpolation(float(row["tau"]), chosen.longest, scale)

@@ -31,7 +31,7 @@ def past_size(delays: np.ndarray, wider: int = 1) -> int:
     if not len(delays):
         return 0
     many, entries = int(delays["stretches"].sum()), wider * int((delays["room"] * delays["stretches"]).sum())
-    per_stretch = at.ARRIVALS + 2 * at.HEADS + 4 * queue_of(many)
+    per_stretch = at.ARRIVALS + 2 * at.HEADS + 4 * queue_of(many) + at.APART
     return at.HEAD + wider * int(delays["room"].max()) + per_stretch * many + 2 * entries
 
 

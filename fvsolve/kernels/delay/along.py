@@ -9,6 +9,8 @@ from fvsolve.kernels.delay.history import (
     ARRIVALS,
     COUNT,
     HEADS,
+    MANY,
+    SUM,
     ZEROS,
     between,
     both_waves,
@@ -75,7 +77,7 @@ def along_line(t, out, tables, which, r, l):
         r[j], l[j] = waves_at(t, out, tables, which, (j + 0.5) / n)
 
 
-@njit(forceinline=True)
+@njit
 def sketched(past, places, clock, ring, mask, jumps, wave, t):
     """Wave that was sent into a stretch at t, by lines between entries of a ring; jumps : their head."""
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
@@ -91,19 +93,26 @@ def sketched(past, places, clock, ring, mask, jumps, wave, t):
     return past[a] + x * (past[b] - past[a]) + jumps_until(past, places, jumps, t + clock[4])
 
 
-@njit
-def sketch_line(t, tables, places, clock, which, r, l):
-    """`along_line` at the time of the last entry, as envelopes want it: by lines, delta that of what arrives."""
-    past, line = tables.past, tables.delays[which]
-    n, many, tau = r.size, line["stretches"], line["tau"]
-    for j in range(n):
-        share = (j + 0.5) / n * many
-        q = min(int(share), many - 1)
-        x, s = share - q, line["stretch"] + q
-        ring, mask = ring_of(places, line, q)
-        delta, jumps = past[places[0] + ARRIVALS * s + 2], jumps_at(places, s, 0)
-        r[j] = sketched(past, places, clock, ring, mask, jumps, 0, t - x * tau) - x * delta
-        l[j] = sketched(past, places, clock, ring, mask, jumps + HEADS, 1, t - (1.0 - x) * tau) + (1.0 - x) * delta
+@njit(forceinline=True)
+def sketch(t, past, places, clock, line, share):
+    """`waves_at` the time t of the last entry, as envelopes want it: by lines, delta that of what arrives."""
+    many, tau = line["stretches"], line["tau"]
+    q = min(int(share * many), many - 1)
+    x, s = share * many - q, line["stretch"] + q
+    ring, mask = ring_of(places, line, q)
+    delta, jumps = past[places[0] + ARRIVALS * s + 2], jumps_at(places, s, 0)
+    steps = tau * clock[2]
+    if steps + 2.0 < clock[3] and past[jumps + MANY] + past[jumps + HEADS + MANY] == 0.0:
+        ahead, back = x * steps, (1.0 - x) * steps  # steps ago
+        i, j = int(ahead), int(back)
+        a, b = ring + 2 * ((clock[0] - i) & mask), ring + 2 * ((clock[0] - i - 1) & mask)
+        c, d = ring + 2 * ((clock[0] - j) & mask) + 1, ring + 2 * ((clock[0] - j - 1) & mask) + 1
+        r = past[a] + (ahead - i) * (past[b] - past[a]) + past[jumps + SUM]
+        l = past[c] + (back - j) * (past[d] - past[c]) + past[jumps + HEADS + SUM]
+    else:
+        r = sketched(past, places, clock, ring, mask, jumps, 0, t - x * tau)
+        l = sketched(past, places, clock, ring, mask, jumps + HEADS, 1, t - (1.0 - x) * tau)
+    return r - x * delta, l + (1.0 - x) * delta
 
 
 @njit

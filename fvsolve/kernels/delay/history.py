@@ -22,6 +22,7 @@ KNOWN_TIME, KNOWN_COUNT = 12, 13  # of the arrivals that are kept
 ZEROS = 8  # entries before the first, of the profile
 SUM, FIRST, MANY, ARRIVED, HEADS = 0, 1, 2, 3, 4  # of the jumps of a wave
 ARRIVALS = 3  # of a stretch: backward wave at its beginning, forward one at its end, delta
+APART = 8  # numbers between rings, a cache line: or entries of one time would all fall into the same few of a cache
 SAME = 1e-9  # of a step: times that are as good as one
 RATIO = 3.0  # of neighbouring steps, above which a polynomial through them is a line
 
@@ -45,7 +46,7 @@ def places_of(past):
 def ring_of(places, line, q):
     """(where the entries of stretch q of a line begin, mask of their numbers)."""
     room = places[4] * line["room"]
-    return places[3] + 2 * (places[4] * line["ring"] + q * room), room - 1
+    return places[3] + 2 * (places[4] * line["ring"] + q * room) + APART * (line["stretch"] + q), room - 1
 
 
 @njit(forceinline=True)

@@ -23,7 +23,7 @@ from fvsolve.kernels.friction import EXPONENT, drag, power_of_square
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH
 
-ENOUGH = 1e-7  # of a flow that Newton leaves
+ENOUGH = 1e-6  # of a flow that Newton leaves
 ROUGH = 0.2  # of its slope, by which that of a factor that hangs on the flow is off
 MOST = 60
 
@@ -46,7 +46,7 @@ def rubbed(pipe, line, r, l):
         return 0.0
     kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
     rough = ROUGH if pipe["friction"] == FRICTION_ROUGH else 0.0
-    m, least = x, ENOUGH * (abs(x) + 1e-3 * abs(flow))
+    m, least = x * line["passes"], ENOUGH * (abs(x) + 1e-3 * abs(flow))
     for _ in range(MOST):
         force, slope = drag_and_slope(pipe, flow + m)
         step = (m + kappa * (force - drag0) - x) / (1.0 + kappa * slope)

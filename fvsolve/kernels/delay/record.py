@@ -7,7 +7,7 @@ what differs was passed on. So a jump travels exactly through what is linear, an
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run
-from fvsolve.kernels.delay.along import sketch_line
+from fvsolve.kernels.delay.along import sketch
 from fvsolve.kernels.delay.history import (
     ARRIVALS,
     ARRIVED,
@@ -36,7 +36,7 @@ from fvsolve.kernels.delay.history import (
 )
 from fvsolve.kernels.delay.lines import arrive, arrive_all, drag_and_slope, rubbed
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.observer import record_pipe
+from fvsolve.kernels.observer import note
 from fvsolve.kernels.records import ALONE, JUNCTION
 
 INFINITE, NAN = 1e300, float("nan")
@@ -215,7 +215,7 @@ def note_jumps(past, places, tables, t, out):
 
 @njit
 def record_lines(t, y, out, handle, values):
-    """Keep what was sent into all delay lines, and pass on the jumps that have arrived, after every accepted step."""
+    """After an accepted step: keep what was sent into all lines, pass on jumps that have arrived, widen envelopes."""
     tables = open_tables(handle)
     past, k, places, delays = tables.past, int(tables.past[COUNT]), places_of(tables.past), tables.delays
     if k > 0:
@@ -223,10 +223,12 @@ def record_lines(t, y, out, handle, values):
         if t <= last + same_time(past):
             if t >= last - same_time(past):
                 note_jumps(past, places, tables, last, out)
+            widen_all(t, places, tables)
             return
     if k == 0:  # what is sent from the start on, as from rest, is a jump: nothing was before
         begin_entry(past, t)
         note_jumps(past, places, tables, t, out)
+        widen_all(t, places, tables)
         return
     arrive_at_joints(past, places, tables, t)
     if past[LIVE] > 0.0:
@@ -234,6 +236,7 @@ def record_lines(t, y, out, handle, values):
         pass_jumps(past, places, tables, t, y, out, handle)
         arrive_at_joints(past, places, tables, t)  # again, where nodes were closed without a jump
     entry, ends = begin_entry(past, t), tables.layout[0]["ends"]
+    clock = clock_of(past, entry)
     for i in range(delays.size):
         line = delays[i]
         at, last = ends + 4 * line["pipe"], line["stretches"] - 1
@@ -243,6 +246,30 @@ def record_lines(t, y, out, handle, values):
             joint = places[0] + ARRIVALS * (line["stretch"] + q)
             write(past, places, line, q + 1, entry, 0, past[joint + 1])
             write(past, places, line, q, entry, 1, past[joint + ARRIVALS])
+        widen_line(t, places, clock, tables, i)
+
+
+@njit(forceinline=True)
+def widen_line(t, places, clock, tables, which):
+    """Envelopes along a line at the time of the last entry, and when it first falls below vapour pressure."""
+    line, envelope = tables.delays[which], tables.envelope
+    n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
+    r, l, low, high = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0
+    for j in range(n):
+        r[j], l[j] = sketch(t, tables.past, places, clock, line, (j + 0.5) / n)
+        s = r[j] + l[j]
+        low += not s >= envelope[0, cell + j]
+        high += not s <= envelope[2, cell + j]
+    if low + high > 0:
+        note(t, r, l, cell, low, high, line["pipe"], tables)
+
+
+@njit
+def widen_all(t, places, tables):
+    """Envelopes along all lines."""
+    clock = clock_of(tables.past, int(tables.past[COUNT]) - 1)
+    for i in range(tables.delays.size):
+        widen_line(t, places, clock, tables, i)
 
 
 @njit
@@ -254,17 +281,3 @@ def forget_all(past, places, delays, before):
             for at in range(jumps_at(places, s, 0), jumps_at(places, s + 1, 0), HEADS):
                 if past[at + ARRIVED] > 0.0:
                     forget_jumps(past, places, at, before - line["hold"] - same_time(past))
-
-
-@njit
-def record_places(t, y, out, handle, values):
-    """Envelopes along delay lines, and when they first fall below vapour pressure, after every accepted step."""
-    tables = open_tables(handle)
-    past = tables.past
-    places, clock = places_of(past), clock_of(past, int(past[COUNT]) - 1)
-    for i in range(tables.delays.size):
-        line = tables.delays[i]
-        n = line["places"]
-        r, l = tables.scratch[:n], tables.scratch[n : 2 * n]
-        sketch_line(t, tables, places, clock, i, r, l)
-        record_pipe(t, r, l, tables.pipes[line["pipe"]], line["pipe"], tables)
