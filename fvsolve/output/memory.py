@@ -48,6 +48,11 @@ class MemorySink:
         """`float64[rows, 1 + probes]`: time and probes in the columns' units."""
         return np.concatenate([np.empty((0, 1 + len(self.columns))), *self._blocks])
 
+    @property
+    def last(self) -> np.ndarray:
+        """The last row of the table."""
+        return self._blocks[-1][-1]
+
     def envelope(self) -> dict:
         """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
         columns = envelope_columns(self.model.case)
