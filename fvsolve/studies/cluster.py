@@ -7,7 +7,7 @@ from typing import Any
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import programs
-from fvsolve.studies.crew import done
+from fvsolve.run.crew import done
 
 PATIENCE = 10.0  # s for a scheduler, and for a first worker
 AHEAD = 2  # chunks of each thread: one that is done, one that waits there
