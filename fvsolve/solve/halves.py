@@ -17,7 +17,8 @@ from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.tableau import method_named
 
-LOOKS, DEAR = 32, 16  # in a run of explicit steps, of implicit ones
+LOOKS, DEAR = 32, 16  # in a run of explicit steps, of implicit ones; of explicit ones
+SELDOM, FEWEST = 50.0, 8  # no look sooner than after so many, which costs a twentieth, but in short runs
 LEAST = 0.1  # of what counts as small: a range that is less is none
 WHOLE = 0.99  # of a step: what an event or a kink has cut says nothing
 ROUNDING = 1e-10  # of ranges: an error that is less does not show what a step leaves of it
@@ -44,7 +45,10 @@ class Halves:
         self.least[:] = self.greatest[:] = model.start[self.which]
         self.kept[3], self.stepper = 1.0, None
         if self.which.size:
-            self.every = max(1.0, (numerics.end - numerics.start) / self.step // (LOOKS if method.explicit else DEAR))
+            steps = (numerics.end - numerics.start) / self.step
+            self.every = max(1.0, steps // DEAR)
+            if method.explicit:
+                self.every = max(1.0, steps // LOOKS, min(SELDOM, steps // FEWEST))
             self.kept[1], self.small = self.every, spreads(model, LEAST)[self.which]
 
     def room(self, steps: float) -> float:

@@ -128,6 +128,11 @@ class Method:
         return stage_order(self.exact.a, self.exact.b, self.exact.c, self.rounding)
 
     @functools.cached_property
+    def latest(self) -> float:
+        """Time of the latest stage, in steps; 1 where none is beyond the end."""
+        return max(1.0, float(max(self.exact.c)))
+
+    @functools.cached_property
     def explicit(self) -> bool:
         """Whether each stage needs only those before it."""
         return not np.any(np.triu(self.a))
