@@ -39,7 +39,7 @@ class MemorySink:
 
     def end(self, summary) -> None:
         """Keep the envelope."""
-        self._envelope = with_start(summary.envelope, self.model)
+        self._envelope = summary.envelope
 
     def close(self) -> None:
         """Nothing is open."""
@@ -55,8 +55,10 @@ class MemorySink:
 
     def envelope(self) -> dict:
         """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
+        if not self._envelope:  # of a run that never ended
+            return {}
         columns = envelope_columns(self.model.case)
         return {
             pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns}
-            for pipe, arrays in self._envelope.items()
+            for pipe, arrays in with_start(self._envelope, self.model).items()
         }
