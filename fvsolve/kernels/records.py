@@ -28,6 +28,7 @@ LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
 # Status codes that travel up; the message is made in Python.
 OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM, NO_WEIGHT = 0, 1, 2, 3, 4, 5, 6
+AMENDED = 7  # no fault: what notes an accepted state has put it right, and it is to be looked at again
 
 SETTINGS = np.dtype(
     [
@@ -69,6 +70,8 @@ SETTINGS = np.dtype(
         ("floor", "f8"),  # mixture: what the pressure of the gas adds to, vapour pressure or 0 [Pa]
         ("gas", "f8"),  # its volume over the liquid's, times pressure to the power below [Pa^gas_power]
         ("gas_power", "f8"),  # 1 / (gas exponent)
+        ("weights", "i8"),  # offset in `floats` of the method's b, its c follow, and how many these are
+        ("stages", "i8"),
         ("jumps", "f8"),  # share of the greatest jump from which on a jump in a delay line is kept as one
         ("saturation", "f8"),  # gas pressure at which all of it is dissolved; infinite for none [Pa]
     ],

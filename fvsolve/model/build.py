@@ -30,6 +30,8 @@ from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
 from fvsolve.model.settling import settled
+from fvsolve.steppers import automatic
+from fvsolve.steppers.tableau import method_named
 
 
 def build(case) -> Model:
@@ -142,6 +144,10 @@ def settings_of(draft: Draft) -> np.ndarray:
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
     s["jumps"] = 0.25 * case.numerics.accuracy
+    if len(draft.delay_table):
+        method = method_named(automatic.first_method(case.numerics.method))
+        s["weights"], s["stages"] = len(draft.floats), method.stages
+        draft.floats += [*map(float, method.b), *method.times]
     s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *column_rates(draft)])
     return found
 

@@ -63,7 +63,9 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     if numerics.step is not None or numerics.courant is not None:
         longest = numerics.step or numerics.courant / max(rate, cells)
     kinds = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
-    longest *= max(method_named(kind).latest for kind in kinds)  # nothing is read that is not yet known
+    longest *= max(
+        1.0, *(time for kind in kinds for time in method_named(kind).times)
+    )  # nothing is read that is not yet known
     for name in lines:
         why = "waves travel along it unchanged but for friction"
         if travel[name] < longest:

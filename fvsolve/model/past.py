@@ -45,9 +45,9 @@ def begin_past(past: np.ndarray, delays: np.ndarray) -> None:
     if not len(delays):
         return
     past[:], many = 0.0, int(delays["stretches"].sum())
-    sizes = [at.CAPACITY, at.QUEUE, at.STRETCHES, at.WIDER, at.KNOWN_TIME]
+    sizes = [at.CAPACITY, at.QUEUE, at.STRETCHES, at.WIDER, at.KNOWN_TIME, at.MENDED]
     wider = 1 if past.size == past_size(delays) else wider_of(past, delays)
-    past[sizes] = wider * int(delays["room"].max()), queue_of(many), many, wider, math.nan
+    past[sizes] = wider * int(delays["room"].max()), queue_of(many), many, wider, math.nan, -math.inf
 
 
 def wider_of(past: np.ndarray, delays: np.ndarray) -> int:

@@ -14,6 +14,7 @@ from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.rows import emit, next_due
 from fvsolve.steppers.signatures import ATTEMPT, compiled_as
 from fvsolve.steppers.slots import (
+    AMENDED,
     BAD_STATUS,
     BAD_VALUE,
     BEHIND,
@@ -156,6 +157,10 @@ def march(
             reuse = False
             flags[PHASE] = EMIT
             record(memory[T], y[now], out, handle, values)
+            if out[STATUS] == AMENDED:
+                rhs(memory[T], y[now], k[0], out, handle)
+                memory[CALLS] += 1.0
+                record(memory[T], y[now], out, handle, values)
             if not all_finite(join, handle, spans, sums, y[now]):
                 out[STATUS] = NOT_FINITE
         if flags[PHASE] <= EMIT:

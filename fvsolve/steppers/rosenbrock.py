@@ -72,9 +72,9 @@ class Rosenbrock(Method):
     def _conditions(self) -> Conditions:
         return Conditions(self.forms[0], self.rounding, self.exact.a)
 
-    @functools.cached_property
-    def latest(self) -> float:
-        return max(1.0, float(max(self.printed[0])))
+    @property
+    def times(self) -> tuple[float, ...]:
+        return tuple(map(float, self.printed[0]))
 
     @property
     def diagonally_implicit(self) -> bool:

@@ -127,10 +127,10 @@ class Method:
     def stage_order(self) -> int:
         return stage_order(self.exact.a, self.exact.b, self.exact.c, self.rounding)
 
-    @functools.cached_property
-    def latest(self) -> float:
-        """Time of the latest stage, in steps; 1 where none is beyond the end."""
-        return max(1.0, float(max(self.exact.c)))
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Of its stages, in steps."""
+        return tuple(map(float, self.exact.c))
 
     @functools.cached_property
     def explicit(self) -> bool:

@@ -19,6 +19,7 @@ STEP, EVEN = 5, 6  # length of the last step [s], and how many were of that leng
 STEP_BEFORE, EVEN_BEFORE = 7, 8  # both without the last entry
 GREATEST, CROWDED, LIVE = 9, 10, 11  # the greatest jump [Pa], the greatest that found no room, how many there are now
 KNOWN_TIME, KNOWN_COUNT = 12, 13  # of the arrivals that are kept
+MENDED = 14  # time of the last state whose stores were put right [s]
 ZEROS = 8  # entries before the first, of the profile
 SUM, FIRST, MANY, ARRIVED, HEADS = 0, 1, 2, 3, 4  # of the jumps of a wave
 ARRIVALS = 3  # of a stretch: backward wave at its beginning, forward one at its end, delta

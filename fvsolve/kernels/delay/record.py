@@ -19,6 +19,7 @@ from fvsolve.kernels.delay.history import (
     KNOWN_TIME,
     LIVE,
     MANY,
+    MENDED,
     QUEUE,
     begin_entry,
     clock_of,
@@ -36,8 +37,9 @@ from fvsolve.kernels.delay.history import (
 )
 from fvsolve.kernels.delay.lines import arrive, arrive_all, drag_and_slope, rubbed
 from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
 from fvsolve.kernels.observer import note
-from fvsolve.kernels.records import ALONE, JUNCTION
+from fvsolve.kernels.records import ALONE, AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
 
 INFINITE, NAN = 1e300, float("nan")
 NOISE = 1e-13  # of half a bar's wave: a jump that is rounding
@@ -76,14 +78,49 @@ def end_of(line, side):
     return line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
 
 
+@njit(forceinline=True)
+def missed_by(past, tables, t, when):
+    """By how much the weights of the step that ends at t book what begins within it too briefly [s].
+
+    Stages before it know nothing of it, those behind it that it was always there.
+    """
+    before, settings = time_of(past, int(past[COUNT]) - 1), tables.settings[0]
+    h, booked, at, many = t - before, 0.0, settings["weights"], settings["stages"]
+    for i in range(many):
+        if before + tables.floats[at + many + i] * h >= when - same_time(past):
+            booked += tables.floats[at + i]
+    return (t - when) - h * booked
+
+
+@njit(forceinline=True)
+def stores(tables, i):
+    """Whether node i stores what flows into it, now."""
+    node = tables.nodes[i]
+    if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
+        return False
+    k = EVENTS * node["row"]
+    return node["kind"] != TANK or (tables.armed[k + BOTTOM] <= 0.0 and tables.armed[k + RIM] <= 0.0)
+
+
+@njit(forceinline=True)
+def mend(past, tables, y, i, flow, missed):
+    """Give a store what a flow that began within the step has brought."""
+    if stores(tables, i) and flow * missed != 0.0:
+        y[tables.nodes[i]["y"]] += flow * missed
+        past[MENDED] = NAN
+
+
 @njit
-def meet(past, places, tables, which, side, t, size):
-    """A jump of a line arrives at the plain node at one of its ends."""
+def meet(past, places, tables, y, which, side, t, size, missed):
+    """A jump of a line arrives at the plain node at one of its ends; missed : see `missed_by`."""
     line, pipe = tables.delays[which], tables.pipes[tables.delays[which]["pipe"]]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
     node = tables.nodes[i]
     if node["kind"] != JUNCTION:
         send(past, places, tables, end_of(line, side), side, t, -size, pipe)
+        mend(past, tables, y, i, 2.0 * size, missed)
+        if stores(tables, i):
+            y[pipe["y"]] -= 2.0 * size * missed
         return
     change = 2.0 * size / node["admittance"]
     for k in range(node["line_count"]):
@@ -95,27 +132,35 @@ def meet(past, places, tables, which, side, t, size):
 
 
 @njit
-def enter(past, places, tables, which, q, wave, t, size):
+def enter(past, places, tables, y, which, q, wave, t, size, missed):
     """A jump of a wave leaves stretch q of a line: into the next one, or to the node there."""
     line = tables.delays[which]
     onward = q + 1 if wave == 0 else q - 1
     if 0 <= onward < line["stretches"]:
         send(past, places, tables, line["stretch"] + onward, wave, t, size, tables.pipes[line["pipe"]])
     elif abs(size) > 0.0:
-        meet(past, places, tables, which, 1 if wave == 0 else 0, t, size)
+        meet(past, places, tables, y, which, 1 if wave == 0 else 0, t, size, missed)
 
 
 @njit
-def pass_by_closing(past, places, tables, t, y, out, handle, place, when):
+def pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed):
     """Close the nodes without the jump at a place of the list; what all lines are sent differs by what it passes on."""
     queue, spare, layout = int(past[QUEUE]), tables.spare, tables.layout[0]
     size = past[place + queue]
     past[place + queue], past[KNOWN_TIME] = 0.0, NAN
     run(CLOSE, t, y, y[:0], spare, handle)
     past[place + queue], past[KNOWN_TIME] = size, NAN
+    mended = False
+    for i in range(tables.nodes.size):
+        if stores(tables, i):
+            mend(past, tables, y, i, out[layout["net"] + i] - spare[layout["net"] + i], missed)
+            mended = True
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
+        if mended:
+            left = (out[at] - out[at + 1]) - (out[at + 2] - out[at + 3])
+            y[pipe["y"]] += missed * (left - ((spare[at] - spare[at + 1]) - (spare[at + 2] - spare[at + 3])))
         for side in range(2):
             change = out[at + 3 * side] - spare[at + 3 * side]
             if abs(change) > enough(past, tables, pipe):
@@ -149,12 +194,12 @@ def passed(past, places, tables, which, q, wave, at, t, y, out, handle):
     near = pipe["from_node"] if wave == 0 else pipe["to_node"]
     leaves, returns = (ahead, back) if wave == 0 else (back, ahead)
     plain = not (leaves and not is_plain(tables, far)) and not (returns and not is_plain(tables, near))
-    share = size * rubs(past, places, tables, line, pipe, q, t)
+    share, missed = size * rubs(past, places, tables, line, pipe, q, t), missed_by(past, tables, t, when)
     if line["now"] == 0.0 and plain:
-        enter(past, places, tables, which, q, wave, when, size - share)
-        enter(past, places, tables, which, q, 1 - wave, when, share)
+        enter(past, places, tables, y, which, q, wave, when, size - share, missed)
+        enter(past, places, tables, y, which, q, 1 - wave, when, share, missed)
         return True
-    pass_by_closing(past, places, tables, t, y, out, handle, place, when)
+    pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed)
     if not (leaves and returns):  # within the line
         for side in range(2):
             to, part = (wave, size - share) if side == 0 else (1 - wave, share)
@@ -221,7 +266,9 @@ def record_lines(t, y, out, handle, values):
     if k > 0:
         last = time_of(past, k - 1)
         if t <= last + same_time(past):
-            if t >= last - same_time(past):
+            if past[MENDED] == last:
+                write_ends(past, places, tables, k - 1, out)
+            elif t >= last - same_time(past):
                 note_jumps(past, places, tables, last, out)
             widen_all(t, places, tables)
             return
@@ -237,6 +284,8 @@ def record_lines(t, y, out, handle, values):
         arrive_at_joints(past, places, tables, t)  # again, where nodes were closed without a jump
     entry, ends = begin_entry(past, t), tables.layout[0]["ends"]
     clock = clock_of(past, entry)
+    if past[MENDED] != past[MENDED]:
+        past[MENDED], out[STATUS] = t, AMENDED
     for i in range(delays.size):
         line = delays[i]
         at, last = ends + 4 * line["pipe"], line["stretches"] - 1
@@ -270,6 +319,15 @@ def widen_all(t, places, tables):
     clock = clock_of(tables.past, int(tables.past[COUNT]) - 1)
     for i in range(tables.delays.size):
         widen_line(t, places, clock, tables, i)
+
+
+@njit
+def write_ends(past, places, tables, entry, out):
+    """Keep what nodes send once more."""
+    for i in range(tables.delays.size):
+        line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
+        write(past, places, line, 0, entry, 0, out[at])
+        write(past, places, line, line["stretches"] - 1, entry, 1, out[at + 3])
 
 
 @njit
