@@ -29,7 +29,7 @@ def moved(reader: Any) -> Case | None:
     found = {}
     for group in GROUPS:
         found[group] = {}
-        for name, given in raw.table[group].items():
+        for name, given in raw.table.get(group, {}).items():
             known = before.read.get((group, name))
             if known is None:
                 return None
