@@ -132,12 +132,12 @@ def _once(model, y, run) -> Outcome:
 Progress = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
 
 
-def without_lines(case, study: str) -> None:
-    """Raises FvsolveError where pipes are delay lines, of whose past a study knows nothing yet."""
+def without_lines(case, study: str, beside: str = "") -> None:
+    """Raises FvsolveError where pipes are delay lines, of whose past a study knows nothing yet; beside : a hint."""
     names = [name for name, one in followed(case).items() if one.line == "delay"]
     if names:
-        raise FvsolveError(f"{study} does not know delay lines yet; {listing(names)} would be: say numerics.line = "
-                           '"cells", and line of no pipe')  # fmt: skip
+        raise FvsolveError(f"{study} does not know delay lines yet; {listing(names)} would be: {beside}say "
+                           'numerics.line = "cells", and line of no pipe')  # fmt: skip
 
 
 def without_basins(case, study: str, riding: bool = False) -> None:

@@ -353,9 +353,25 @@ def test_what_knows_no_lines_says_so():
     for call in (lambda: model.rhs(0.0, model.start), lambda: model.jacobian(0.0, model.start)):
         with pytest.raises(FvsolveError, match="delay lines"):
             call()
-    for study in (studies.linearise, studies.stability, studies.energy, studies.order):
+    for study in (studies.stability, studies.energy, studies.order, studies.chart):
         with pytest.raises(FvsolveError, match="does not know delay lines yet; main would be"):
             study(case)
+
+
+def test_lines_are_linearised_as_cells_up_to_a_frequency_that_is_told():
+    """What the lake gives back of a wave, exp(-2 s tau), to twice a hundredth up to there, and not far above."""
+    case = main(1.0, demand=FLOW, cells=60)
+    case["links"]["main"]["line"] = "delay"
+    found = studies.linearise(case, inputs=["gate.demand"], outputs=["gate.pressure"])
+    told = float(found.at.when.partition("up to ")[2].split()[0])
+
+    def off(frequency: float) -> float:
+        s = 2j * np.pi * frequency
+        inside = np.linalg.solve(s * np.eye(len(found.states)) - found.a, found.b)
+        pressure = (found.c @ inside + found.d)[0, 0] / -RHO * AREA / SPEED  # per wave of a flow into the pipe
+        return abs((pressure - 1.0) / (pressure + 1.0) + np.exp(-2.0 * s * TRAVEL))
+
+    assert max(off(told * share) for share in (0.3, 0.61, 0.97)) < 0.02 < off(2.0 * told)
 
 
 def test_an_unknown_word_and_a_bad_share():

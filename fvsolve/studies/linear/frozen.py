@@ -10,8 +10,12 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.ends import difference_rows
 from fvsolve.kernels.schedules import POLYNOMIAL, piece_at, piece_slopes, value_until
+from fvsolve.limits.symbol import symbol
+from fvsolve.model.delay import followed
 from fvsolve.schemes import LIMITED, SCHEMES
-from fvsolve.studies.outcome import outcome, prepared, without_lines
+from fvsolve.studies.outcome import outcome, prepared
+
+NEAR = 0.01  # of a wave: by which cells that stand for a delay line are off
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +50,9 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    without_lines(case, "linearise")
+    lines = [name for name, one in followed(case).items() if one.line == "delay"]
+    if lines:
+        case = load(case, {"numerics.line": "cells"} | {f"links.{name}.line": "cells" for name in lines})
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
         linear = "upwind" if case.meshes else SCHEMES[case.numerics.scheme].twin
         case = load(case, {"numerics.scheme": linear})
@@ -60,7 +66,20 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     side = "before" if before else "after"
     when = "the start" if at is None else f"t = {t:g} s"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
+    when += in_cells(model, lines) if lines else ""
     return Frozen(stopped(model, t, before), t, y, when, armed)
+
+
+def in_cells(model, lines: list[str]) -> str:
+    """Up to which frequency cells stand for delay lines: exp(-s tau) of the slowest pipe to a hundredth."""
+    theta = np.linspace(0.0, np.pi, 20001)[1:]
+    off = np.abs(symbol(SCHEMES[model.case.numerics.scheme].weights, theta) + 1j * theta)
+    rates = []
+    for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
+        if pipe.name in lines:
+            good = theta[pipe.cells * off <= NEAR]
+            rates.append((good.max() if good.size else 0.0) * row["speed"] / row["dx"] / (2.0 * np.pi))
+    return f", delay lines as cells (their delay to {NEAR:g} up to {min(rates):.3g} Hz)"
 
 
 def _arrive(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | float]:

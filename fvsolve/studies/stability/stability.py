@@ -25,7 +25,7 @@ from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter, reweighte
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
 from fvsolve.studies.many import Bench
-from fvsolve.studies.outcome import Progress, names
+from fvsolve.studies.outcome import Progress, names, without_lines
 from fvsolve.studies.points import Points, key_of
 from fvsolve.studies.sent import Sent
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
@@ -121,6 +121,7 @@ def stability(
     if steps < 10 or not threshold > 1.0:
         raise FvsolveError(f"steps = {steps}, threshold = {threshold:g}: wanted at least 10 steps and growth above 1")
     case = load(case, dict(set or {}))
+    without_lines(case, "stability", "`check` says what grows at its stores; ")
     schemes = names(schemes) or [case.numerics.scheme]
     asked = names(methods) or [case.numerics.method]
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
