@@ -171,6 +171,14 @@ class BasinRows:
         return "" if self.banded else f"rows of {self.part.physics} are not shared out"
 
     @property
+    def sums_rows(self) -> bool:
+        """Whether who finds rates of its rows can form sums of stages beside them, for nothing comes to these later.
+
+        But at cells that all look at: behind patches.
+        """
+        return False
+
+    @property
     def fifth(self) -> bool:
         """Whether its scheme is of more than second order."""
         return SCHEMES[self.scheme].order > 2
