@@ -14,7 +14,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import COMPILING, Intrinsic, declared, njit, plain_kinds
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import table_types
+from fvsolve.kernels.records import AMENDED, STATUS, table_types
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
 # SEE makes of a state what the pieces of all but RHS see of it, where that is something else (`basins.walls`).
@@ -242,6 +242,8 @@ def record_in_turn(t, y, out, handle, values):
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[RECORD, k] != 0:
         call_reader(calls[RECORD, k], t, seen, out, handle, values)
+        if out[STATUS] == AMENDED:
+            return
         k += 1
 
 

@@ -137,11 +137,10 @@ MEMBERS = {
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
 DELAYS = Pieces(
-    offer="delay.lines: offer_lines", answer="delay.lines: answer_lines", rates="delay.lines: fill_lines",
+    offer="delay.lines: offer_lines", answer="delay.lines: answer_lines",
     observe="delay.along: observe_lines", record="delay.record: record_lines",
 )  # fmt: skip
 COUPLED = Pieces(close="delay.lines: couple_clusters")
-TOLD = Pieces(record="delay.record: record_places")
 BANDS = Pieces(meet="joint: meet", agree="joint: agree")
 TOGETHER = Pieces(home="fvsolve.basins", together="bands: book_together")
 MIXED = Pieces(mix="scalars: mix_scalars")
@@ -236,8 +235,6 @@ class Cast:
         yield from self.carried
         if self.pipes:
             yield MEMBERS["pipes"]
-        if self.delays:
-            yield TOLD
         yield ALWAYS
 
     def modules(self) -> list:

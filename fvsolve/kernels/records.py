@@ -28,6 +28,7 @@ LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
 # Status codes that travel up; the message is made in Python.
 OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM, NO_WEIGHT = 0, 1, 2, 3, 4, 5, 6
+AMENDED = 7  # no fault: what notes an accepted state has put it right, and it is to be looked at again
 
 SETTINGS = np.dtype(
     [
@@ -69,32 +70,34 @@ SETTINGS = np.dtype(
         ("floor", "f8"),  # mixture: what the pressure of the gas adds to, vapour pressure or 0 [Pa]
         ("gas", "f8"),  # its volume over the liquid's, times pressure to the power below [Pa^gas_power]
         ("gas_power", "f8"),  # 1 / (gas exponent)
+        ("weights", "i8"),  # offset in `floats` of the method's b, its c follow, and how many these are
+        ("stages", "i8"),
         ("jumps", "f8"),  # share of the greatest jump from which on a jump in a delay line is kept as one
         ("saturation", "f8"),  # gas pressure at which all of it is dissolved; infinite for none [Pa]
     ],
     align=True,
 )
 
-PIPE = np.dtype(
+PIPE = np.dtype(  # what delay lines read comes first, in as few cache lines as it takes
     [
         ("y", "i8"),  # offset of the forward wave in y; the backward wave follows it
-        ("cells", "i8"),
         ("cell", "i8"),  # offset of its cells in per-cell arrays
         ("from_node", "i8"),
         ("to_node", "i8"),
+        ("admittance", "f8"),  # area / speed [kg/s per Pa]
+        ("flow", "f8"),  # mass flow of the profile [kg/s]
+        ("drag", "f8"),  # what holds the profile's pressure gradient, its friction where that is steady [kg/s2]
+        ("friction", "i8"),
+        ("loss", "f8"),  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
+        ("rough", "f8"),  # dM/dt = -rough f(Re) |M| M  [1/kg]
+        ("cells", "i8"),
         ("dx", "f8"),
         ("speed", "f8"),  # wave speed [m/s]
         ("quicker", "f8"),  # factor on speed / dx that the ends of a short pipe ask for
         ("area", "f8"),
         ("diameter", "f8"),
-        ("admittance", "f8"),  # area / speed [kg/s per Pa]
-        ("flow", "f8"),  # mass flow of the profile [kg/s]
-        ("friction", "i8"),
-        ("loss", "f8"),  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
-        ("rough", "f8"),  # dM/dt = -rough f(Re) |M| M  [1/kg]
         ("roughness", "f8"),  # relative roughness
         ("reynolds", "f8"),  # Reynolds number per mass flow [s/kg]
-        ("drag", "f8"),  # what holds the profile's pressure gradient, its friction where that is steady [kg/s2]
         ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
         ("slope", "f8"),  # rise per length
@@ -125,9 +128,11 @@ DELAY = np.dtype(  # a pipe as a delay line: stretches of equal travel time, fri
         ("tau", "f8"),  # travel time of a stretch [s]
         ("hold", "f8"),  # what is read was sent so long ago: tau, or of a shorter one the longest step [s]
         ("now", "f8"),  # share of a shorter one that arrives at once, 1 - tau / hold; 0 of others
-        ("couple", "f8"),  # of a shorter one, flow between its ends per pressure [kg/s per Pa]
-        ("slope", "f8"),  # d drag / d flow of the profile [1/s]
+        ("ring", "i8"),  # entries of its past before its own, and how many of each stretch, see `kernels.delay.history`
+        ("room", "i8"),
+        ("passes", "f8"),  # share of a small change of flow that friction in the middle of a stretch lets pass
         ("places", "i8"),  # at which fields and envelopes are told
+        ("couple", "f8"),  # of a shorter one, flow between its ends per pressure [kg/s per Pa]
     ],
     align=True,
 )

@@ -16,6 +16,7 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
 from fvsolve.limits.ends import LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
+from fvsolve.limits.lines import line_growth
 from fvsolve.limits.lumped import GROWS, Mode, lumped_modes, times
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.swings import swings
@@ -53,19 +54,22 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
     """
     numerics = model.case.numerics
     method = method_named(automatic.first_method(numerics.method))
-    if numerics.rtol is not None or not method.explicit:
+    if numerics.rtol is not None:
         return []
+    lines = line_growth(model, method, given_step(model), span(model)) if len(model.tables.delays) else []
+    if not method.explicit:
+        return lines
     try:
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
         h = first_step(model)
         modes = lumped_modes(model, method.name, h) if h > 0.0 else []
         growing = swings(model, method.name, h, span(model)) if h > 0.0 else []
     except FvsolveError:  # a method whose stability function is not to be had
-        return []
+        return lines
     found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
     jumps = any(jump for _, jump in model.breaks)
     modes = [mode for mode in modes if mode.own or not found]  # of cells those that waves bring with them are known
-    return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes] + growing
+    return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
 
 
 def first_step(model) -> float:
@@ -75,6 +79,12 @@ def first_step(model) -> float:
         return numerics.step
     rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
     return numerics.courant / rate if rate > 0.0 else 0.0
+
+
+def given_step(model) -> float:
+    """The step that delay lines go by [s]."""
+    numerics = model.case.numerics
+    return numerics.step if numerics.step is not None else numerics.courant / model.wave_rate
 
 
 def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:

@@ -15,13 +15,14 @@ from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays, past_of
+from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays
 from fvsolve.model.device import lower_devices
 from fvsolve.model.draft import Draft
 from fvsolve.model.lowering import lowering_of
 from fvsolve.model.masses import lower_masses
 from fvsolve.model.mechanism import lower_bodies, lower_lines
 from fvsolve.model.model import Model
+from fvsolve.model.past import past_size
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
 from fvsolve.model.ranges import flow_notices
@@ -29,6 +30,8 @@ from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
 from fvsolve.model.settling import settled
+from fvsolve.steppers import automatic
+from fvsolve.steppers.tableau import method_named
 
 
 def build(case) -> Model:
@@ -126,7 +129,7 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
         armed=limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
         scratch=scratch_of(draft), spare=int(layout["size"][0]), seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0,
-        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_of(draft),
+        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_size(draft.delay_table),
     )  # fmt: skip
 
 
@@ -141,6 +144,10 @@ def settings_of(draft: Draft) -> np.ndarray:
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
     s["jumps"] = 0.25 * case.numerics.accuracy
+    if len(draft.delay_table):
+        method = method_named(automatic.first_method(case.numerics.method))
+        s["weights"], s["stages"] = len(draft.floats), method.stages
+        draft.floats += [*map(float, method.b), *method.times]
     s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *column_rates(draft)])
     return found
 

@@ -14,15 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.delay.history import HEAD, TIMES
 from fvsolve.kernels.delay.lines import drag_and_slope
 from fvsolve.kernels.schedules import WAVE
+from fvsolve.model.past import past_size, rings_of
+from fvsolve.steppers import automatic
+from fvsolve.steppers.methods import AUTO
+from fvsolve.steppers.tableau import method_named
 
 FELT = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start where friction is looked at
 DRIVEN = 1e-9  # of a bar's wave: what friction leaves of a drop
 ROUGH = 0.5  # of a wave: friction of a line shorter than a step may take no more
-JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024  # kept in all lines together, and of each wave
-SPARE = 64  # entries beyond those of a travel time
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,10 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     longest = 1.0 / rate  # under error control, see `solve.loop.longest_step`
     if numerics.step is not None or numerics.courant is not None:
         longest = numerics.step or numerics.courant / max(rate, cells)
+    kinds = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
+    longest *= max(
+        1.0, *(time for kind in kinds for time in method_named(kind).times)
+    )  # nothing is read that is not yet known
     for name in lines:
         why = "waves travel along it unchanged but for friction"
         if travel[name] < longest:
@@ -103,6 +108,7 @@ def lower_delays(draft) -> None:
             row["now"], row["couple"] = beta, 2.0 * beta * pipe["admittance"] / (1.0 - beta * beta)
         rows.append(row)
     draft.delay_table = np.array(rows, rec.DELAY)
+    rings_of(draft.delay_table, longest_of(draft))
     ends: list[list[int]] = [[] for _ in draft.node_table] if rows else []
     for d, row in enumerate(rows):
         for side, end in enumerate(("from_node", "to_node")):
@@ -135,8 +141,8 @@ def cut_lines(draft) -> list[str]:
         many = min(most, max(1, math.ceil(0.5 * takes / case.numerics.accuracy)))
         if row["now"] > 0.0:
             many = 1
-        row["stretches"], row["stretch"], row["slope"] = many, at, drag_and_slope(pipe, float(pipe["flow"]))[1]
-        row["tau"] = travel / many
+        row["stretches"], row["stretch"], row["tau"] = many, at, travel / many
+        row["passes"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
         row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
         at += many
         off = 0.25 * takes / many + by_interpolation(float(row["tau"]), chosen.longest, scale)
@@ -158,7 +164,7 @@ def cut_lines(draft) -> list[str]:
         elif off == math.inf:
             draft.fault(f"links.{name}.line", f'"delay" does not fit: friction takes {takes:.3g} of a wave in a line '
                         f'shorter than a step of {chosen.longest:.4g} s; wanted shorter steps, or "cells"')  # fmt: skip
-    draft.shapes = draft.shapes._replace(past=past_of(draft))
+    shape_past(draft)
     return unfit
 
 
@@ -187,78 +193,12 @@ def time_scale(draft) -> float:
     return found if math.isfinite(found) else 0.0
 
 
-def past_of(draft) -> int:
-    """Numbers that a run keeps of what was sent into lines."""
-    many = int(draft.delay_table["stretches"].sum())
-    if not many:
-        return 0
-    longest = min(one.longest for one in draft.followed.values() if one.line == "delay")
-    return past_size(many, capacity_of(draft.delay_table, longest))
+def shape_past(draft) -> None:
+    """Rings of all lines, and the size of what a run keeps of them."""
+    rings_of(draft.delay_table, longest_of(draft))
+    draft.shapes = draft.shapes._replace(past=past_size(draft.delay_table))
 
 
-def capacity_of(delays, longest: float) -> int:
-    """Entries of a ring that holds the longest delay in steps of this length, a power of two."""
-    return 1 << math.ceil(math.log2(2.0 * float(delays["hold"].max()) / longest + SPARE))
-
-
-def queue_of(many: int) -> int:
-    """Jumps of each wave that are kept at once."""
-    return max(LEAST_JUMPS, min(MOST_JUMPS, JUMPS // many))
-
-
-def past_size(many: int, capacity: int) -> int:
-    """Numbers of `many` stretches, see `kernels.delay.history`."""
-    return HEAD + capacity + many * (stride_of(many, capacity) + 3)
-
-
-def stride_of(many: int, capacity: int) -> int:
-    """Numbers of one of `many` stretches."""
-    return 2 * capacity + 2 * (TIMES + 2 * queue_of(many))
-
-
-def begin_past(past: np.ndarray, delays) -> None:
-    """Say the sizes of an empty past."""
-    many = int(delays["stretches"].sum())
-    if many:
-        fixed = HEAD + many * (stride_of(many, 0) + 3)
-        past[:], capacity = 0.0, (past.size - fixed) // (1 + 2 * many)
-        past[[0, 2, 9, 10]] = capacity, queue_of(many), many, stride_of(many, capacity)
-        past[11] = np.nan
-
-
-def without_past(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What a state remembers beside the past of delay lines, and that; ValueError where it is not such a memory."""
-    size = int(memory[-1]) if memory.size and np.isfinite(memory[-1]) else -1
-    if not 0 <= size < memory.size:
-        raise ValueError("no such past")
-    return memory[: memory.size - 1 - size], memory[memory.size - 1 - size : -1]
-
-
-def room_left(past: np.ndarray, delays) -> int:
-    """Steps that can be taken before an entry is lost that is still to be read."""
-    capacity, count = int(past[0]), int(past[1])
-    if count == 0:
-        return capacity - 32
-    first = max(8, count - capacity)
-    ring = np.arange(first, count)
-    times = past[HEAD + (ring & (capacity - 1))]
-    wanted = np.searchsorted(times, times[-1] - 1.1 * float(delays["hold"].max()))
-    return capacity - (count - first) + max(0, int(wanted) - 8)
-
-
-def doubled(past: np.ndarray, delays) -> np.ndarray:
-    """The same past with room for twice as many entries."""
-    many, capacity, count = int(past[9]), int(past[0]), int(past[1])
-    wider = np.zeros(past_size(many, 2 * capacity))
-    wider[:HEAD] = past[:HEAD]
-    wider[0], wider[10], wider[11] = 2 * capacity, stride_of(many, 2 * capacity), np.nan
-    kept = np.arange(max(0, count - capacity), count)
-    old, new = kept & (capacity - 1), kept & (2 * capacity - 1)
-    wider[HEAD + new] = past[HEAD + old]
-    own = 2 * (TIMES + 2 * queue_of(many))
-    for s in range(many):
-        a, b = HEAD + capacity + s * (2 * capacity + own), HEAD + 2 * capacity + s * (4 * capacity + own)
-        for wave in range(2):
-            wider[b + 2 * new + wave] = past[a + 2 * old + wave]
-        wider[b + 4 * capacity :][:own] = past[a + 2 * capacity :][:own]
-    return wider
+def longest_of(draft) -> float:
+    """Step that lines are cut for [s]."""
+    return min((one.longest for one in draft.followed.values() if one.line == "delay"), default=math.inf)

@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
-from fvsolve.model.delay import begin_past, without_past
+from fvsolve.model.past import begin_past, without_past
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
 from fvsolve.shown import Shown

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
-from fvsolve.model.delay import SPARE, begin_past, doubled, room_left, without_past
+from fvsolve.model.past import LEAST_ROOM, begin_past, doubled, room_left, without_past
 
 if TYPE_CHECKING:
     from fvsolve.model.model import Model
@@ -87,7 +87,7 @@ class Slate:
         delays = self.model.tables.delays
         if not len(delays):
             return np.inf
-        while (left := room_left(self.past, delays)) < SPARE // 2:
+        while (left := room_left(self.past, delays)) < LEAST_ROOM:
             self.past = doubled(self.past, delays)
         return float(left)
 

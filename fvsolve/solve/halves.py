@@ -11,13 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
+from fvsolve.kernels.delay.history import MENDED
 from fvsolve.limits.drives import lumped, spreads
 from fvsolve.limits.step import DOUBTFUL, WRONG
 from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.tableau import method_named
 
-LOOKS, DEAR = 32, 16  # in a run of explicit steps, of implicit ones
+LOOKS, DEAR = 32, 16  # in a run of explicit steps, of implicit ones; of explicit ones
+SELDOM, FEWEST = 50.0, 8  # no look sooner than after so many, which costs a twentieth, but in short runs
 LEAST = 0.1  # of what counts as small: a range that is less is none
 WHOLE = 0.99  # of a step: what an event or a kink has cut says nothing
 ROUNDING = 1e-10  # of ranges: an error that is less does not show what a step leaves of it
@@ -37,14 +39,18 @@ class Halves:
         model, self.step = slate.model, float(slate.clock["step"])
         numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
-        which = lumped(model) if method.explicit else np.arange(model.y_size)
+        lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # what they hold moves nothing
+        which = lumped(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
         self.model, self.which = model, which[: None if self.step > 0.0 else 0]
         self.kept = np.zeros(4 + 5 * self.which.size)
         self.error, self.astray, self.sums, self.least, self.greatest = self.kept[4:].reshape(5, -1)
         self.least[:] = self.greatest[:] = model.start[self.which]
         self.kept[3], self.stepper = 1.0, None
         if self.which.size:
-            self.every = max(1.0, (numerics.end - numerics.start) / self.step // (LOOKS if method.explicit else DEAR))
+            steps = (numerics.end - numerics.start) / self.step
+            self.every = max(1.0, steps // DEAR)
+            if method.explicit:
+                self.every = max(1.0, steps // LOOKS, min(SELDOM, steps // FEWEST))
             self.kept[1], self.small = self.every, spreads(model, LEAST)[self.which]
 
     def room(self, steps: float) -> float:
@@ -60,7 +66,7 @@ class Halves:
         self.kept[1] = steps + 1.0  # the next one, if this says nothing
         end = loop.orders[slots.END]
         whole = self.step if loop.t < end else min(self.step, end - memory[slots.T_MARK])
-        if h < WHOLE * whole:
+        if h < WHOLE * whole or mended(loop):
             return
         before, now = loop.before[self.which], loop.now[self.which]
         t = loop.t - h
@@ -127,3 +133,9 @@ class Halves:
                 f"average, by where two halves of them end; {said}; halve the step")  # fmt: skip
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)
+
+
+def mended(loop) -> bool:
+    """Whether a store was given what a jump had brought within the last step, as halves of it are not."""
+    past = loop.slate.past
+    return past.size > 0 and past[MENDED] == loop.t

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model import Model, State
-from fvsolve.model.delay import without_past
+from fvsolve.model.past import without_past
 from fvsolve.model.scalars import scalar_ledgers
 from fvsolve.solve.bands import threads_of
 from fvsolve.solve.loop import NO_LIMIT, Loop

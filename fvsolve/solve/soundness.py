@@ -7,6 +7,7 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.limits.drives import drives
 from fvsolve.limits.step import step_limits
+from fvsolve.model.past import crowded
 from fvsolve.solve.halves import Halves
 from fvsolve.solve.unfelt import Unfelt
 
@@ -22,7 +23,8 @@ class Soundness:
     """
 
     def __init__(self, slate) -> None:
-        self.model = model = slate.model
+        self.slate, self.model = slate, slate.model
+        model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
         self.predicted = step_limits(model)
@@ -61,6 +63,7 @@ class Soundness:
             found = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
         astray = self.halves.notice()
         found += [] if astray is None else [astray]
+        found += crowded(self.slate.past)
         found += self.unfelt.notices()
         found += [] if self.grown is None else [self.grown]
         return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]

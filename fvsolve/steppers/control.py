@@ -81,6 +81,16 @@ def next_step(orders, memory, out_rate, k, scale):
 
 
 @njit(forceinline=True)
+def end_of(orders, memory, h, last):
+    """Time at which a step of h ends [s]: of whole given steps a multiple, so that no rounding adds up."""
+    if last:
+        return orders[END]
+    if orders[CONTROL] != TOLERANCE and (h == memory[STEP] or h == memory[LEFT]):
+        return memory[T_MARK] + (memory[N_MARK] + (0.0 if memory[LEFT] > h else 1.0)) * memory[STEP]
+    return memory[T] + h
+
+
+@njit(forceinline=True)
 def closing_step(memory, closing, h, least):
     """A given step h, or a part of it where something shuts at a rate that has no bound, -x'/x = closing [1/s]."""
     if h * closing <= CLOSED or h <= 2.0 * least:

@@ -9,12 +9,13 @@ from math import isfinite
 from fvsolve.jit import COMPILING, njit
 from fvsolve.kernels.sums import BAD, LOOK, MODE, OFF
 from fvsolve.steppers.coefficients import error_of, row_of, weights_of
-from fvsolve.steppers.control import closing_step, grown, kept, next_step, reduced, shortest, too_short, watch
+from fvsolve.steppers.control import closing_step, end_of, grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
 from fvsolve.steppers.ledger import book, book_error
 from fvsolve.steppers.rows import emit, next_due
 from fvsolve.steppers.signatures import ATTEMPT, compiled_as
 from fvsolve.steppers.slots import (
+    AMENDED,
     BAD_STATUS,
     BAD_VALUE,
     BEHIND,
@@ -68,7 +69,7 @@ from fvsolve.steppers.slots import (
     WHERE,
     T,
 )
-from fvsolve.steppers.step import BEGIN, STOP, add_stored, all_finite, copy
+from fvsolve.steppers.step import BEGIN, STOP, add_stored, all_finite, copy, keep_carry
 
 if COMPILING:
     from fvsolve.steppers.signatures import (
@@ -128,7 +129,8 @@ def march(
     within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
     implicit step keeps.
     """
-    s, reuse, formed = k.shape[0], False, orders[KIND] == EXPLICIT and shape.size > 0
+    s, reuse, met, t_new = k.shape[0], False, False, 0.0  # met: g_new is of the end of the step behind
+    formed = orders[KIND] == EXPLICIT and shape.size > 0
     b = weights_of(coefficients, s)
     steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
     for j in range(s):  # the last stage does not, where it is the end
@@ -137,7 +139,11 @@ def march(
         now, old = flags[NOW], flags[OLD]
         new = 3 - now - old
         if flags[PHASE] == FRESH:
-            events(memory[T], y[now], handle, g)
+            if met:
+                copy(g_new, g)
+            elif g.size > 0:
+                events(memory[T], y[now], handle, g)
+            met = False
             if turned(g, armed):
                 flags[BENT] = flags[BEHIND]  # what is due before its end goes by the rule of the step behind
                 if flags[BENT] == 0:
@@ -157,6 +163,10 @@ def march(
             looked, reuse = formed and not reuse, False
             flags[PHASE] = EMIT
             record(memory[T], y[now], out, handle, values)
+            if out[STATUS] == AMENDED:
+                rhs(memory[T], y[now], k[0], out, handle)
+                memory[CALLS] += 1.0
+                record(memory[T], y[now], out, handle, values)
             if not all_finite(join, handle, spans, sums, y[now], shape, looked):
                 out[STATUS] = NOT_FINITE
         if flags[PHASE] <= EMIT:
@@ -222,8 +232,12 @@ def march(
             if e != NEWTON_FAILED:
                 e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
                 if bearable(e, passing):
-                    events(memory[T] + h, y[new], handle, g_new)
+                    t_new, met = end_of(orders, memory, h, last), True
+                    rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
+                    if g.size > 0:
+                        events(t_new, y[new], handle, g_new)
                     if fallen(g, g_new):
+                        met = False
                         length, e = locate(
                             attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle,
                             coefficients, shape, spans, sums, h, y, now, new, k, supply, where, out, scale, orders,
@@ -258,19 +272,15 @@ def march(
             memory[REJECTIONS] += 1.0
             h *= reduced(orders, e)
             memory[STEP] = h
-        rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
+        if not met:
+            t_new, rounded = end_of(orders, memory, h, last), add_stored(h, b, k, y[now], y[new], stored, carry)
+        keep_carry(h, b, k, y[now], stored, carry)
         memory[UNBOOKED] = h
         t_old = memory[T]
         part = memory[LEFT] > h
-        whole = h == memory[STEP] or h == memory[LEFT]
         memory[LEFT] = memory[LEFT] - h if part else 0.0
         memory[N_MARK] += 0.0 if part else 1.0
-        if last:
-            memory[T] = orders[END]
-        elif orders[CONTROL] != TOLERANCE and whole:
-            memory[T] = memory[T_MARK] + memory[N_MARK] * memory[STEP]
-        else:
-            memory[T] = t_old + h
+        memory[T] = t_new
         memory[LAST] = memory[T] - t_old
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0

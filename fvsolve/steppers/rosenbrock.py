@@ -73,6 +73,10 @@ class Rosenbrock(Method):
         return Conditions(self.forms[0], self.rounding, self.exact.a)
 
     @property
+    def times(self) -> tuple[float, ...]:
+        return tuple(map(float, self.printed[0]))
+
+    @property
     def diagonally_implicit(self) -> bool:
         """No stage is solved by Newton."""
         return False

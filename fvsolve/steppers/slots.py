@@ -27,6 +27,7 @@ PHASE, BEHIND, NOW, OLD, ROWS, BENT = range(6)
 FRESH, LEAPT, EMIT, READY = range(4)
 
 RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # the entries of `out` that the loop reads
+AMENDED = 7  # in STATUS: the state was put right as it was noted
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step

@@ -137,7 +137,17 @@ def add_stored(h, b, k, y, y_new, stored, carry):
         i, total = stored[q], 0.0
         for j in range(b.size):
             total += b[j] * k[j, i]
-        new, carry[q] = add_up(y[i], h * total, carry[q])
+        new = add_up(y[i], h * total, carry[q])[0]
         changed = changed or new != y_new[i]
         y_new[i] = new
     return changed
+
+
+@njit
+def keep_carry(h, b, k, y, stored, carry):
+    """What rounding took off in that sum, once the step is taken."""
+    for q in range(stored.size):
+        i, total = stored[q], 0.0
+        for j in range(b.size):
+            total += b[j] * k[j, i]
+        carry[q] = add_up(y[i], h * total, carry[q])[1]

@@ -127,6 +127,11 @@ class Method:
     def stage_order(self) -> int:
         return stage_order(self.exact.a, self.exact.b, self.exact.c, self.rounding)
 
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Of its stages, in steps."""
+        return tuple(map(float, self.exact.c))
+
     @functools.cached_property
     def explicit(self) -> bool:
         """Whether each stage needs only those before it."""

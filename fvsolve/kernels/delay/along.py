@@ -6,20 +6,22 @@ delta of its middle when what passes x now was there, or is yet to be: at both e
 
 from fvsolve.jit import njit
 from fvsolve.kernels.delay.history import (
-    CAPACITY,
+    ARRIVALS,
     COUNT,
-    HEAD,
+    HEADS,
+    MANY,
+    SUM,
     ZEROS,
-    arrivals_at,
     between,
     both_waves,
     clock_of,
     jumps_at,
     jumps_until,
+    places_of,
     read_both,
+    ring_of,
     same_time,
     stencil,
-    stretch_at,
     time_of,
 )
 from fvsolve.kernels.delay.lines import rubbed
@@ -34,18 +36,19 @@ def sent(t, out, tables, which, q, wave, at):
     newest = int(past[COUNT]) - 1
     if newest < 0:
         return 0.0
-    s, last = line["stretch"] + q, time_of(past, newest)
-    until = at + same_time(past)
+    last, places, until = time_of(past, newest), places_of(past), at + same_time(past)
     k, w = stencil(past, clock_of(past, newest), min(at, last))
-    both = both_waves(past, stretch_at(past, s), int(past[CAPACITY]) - 1, k, w)
-    value = (both[1] if wave == 1 else both[0]) + jumps_until(past, jumps_at(past, s, wave), until)
+    ring, mask = ring_of(places, line, q)
+    both = both_waves(past, ring, mask, k, w)
+    jumps = jumps_at(places, line["stretch"] + q, wave)
+    value = (both[1] if wave == 1 else both[0]) + jumps_until(past, places, jumps, until)
     if at <= last or t <= last:
         return value
     if q == (line["stretches"] - 1 if wave == 1 else 0):  # by what its node sends now
         now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
         return value + (now - value) * (at - last) / (t - last)
     pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
-    r, l = read_both(past, clock_of(past, newest), line["stretch"] + before, at - line["tau"])
+    r, l = read_both(past, places, clock_of(past, newest), line, before, at - line["tau"])
     delta = rubbed(pipe, line, r, l)
     return l + delta if wave == 1 else r - delta
 
@@ -74,36 +77,42 @@ def along_line(t, out, tables, which, r, l):
         r[j], l[j] = waves_at(t, out, tables, which, (j + 0.5) / n)
 
 
-@njit(forceinline=True)
-def sketched(past, clock, at, wave, t):
-    """Wave that was sent into a stretch at t, by lines between entries; at : where its entries begin."""
+@njit
+def sketched(past, places, clock, ring, mask, jumps, wave, t):
+    """Wave that was sent into a stretch at t, by lines between entries of a ring; jumps : their head."""
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
-    capacity, place = clock[4][0], (t - latest) * often
+    place = (t - latest) * often
     if place > -even:
         back = int(place)
         k, x = last + back - 1, place - back + 1.0
     else:
         k, x = between(past, last, t)
         if k < ZEROS and x == 0.0:  # before all
-            return jumps_until(past, at + 2 * capacity + wave * clock[4][2], t + clock[5])
-    a, b = at + 2 * (k & (capacity - 1)) + wave, at + 2 * ((k + 1) & (capacity - 1)) + wave
-    jumps = at + 2 * capacity + wave * clock[4][2]
-    return past[a] + x * (past[b] - past[a]) + jumps_until(past, jumps, t + clock[5])
+            return jumps_until(past, places, jumps, t + clock[4])
+    a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
+    return past[a] + x * (past[b] - past[a]) + jumps_until(past, places, jumps, t + clock[4])
 
 
-@njit
-def sketch_line(t, tables, which, r, l):
-    """`along_line` at the time of the last entry, as envelopes want it: by lines, delta that of what arrives."""
-    past, line, clock = tables.past, tables.delays[which], clock_of(tables.past, int(tables.past[COUNT]) - 1)
-    n, many, tau, place = r.size, line["stretches"], line["tau"], arrivals_at(past)
-    first = HEAD + clock[4][0] + line["stretch"] * clock[4][1]
-    for j in range(n):
-        share = (j + 0.5) / n * many
-        q = min(int(share), many - 1)
-        x, at = share - q, first + q * clock[4][1]
-        delta = past[place + 3 * (line["stretch"] + q) + 2]
-        r[j] = sketched(past, clock, at, 0, t - x * tau) - x * delta
-        l[j] = sketched(past, clock, at, 1, t - (1.0 - x) * tau) + (1.0 - x) * delta
+@njit(forceinline=True)
+def sketch(t, past, places, clock, line, share):
+    """`waves_at` the time t of the last entry, as envelopes want it: by lines, delta that of what arrives."""
+    many, tau = line["stretches"], line["tau"]
+    q = min(int(share * many), many - 1)
+    x, s = share * many - q, line["stretch"] + q
+    ring, mask = ring_of(places, line, q)
+    delta, jumps = past[places[0] + ARRIVALS * s + 2], jumps_at(places, s, 0)
+    steps = tau * clock[2]
+    if steps + 2.0 < clock[3] and past[jumps + MANY] + past[jumps + HEADS + MANY] == 0.0:
+        ahead, back = x * steps, (1.0 - x) * steps  # steps ago
+        i, j = int(ahead), int(back)
+        a, b = ring + 2 * ((clock[0] - i) & mask), ring + 2 * ((clock[0] - i - 1) & mask)
+        c, d = ring + 2 * ((clock[0] - j) & mask) + 1, ring + 2 * ((clock[0] - j - 1) & mask) + 1
+        r = past[a] + (ahead - i) * (past[b] - past[a]) + past[jumps + SUM]
+        l = past[c] + (back - j) * (past[d] - past[c]) + past[jumps + HEADS + SUM]
+    else:
+        r = sketched(past, places, clock, ring, mask, jumps, 0, t - x * tau)
+        l = sketched(past, places, clock, ring, mask, jumps + HEADS, 1, t - (1.0 - x) * tau)
+    return r - x * delta, l + (1.0 - x) * delta
 
 
 @njit

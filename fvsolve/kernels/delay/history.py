@@ -4,20 +4,26 @@ A wave is a smooth part u, kept at accepted times, and jumps, each with its time
 So nothing is interpolated across a jump. u is read by Lagrange's polynomial through up to six entries around, as many
 before as behind, so that no wave is magnified; entries that a step has not yet accepted are never read.
 
-past = [head, times of entries, then for each stretch its entries (u forward, u backward) and its jumps of both waves:
-sum of those that have arrived, first, count, how many of them have arrived in the last step, times, sizes; and at last
-what arrives at the ends of stretches, at a time].
+past = [head, times of entries, what arrives at the ends of stretches at a time, of each stretch heads of the jumps of
+both waves: sum of those that have arrived, which is the first, how many there are, how many of them have arrived in the
+last step; times and sizes of these jumps; and at last of each stretch a ring of entries (u forward, u backward), as
+long as its own delay asks for]. So a step through a large network touches little: the ends of rings, and heads.
 """
 
 from fvsolve.jit import njit
 
 HEAD = 16
-CAPACITY, COUNT, QUEUE, STARTED, STEP, EVEN = 0, 1, 2, 3, 4, 5
-GREATEST, DROPPED, PASSED, STRETCHES, STRIDE = 6, 7, 8, 9, 10
-KNOWN_TIME, KNOWN_COUNT = 11, 12  # of the arrivals that are kept
-STEP_BEFORE, EVEN_BEFORE = 13, 14  # STEP and EVEN without the last entry
+COUNT, CAPACITY, QUEUE, STRETCHES = 0, 1, 2, 3  # entries so far, room for times, for jumps of a wave
+WIDER = 4  # rings are so many times as long as at first
+STEP, EVEN = 5, 6  # length of the last step [s], and how many were of that length
+STEP_BEFORE, EVEN_BEFORE = 7, 8  # both without the last entry
+GREATEST, CROWDED, LIVE = 9, 10, 11  # the greatest jump [Pa], the greatest that found no room, how many there are now
+KNOWN_TIME, KNOWN_COUNT = 12, 13  # of the arrivals that are kept
+MENDED = 14  # time of the last state whose stores were put right [s]
 ZEROS = 8  # entries before the first, of the profile
-SUM, FIRST, MANY, ARRIVED, TIMES = 0, 1, 2, 3, 4  # of the jumps of a wave
+SUM, FIRST, MANY, ARRIVED, HEADS = 0, 1, 2, 3, 4  # of the jumps of a wave
+ARRIVALS = 3  # of a stretch: backward wave at its beginning, forward one at its end, delta
+APART = 8  # numbers between rings, a cache line: or entries of one time would all fall into the same few of a cache
 SAME = 1e-9  # of a step: times that are as good as one
 RATIO = 3.0  # of neighbouring steps, above which a polynomial through them is a line
 
@@ -29,21 +35,31 @@ def time_of(past, k):
 
 
 @njit(forceinline=True)
-def stretch_at(past, s):
-    """Where the entries of stretch s begin."""
-    return HEAD + int(past[CAPACITY]) + s * int(past[STRIDE])
+def places_of(past):
+    """Where there begin: (arrivals, heads of jumps, jumps, rings), and how many times as long as at first these are."""
+    many, arrivals = int(past[STRETCHES]), HEAD + int(past[CAPACITY])
+    heads = arrivals + ARRIVALS * many
+    jumps = heads + 2 * HEADS * many
+    return arrivals, heads, jumps, jumps + 4 * int(past[QUEUE]) * many, int(past[WIDER])
 
 
 @njit(forceinline=True)
-def jumps_at(past, s, wave):
-    """Where the jumps of a wave of stretch s begin."""
-    return stretch_at(past, s) + 2 * int(past[CAPACITY]) + wave * (TIMES + 2 * int(past[QUEUE]))
+def ring_of(places, line, q):
+    """(where the entries of stretch q of a line begin, mask of their numbers)."""
+    room = places[4] * line["room"]
+    return places[3] + 2 * (places[4] * line["ring"] + q * room) + APART * (line["stretch"] + q), room - 1
 
 
 @njit(forceinline=True)
-def arrivals_at(past):
-    """Where it is kept what arrives: of each stretch backward wave at its beginning, forward one at its end, delta."""
-    return stretch_at(past, int(past[STRETCHES]))
+def jumps_at(places, s, wave):
+    """Where the head of the jumps of a wave of stretch s lies."""
+    return places[1] + HEADS * (2 * s + wave)
+
+
+@njit(forceinline=True)
+def queue_at(places, queue, at):
+    """Where the times of jumps lie whose head is at a place; sizes follow."""
+    return places[2] + 2 * queue * ((at - places[1]) // HEADS)
 
 
 @njit(forceinline=True)
@@ -119,15 +135,14 @@ def uneven(past, newest, t):
 
 @njit(forceinline=True)
 def clock_of(past, newest):
-    """What every reading asks for: (newest entry, its time, 1 / step, how many steps were of this length, sizes, SAME).
+    """What every reading asks for: (newest entry, its time, 1 / step, how many steps were of this length, SAME).
 
     It is the same whether an entry behind the newest is there already or not.
     """
     step, even = past[STEP], past[EVEN]
     if newest != int(past[COUNT]) - 1:
         step, even = past[STEP_BEFORE], past[EVEN_BEFORE]
-    sizes = int(past[CAPACITY]), int(past[STRIDE]), TIMES + 2 * int(past[QUEUE])
-    return newest, time_of(past, newest), 1.0 / step, even, sizes, same_time(past)
+    return newest, time_of(past, newest), 1.0 / step, even, same_time(past)
 
 
 @njit(forceinline=True)
@@ -162,11 +177,12 @@ def both_waves(past, at, mask, k, w):
 
 
 @njit
-def some_jumps(past, at, t):
-    """Sum of the jumps of a wave up to t, of which it has some."""
+def some_jumps(past, places, at, t):
+    """Sum of the jumps of a wave up to t, of which it has some; at : their head."""
     total, many, queue, first = past[at + SUM], int(past[at + MANY]), int(past[QUEUE]), int(past[at + FIRST])
+    times = queue_at(places, queue, at)
     for i in range(many):
-        place = at + TIMES + (first + i) % queue
+        place = times + (first + i) % queue
         if past[place] > t:
             break
         total += past[place + queue]
@@ -174,54 +190,55 @@ def some_jumps(past, at, t):
 
 
 @njit(forceinline=True)
-def jumps_until(past, at, t):
-    """Sum of the jumps of a wave up to t."""
-    return some_jumps(past, at, t) if past[at + MANY] > 0.0 else past[at + SUM]
+def jumps_until(past, places, at, t):
+    """Sum of the jumps of a wave up to t; at : their head."""
+    return some_jumps(past, places, at, t) if past[at + MANY] > 0.0 else past[at + SUM]
 
 
 @njit(forceinline=True)
-def read_both(past, clock, s, t):
-    """Both waves that were sent into stretch s at t [kg/s], forward from its beginning and backward from its end."""
-    capacity, stride, jumps = clock[4]
-    at = HEAD + capacity + s * stride
+def read_both(past, places, clock, line, q, t):
+    """Both waves that were sent into stretch q of a line at t [kg/s], from its beginning and from its end."""
+    at, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t)
-    r, l = both_waves(past, at, capacity - 1, k, w)
-    until, ahead = t + clock[5], at + 2 * capacity
-    back = ahead + jumps
-    return r + jumps_until(past, ahead, until), l + jumps_until(past, back, until)
+    r, l = both_waves(past, at, mask, k, w)
+    until, ahead = t + clock[4], jumps_at(places, line["stretch"] + q, 0)
+    return r + jumps_until(past, places, ahead, until), l + jumps_until(past, places, ahead + HEADS, until)
 
 
 @njit
-def push_jump(past, at, t, size):
+def push_jump(past, places, at, t, size):
     """Note a jump of a wave; what is too many joins the smooth part."""
     queue, first, many = int(past[QUEUE]), int(past[at + FIRST]), int(past[at + MANY])
-    i = many
-    while i > 0 and past[at + TIMES + (first + i - 1) % queue] > t + same_time(past):
+    i, times = many, queue_at(places, queue, at)
+    while i > 0 and past[times + (first + i - 1) % queue] > t + same_time(past):
         i -= 1
-    before = at + TIMES + (first + i - 1) % queue
+    before = times + (first + i - 1) % queue
     if i > int(past[at + ARRIVED]) and abs(past[before] - t) <= same_time(past):
         past[before + queue] += size
-        return
+        return True
     if many == queue:
-        past[DROPPED] = max(past[DROPPED], abs(size))
-        return
+        return False
     for j in range(many, i, -1):
-        here, there = at + TIMES + (first + j) % queue, at + TIMES + (first + j - 1) % queue
+        here, there = times + (first + j) % queue, times + (first + j - 1) % queue
         past[here], past[here + queue] = past[there], past[there + queue]
-    here = at + TIMES + (first + i) % queue
+    here = times + (first + i) % queue
     past[here], past[here + queue] = t, size
     past[at + MANY] = many + 1.0
+    past[LIVE] += 1.0
+    return True
 
 
 @njit
-def forget_jumps(past, at, t):
+def forget_jumps(past, places, at, t):
     """Take those that have arrived, and were sent before t, out of the list."""
     queue = int(past[QUEUE])
-    while past[at + ARRIVED] > 0.0 and past[at + TIMES + int(past[at + FIRST])] < t:
-        past[at + SUM] += past[at + TIMES + int(past[at + FIRST]) + queue]
+    times = queue_at(places, queue, at)
+    while past[at + ARRIVED] > 0.0 and past[times + int(past[at + FIRST])] < t:
+        past[at + SUM] += past[times + int(past[at + FIRST]) + queue]
         past[at + FIRST] = (int(past[at + FIRST]) + 1) % queue
         past[at + MANY] -= 1.0
         past[at + ARRIVED] -= 1.0
+        past[LIVE] -= 1.0
 
 
 @njit
@@ -229,7 +246,7 @@ def begin_entry(past, t):
     """Make room for an entry at t; returns its number."""
     mask, k = int(past[CAPACITY]) - 1, int(past[COUNT])
     if k == 0:
-        past[COUNT], past[STARTED], past[EVEN], past[STEP] = ZEROS + 1.0, t, 1e18, 1e-300
+        past[COUNT], past[EVEN], past[STEP] = ZEROS + 1.0, 1e18, 1e-300
         past[STEP_BEFORE], past[EVEN_BEFORE] = past[STEP], past[EVEN]
         past[HEAD + ZEROS] = t
         return ZEROS

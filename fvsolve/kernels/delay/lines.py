@@ -8,20 +8,22 @@ and its ends know each other, p' as between two admittances Y tau / (2 h - tau) 
 """
 
 from fvsolve.jit import njit
+from fvsolve.kernels.clusters import inner_of
 from fvsolve.kernels.delay.history import (
+    ARRIVALS,
     COUNT,
     KNOWN_COUNT,
     KNOWN_TIME,
-    arrivals_at,
     clock_of,
     newest_before,
+    places_of,
     read_both,
 )
 from fvsolve.kernels.friction import EXPONENT, drag, power_of_square
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH
 
-ENOUGH = 1e-7  # of a flow that Newton leaves
+ENOUGH = 1e-6  # of a flow that Newton leaves
 ROUGH = 0.2  # of its slope, by which that of a factor that hangs on the flow is off
 MOST = 60
 
@@ -44,7 +46,7 @@ def rubbed(pipe, line, r, l):
         return 0.0
     kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
     rough = ROUGH if pipe["friction"] == FRICTION_ROUGH else 0.0
-    m, least = x, ENOUGH * (abs(x) + 1e-3 * abs(flow))
+    m, least = x * line["passes"], ENOUGH * (abs(x) + 1e-3 * abs(flow))
     for _ in range(MOST):
         force, slope = drag_and_slope(pipe, flow + m)
         step = (m + kappa * (force - drag0) - x) / (1.0 + kappa * slope)
@@ -56,19 +58,20 @@ def rubbed(pipe, line, r, l):
 
 
 @njit(forceinline=True)
-def arrive(past, clock, line, pipe, q, t, place):
-    """What arrives at the ends of stretch q of a line at t, into past from `place` on.
+def arrive(past, places, clock, line, pipe, q, t):
+    """What arrives at the ends of stretch q of a line at t, into its place in past.
 
     Of a short line both waves are those at p' = 0 at its ends.
     """
-    r, l = read_both(past, clock, line["stretch"] + q, t - line["hold"])
+    r, l = read_both(past, places, clock, line, q, t - line["hold"])
     delta, beta = rubbed(pipe, line, r, l), line["now"]
     back, ahead = l + delta, r - delta
     if beta > 0.0:
         ahead, back = ahead - beta * r, back - beta * l
         per = 1.0 / (1.0 - beta * beta)
         ahead, back = per * (ahead - beta * back), per * (back - beta * ahead)
-    past[place], past[place + 1], past[place + 2] = back, ahead, delta
+    at = places[0] + ARRIVALS * (line["stretch"] + q)
+    past[at], past[at + 1], past[at + 2] = back, ahead, delta
 
 
 @njit
@@ -76,13 +79,14 @@ def arrive_all(past, tables, t):
     """What arrives at the ends of all lines at t; nodes are closed several times at one time, which is read once."""
     if past[KNOWN_TIME] == t and past[KNOWN_COUNT] == past[COUNT]:
         return
-    place, clock = arrivals_at(past), clock_of(past, newest_before(past, t))
+    places, clock = places_of(past), clock_of(past, newest_before(past, t))
     delays, pipes = tables.delays, tables.pipes
     for i in range(delays.size):
         line = delays[i]
-        pipe, first, last = pipes[line["pipe"]], place + 3 * line["stretch"], line["stretches"] - 1
-        for q in range(0, last + 1, max(1, last)):
-            arrive(past, clock, line, pipe, q, t, first + 3 * q)
+        pipe, last = pipes[line["pipe"]], line["stretches"] - 1
+        arrive(past, places, clock, line, pipe, 0, t)
+        if last > 0:
+            arrive(past, places, clock, line, pipe, last, t)
     past[KNOWN_TIME], past[KNOWN_COUNT] = t, past[COUNT]
 
 
@@ -91,48 +95,44 @@ def offer_lines(t, y, dydt, out, handle):
     """Waves that leave delay lines into out[ends], and what they carry into their nodes into out[net]."""
     tables = open_tables(handle)
     past, layout, lines = tables.past, tables.layout[0], tables.delays
-    started, place = past[COUNT] > 0.0, arrivals_at(past)
+    started, place, ends, net = past[COUNT] > 0.0, places_of(past)[0], layout["ends"], layout["net"]
     if started:
         arrive_all(past, tables, t)
     for i in range(lines.size):
         line, pipe = lines[i], tables.pipes[lines[i]["pipe"]]
-        at, first = layout["ends"] + 4 * line["pipe"], place + 3 * line["stretch"]
+        at, first = ends + 4 * line["pipe"], place + ARRIVALS * line["stretch"]
         left, right = 0.0, 0.0
         if started:
-            left, right = past[first], past[first + 3 * line["stretches"] - 2]
+            left, right = past[first], past[first + ARRIVALS * (line["stretches"] - 1) + 1]
         out[at + 1], out[at + 2] = left, right
-        out[layout["net"] + pipe["from_node"]] += 2.0 * left
-        out[layout["net"] + pipe["to_node"]] += 2.0 * right
+        out[net + pipe["from_node"]] += 2.0 * left
+        out[net + pipe["to_node"]] += 2.0 * right
 
 
 @njit
 def answer_lines(t, y, dydt, out, handle):
-    """Waves that the nodes send into delay lines: Y p' less what arrives, which in short lines they decide too."""
+    """Waves that the nodes send into delay lines: Y p' less what arrives, which in short lines they decide too.
+
+    And d/dt of what lines hold [kg/s]: what flows in at both ends.
+    """
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.delays
+    ends, pressure = layout["ends"], layout["pressure"]
     for i in range(lines.size):
         line, pipe = lines[i], tables.pipes[lines[i]["pipe"]]
-        at = layout["ends"] + 4 * line["pipe"]
-        near = pipe["admittance"] * out[layout["pressure"] + pipe["from_node"]]
-        far = pipe["admittance"] * out[layout["pressure"] + pipe["to_node"]]
+        at, admittance = ends + 4 * line["pipe"], pipe["admittance"]
+        near = admittance * out[pressure + pipe["from_node"]]
+        far = admittance * out[pressure + pipe["to_node"]]
         if line["now"] > 0.0:
             beta = line["now"]
             per = beta / (1.0 - beta * beta)
             out[at + 1] += per * (far - beta * near)
             out[at + 2] += per * (near - beta * far)
-        out[at], out[at + 3] = near - out[at + 1], far - out[at + 2]
-
-
-@njit
-def fill_lines(t, y, dydt, out, handle):
-    """d/dt of what delay lines hold [kg/s]: what flows in at both ends."""
-    tables = open_tables(handle)
-    layout, lines = tables.layout[0], tables.delays
-    if dydt.size == 0:
-        return
-    for i in range(lines.size):
-        at = layout["ends"] + 4 * lines[i]["pipe"]
-        dydt[tables.pipes[lines[i]["pipe"]]["y"]] = (out[at] - out[at + 1]) - (out[at + 2] - out[at + 3])
+        left, right = out[at + 1], out[at + 2]
+        ahead, back = near - left, far - right
+        out[at], out[at + 3] = ahead, back
+        if dydt.size > 0:
+            dydt[pipe["y"]] = (ahead - left) - (right - back)
 
 
 @njit
@@ -150,25 +150,13 @@ def couple_clusters(t, y, dydt, out, handle):
         for c in range(cluster["couples"]):
             line = tables.delays[integers[cluster["first_couple"] + c]]
             pipe = tables.pipes[line["pipe"]]
-            for side in range(2):
-                here, there = (
-                    pipe["to_node"] if side else pipe["from_node"],
-                    pipe["from_node"] if side else pipe["to_node"],
-                )
-                i, j = row_of(tables, which, here), row_of(tables, which, there)
-                if i >= 0 and j < 0:
-                    work[i] += line["couple"] * out[layout["pressure"] + there]
+            i, j = inner_of(cluster, tables, pipe["from_node"]), inner_of(cluster, tables, pipe["to_node"])
+            if i >= 0 and j < 0:
+                work[i] += line["couple"] * out[layout["pressure"] + pipe["to_node"]]
+            if j >= 0 and i < 0:
+                work[j] += line["couple"] * out[layout["pressure"] + pipe["from_node"]]
         for i in range(n):
             total, at = 0.0, cluster["inverse"] + i * n
             for j in range(n):
                 total += tables.floats[at + j] * work[j]
             out[layout["pressure"] + integers[first + i]] = total
-
-
-@njit(forceinline=True)
-def row_of(tables, which, i):
-    """Row of node i in a cluster, -1 where it is none of its nodes."""
-    cluster, row = tables.clusters[which], tables.nodes[i]["row"]
-    if tables.nodes[i]["solve"] != 2 or row < 0 or row >= cluster["nodes"]:
-        return -1
-    return row if tables.integers[cluster["first_node"] + row] == i else -1

@@ -7,37 +7,39 @@ what differs was passed on. So a jump travels exactly through what is linear, an
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run
-from fvsolve.kernels.delay.along import sketch_line
+from fvsolve.kernels.delay.along import sketch
 from fvsolve.kernels.delay.history import (
+    ARRIVALS,
     ARRIVED,
-    CAPACITY,
     COUNT,
-    DROPPED,
+    CROWDED,
     FIRST,
     GREATEST,
-    HEAD,
+    HEADS,
     KNOWN_TIME,
+    LIVE,
     MANY,
-    PASSED,
+    MENDED,
     QUEUE,
-    TIMES,
-    arrivals_at,
     begin_entry,
     clock_of,
     forget_jumps,
     jumps_at,
     jumps_until,
     newest_before,
+    places_of,
     push_jump,
+    queue_at,
     read_both,
+    ring_of,
     same_time,
-    stretch_at,
     time_of,
 )
 from fvsolve.kernels.delay.lines import arrive, arrive_all, drag_and_slope, rubbed
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.observer import record_pipe
-from fvsolve.kernels.records import ALONE, JUNCTION
+from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
+from fvsolve.kernels.observer import note
+from fvsolve.kernels.records import ALONE, AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
 
 INFINITE, NAN = 1e300, float("nan")
 NOISE = 1e-13  # of half a bar's wave: a jump that is rounding
@@ -50,12 +52,17 @@ def enough(past, tables, pipe):
 
 
 @njit
-def send(past, tables, s, wave, t, size, pipe):
-    """A jump enters stretch s."""
+def keep(past, places, s, wave, t, size, pipe):
+    """A jump that enters stretch s is kept as one, if there is room for it."""
+    if not push_jump(past, places, jumps_at(places, s, wave), t, size):
+        past[CROWDED] = max(past[CROWDED], abs(size) / pipe["admittance"])
+
+
+@njit
+def send(past, places, tables, s, wave, t, size, pipe):
+    """A jump enters stretch s; a small one joins the smooth part."""
     if abs(size) > enough(past, tables, pipe):
-        push_jump(past, jumps_at(past, s, wave), t, size)
-    else:
-        past[DROPPED] = max(past[DROPPED], abs(size) / pipe["admittance"])
+        keep(past, places, s, wave, t, size, pipe)
 
 
 @njit(forceinline=True)
@@ -65,15 +72,55 @@ def is_plain(tables, i):
     return node["kind"] != JUNCTION or node["solve"] == ALONE
 
 
+@njit(forceinline=True)
+def end_of(line, side):
+    """The stretch at an end of a line."""
+    return line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
+
+
+@njit(forceinline=True)
+def missed_by(past, tables, t, when):
+    """By how much the weights of the step that ends at t book what begins within it too briefly [s].
+
+    Stages before it know nothing of it, those behind it that it was always there.
+    """
+    before, settings = time_of(past, int(past[COUNT]) - 1), tables.settings[0]
+    h, booked, at, many = t - before, 0.0, settings["weights"], settings["stages"]
+    for i in range(many):
+        if before + tables.floats[at + many + i] * h >= when - same_time(past):
+            booked += tables.floats[at + i]
+    return (t - when) - h * booked
+
+
+@njit(forceinline=True)
+def stores(tables, i):
+    """Whether node i stores what flows into it, now."""
+    node = tables.nodes[i]
+    if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
+        return False
+    k = EVENTS * node["row"]
+    return node["kind"] != TANK or (tables.armed[k + BOTTOM] <= 0.0 and tables.armed[k + RIM] <= 0.0)
+
+
+@njit(forceinline=True)
+def mend(past, tables, y, i, flow, missed):
+    """Give a store what a flow that began within the step has brought."""
+    if stores(tables, i) and flow * missed != 0.0:
+        y[tables.nodes[i]["y"]] += flow * missed
+        past[MENDED] = NAN
+
+
 @njit
-def meet(past, tables, which, side, t, size):
-    """A jump of a line arrives at the plain node at one of its ends."""
+def meet(past, places, tables, y, which, side, t, size, missed):
+    """A jump of a line arrives at the plain node at one of its ends; missed : see `missed_by`."""
     line, pipe = tables.delays[which], tables.pipes[tables.delays[which]["pipe"]]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
     node = tables.nodes[i]
     if node["kind"] != JUNCTION:
-        s = line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
-        send(past, tables, s, side, t, -size, pipe)
+        send(past, places, tables, end_of(line, side), side, t, -size, pipe)
+        mend(past, tables, y, i, 2.0 * size, missed)
+        if stores(tables, i):
+            y[pipe["y"]] -= 2.0 * size * missed
         return
     change = 2.0 * size / node["admittance"]
     for k in range(node["line_count"]):
@@ -81,188 +128,214 @@ def meet(past, tables, which, side, t, size):
         other, right = tables.delays[end // 2], end % 2
         pipe = tables.pipes[other["pipe"]]
         own = size if end == 2 * which + side else 0.0
-        s = other["stretch"] + (other["stretches"] - 1 if right == 1 else 0)
-        send(past, tables, s, right, t, pipe["admittance"] * change - own, pipe)
+        send(past, places, tables, end_of(other, right), right, t, pipe["admittance"] * change - own, pipe)
 
 
 @njit
-def enter(past, tables, which, q, wave, t, size):
+def enter(past, places, tables, y, which, q, wave, t, size, missed):
     """A jump of a wave leaves stretch q of a line: into the next one, or to the node there."""
     line = tables.delays[which]
     onward = q + 1 if wave == 0 else q - 1
     if 0 <= onward < line["stretches"]:
-        send(past, tables, line["stretch"] + onward, wave, t, size, tables.pipes[line["pipe"]])
+        send(past, places, tables, line["stretch"] + onward, wave, t, size, tables.pipes[line["pipe"]])
     elif abs(size) > 0.0:
-        meet(past, tables, which, 1 if wave == 0 else 0, t, size)
+        meet(past, places, tables, y, which, 1 if wave == 0 else 0, t, size, missed)
 
 
 @njit
-def pass_by_closing(past, tables, t, y, out, handle, place, when):
+def pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed):
     """Close the nodes without the jump at a place of the list; what all lines are sent differs by what it passes on."""
     queue, spare, layout = int(past[QUEUE]), tables.spare, tables.layout[0]
     size = past[place + queue]
     past[place + queue], past[KNOWN_TIME] = 0.0, NAN
     run(CLOSE, t, y, y[:0], spare, handle)
     past[place + queue], past[KNOWN_TIME] = size, NAN
+    mended = False
+    for i in range(tables.nodes.size):
+        if stores(tables, i):
+            mend(past, tables, y, i, out[layout["net"] + i] - spare[layout["net"] + i], missed)
+            mended = True
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
+        if mended:
+            left = (out[at] - out[at + 1]) - (out[at + 2] - out[at + 3])
+            y[pipe["y"]] += missed * (left - ((spare[at] - spare[at + 1]) - (spare[at + 2] - spare[at + 3])))
         for side in range(2):
             change = out[at + 3 * side] - spare[at + 3 * side]
             if abs(change) > enough(past, tables, pipe):
-                s = line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
-                push_jump(past, jumps_at(past, s, side), when, change)
+                keep(past, places, end_of(line, side), side, when, change, pipe)
 
 
 @njit
-def pass_jumps(past, tables, t, y, out, handle):
+def pass_jumps(past, places, tables, t, y, out, handle):
     """All jumps that arrive at the ends of their stretches by t."""
-    queue = int(past[QUEUE])
     for which in range(tables.delays.size):
-        line = tables.delays[which]
-        pipe = tables.pipes[line["pipe"]]
-        for q in range(line["stretches"]):
+        for q in range(tables.delays[which]["stretches"]):
             for wave in range(2):
-                at = jumps_at(past, line["stretch"] + q, wave)
+                at = jumps_at(places, tables.delays[which]["stretch"] + q, wave)
                 while past[at + ARRIVED] < past[at + MANY]:
-                    place = at + TIMES + (int(past[at + FIRST]) + int(past[at + ARRIVED])) % queue
-                    if past[place] > t - line["hold"] + same_time(past):
+                    if not passed(past, places, tables, which, q, wave, at, t, y, out, handle):
                         break
-                    past[at + ARRIVED] += 1.0
-                    past[PASSED] += 1.0
-                    when, size = min(past[place] + line["hold"], t), past[place + queue]
-                    ahead, back = q + 1 == line["stretches"], q == 0
-                    far = pipe["to_node"] if wave == 0 else pipe["from_node"]
-                    near = pipe["from_node"] if wave == 0 else pipe["to_node"]
-                    leaves, returns = (ahead, back) if wave == 0 else (back, ahead)
-                    plain = not (leaves and not is_plain(tables, far)) and not (returns and not is_plain(tables, near))
-                    if line["now"] > 0.0 or not plain:
-                        pass_by_closing(past, tables, t, y, out, handle, place, when)
-                        if not (leaves and returns):
-                            inner(past, tables, which, q, wave, when, size, t)
-                        continue
-                    share = size * rubs(past, tables, line, pipe, line["stretch"] + q, t)
-                    enter(past, tables, which, q, wave, when, size - share)
-                    enter(past, tables, which, q, 1 - wave, when, share)
 
 
 @njit
-def inner(past, tables, which, q, wave, when, size, t):
-    """Of a jump whose stretch has one end at a node that was closed: what goes on within the line."""
-    line = tables.delays[which]
+def passed(past, places, tables, which, q, wave, at, t, y, out, handle):
+    """Pass on the first jump of a wave that has not arrived, if it does by t; whether it did. at : their head."""
+    line, queue = tables.delays[which], int(past[QUEUE])
     pipe = tables.pipes[line["pipe"]]
-    share = size * rubs(past, tables, line, pipe, line["stretch"] + q, t)
-    for side in range(2):
-        to, part = (wave, size - share) if side == 0 else (1 - wave, share)
-        onward = q + 1 if to == 0 else q - 1
-        if 0 <= onward < line["stretches"]:
-            send(past, tables, line["stretch"] + onward, to, when, part, pipe)
+    place = queue_at(places, queue, at) + (int(past[at + FIRST]) + int(past[at + ARRIVED])) % queue
+    if past[place] > t - line["hold"] + same_time(past):
+        return False
+    past[at + ARRIVED] += 1.0
+    when, size = min(past[place] + line["hold"], t), past[place + queue]
+    ahead, back = q + 1 == line["stretches"], q == 0
+    far = pipe["to_node"] if wave == 0 else pipe["from_node"]
+    near = pipe["from_node"] if wave == 0 else pipe["to_node"]
+    leaves, returns = (ahead, back) if wave == 0 else (back, ahead)
+    plain = not (leaves and not is_plain(tables, far)) and not (returns and not is_plain(tables, near))
+    share, missed = size * rubs(past, places, tables, line, pipe, q, t), missed_by(past, tables, t, when)
+    if line["now"] == 0.0 and plain:
+        enter(past, places, tables, y, which, q, wave, when, size - share, missed)
+        enter(past, places, tables, y, which, q, 1 - wave, when, share, missed)
+        return True
+    pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed)
+    if not (leaves and returns):  # within the line
+        for side in range(2):
+            to, part = (wave, size - share) if side == 0 else (1 - wave, share)
+            onward = q + 1 if to == 0 else q - 1
+            if 0 <= onward < line["stretches"]:
+                send(past, places, tables, line["stretch"] + onward, to, when, part, pipe)
+    return True
 
 
 @njit
-def rubs(past, tables, line, pipe, s, t):
-    """Share of a jump that friction in the middle of stretch s turns back."""
-    r, l = read_both(past, clock_of(past, newest_before(past, t)), s, t - line["hold"])
+def rubs(past, places, tables, line, pipe, q, t):
+    """Share of a jump that friction in the middle of stretch q turns back."""
+    r, l = read_both(past, places, clock_of(past, newest_before(past, t)), line, q, t - line["hold"])
     flow = pipe["flow"] + (r - l) - rubbed(pipe, line, r, l)
     k = 0.5 * line["tau"] * drag_and_slope(pipe, flow)[1]
     return k / (1.0 + k)
 
 
 @njit(forceinline=True)
-def write(past, sizes, s, k, wave, value):
-    """Keep the smooth part of a wave as entry k; sizes : as `clock_of` has them."""
-    capacity, stride, jumps = sizes
-    at = HEAD + capacity + s * stride
-    own = jumps_until(past, at + 2 * capacity + wave * jumps, INFINITE)
-    past[at + 2 * (k & (capacity - 1)) + wave] = value - own
+def write(past, places, line, q, k, wave, value):
+    """Keep the smooth part of a wave as entry k."""
+    at, mask = ring_of(places, line, q)
+    jumps = jumps_until(past, places, jumps_at(places, line["stretch"] + q, wave), INFINITE)
+    past[at + 2 * (k & mask) + wave] = value - jumps
 
 
 @njit
-def arrive_at_joints(past, tables, t):
+def arrive_at_joints(past, places, tables, t):
     """What arrives at the joints of stretches at t, beside what does at the ends of lines."""
     arrive_all(past, tables, t)
-    place, clock = arrivals_at(past), clock_of(past, newest_before(past, t))
+    clock = clock_of(past, newest_before(past, t))
     for i in range(tables.delays.size):
         line = tables.delays[i]
         for q in range(1, line["stretches"] - 1):
-            at = place + 3 * (line["stretch"] + q)
-            arrive(past, clock, line, tables.pipes[line["pipe"]], q, t, at)
+            arrive(past, places, clock, line, tables.pipes[line["pipe"]], q, t)
 
 
 @njit
-def note_jumps(past, tables, t, out):
+def note_jumps(past, places, tables, t, out):
     """At the time of the last entry: what differs from it is a jump, where it is large enough, else the entry."""
-    layout, k = tables.layout[0], int(past[COUNT]) - 1
-    sizes = clock_of(past, k)[4]
-    mask = int(past[CAPACITY]) - 1
-    greatest = past[GREATEST]
-    for i in range(tables.delays.size):
-        line = tables.delays[i]
-        pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
-        for side in range(2):
-            s = line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
-            old = past[stretch_at(past, s) + 2 * (k & mask) + side] + jumps_until(
-                past, jumps_at(past, s, side), INFINITE
-            )
-            greatest = max(greatest, abs(out[at + 3 * side] - old) / pipe["admittance"])
-    past[GREATEST] = greatest
-    for i in range(tables.delays.size):
-        line = tables.delays[i]
-        pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
-        for side in range(2):
-            s = line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
-            new, where = out[at + 3 * side], jumps_at(past, s, side)
-            old = past[stretch_at(past, s) + 2 * (k & mask) + side] + jumps_until(past, where, INFINITE)
-            if abs(new - old) > enough(past, tables, pipe):
-                push_jump(past, where, t, new - old)
-            write(past, sizes, s, k, side, new)
+    k, ends = int(past[COUNT]) - 1, tables.layout[0]["ends"]
+    for notes in range(2):  # the greatest first
+        for i in range(tables.delays.size):
+            line = tables.delays[i]
+            pipe, at = tables.pipes[line["pipe"]], ends + 4 * line["pipe"]
+            for side in range(2):
+                q, new = line["stretches"] - 1 if side == 1 else 0, out[at + 3 * side]
+                ring, mask = ring_of(places, line, q)
+                jumps = jumps_at(places, line["stretch"] + q, side)
+                old = past[ring + 2 * (k & mask) + side] + jumps_until(past, places, jumps, INFINITE)
+                if notes == 0:
+                    past[GREATEST] = max(past[GREATEST], abs(new - old) / pipe["admittance"])
+                    continue
+                if abs(new - old) > enough(past, tables, pipe):
+                    keep(past, places, line["stretch"] + q, side, t, new - old, pipe)
+                write(past, places, line, q, k, side, new)
 
 
 @njit
 def record_lines(t, y, out, handle, values):
-    """Keep what was sent into all delay lines, and pass on the jumps that have arrived, after every accepted step."""
+    """After an accepted step: keep what was sent into all lines, pass on jumps that have arrived, widen envelopes."""
     tables = open_tables(handle)
-    past, layout = tables.past, tables.layout[0]
-    k = int(past[COUNT])
+    past, k, places, delays = tables.past, int(tables.past[COUNT]), places_of(tables.past), tables.delays
     if k > 0:
         last = time_of(past, k - 1)
         if t <= last + same_time(past):
-            if t >= last - same_time(past):
-                note_jumps(past, tables, last, out)
+            if past[MENDED] == last:
+                write_ends(past, places, tables, k - 1, out)
+            elif t >= last - same_time(past):
+                note_jumps(past, places, tables, last, out)
+            widen_all(t, places, tables)
             return
     if k == 0:  # what is sent from the start on, as from rest, is a jump: nothing was before
         begin_entry(past, t)
-        note_jumps(past, tables, t, out)
+        note_jumps(past, places, tables, t, out)
+        widen_all(t, places, tables)
         return
-    before, place = time_of(past, k - 1), arrivals_at(past)
-    arrive_at_joints(past, tables, t)
-    for i in range(tables.delays.size):
-        for s in range(tables.delays[i]["stretch"], tables.delays[i]["stretch"] + tables.delays[i]["stretches"]):
-            for wave in range(2):
-                where = jumps_at(past, s, wave)
-                if past[where + ARRIVED] > 0.0:
-                    forget_jumps(past, where, before - tables.delays[i]["hold"] - same_time(past))
-    pass_jumps(past, tables, t, y, out, handle)
-    entry, delays, ends = begin_entry(past, t), tables.delays, layout["ends"]
-    sizes = clock_of(past, entry)[4]
+    arrive_at_joints(past, places, tables, t)
+    if past[LIVE] > 0.0:
+        forget_all(past, places, delays, time_of(past, k - 1))
+        pass_jumps(past, places, tables, t, y, out, handle)
+        arrive_at_joints(past, places, tables, t)  # again, where nodes were closed without a jump
+    entry, ends = begin_entry(past, t), tables.layout[0]["ends"]
+    clock = clock_of(past, entry)
+    if past[MENDED] != past[MENDED]:
+        past[MENDED], out[STATUS] = t, AMENDED
     for i in range(delays.size):
         line = delays[i]
-        at, first, last = ends + 4 * line["pipe"], line["stretch"], line["stretch"] + line["stretches"] - 1
-        write(past, sizes, first, entry, 0, out[at])
-        write(past, sizes, last, entry, 1, out[at + 3])
-        for q in range(line["stretches"] - 1):
-            joint = place + 3 * (first + q)
-            write(past, sizes, first + q + 1, entry, 0, past[joint + 1])
-            write(past, sizes, first + q, entry, 1, past[joint + 3])
+        at, last = ends + 4 * line["pipe"], line["stretches"] - 1
+        write(past, places, line, 0, entry, 0, out[at])
+        write(past, places, line, last, entry, 1, out[at + 3])
+        for q in range(last):
+            joint = places[0] + ARRIVALS * (line["stretch"] + q)
+            write(past, places, line, q + 1, entry, 0, past[joint + 1])
+            write(past, places, line, q, entry, 1, past[joint + ARRIVALS])
+        widen_line(t, places, clock, tables, i)
+
+
+@njit(forceinline=True)
+def widen_line(t, places, clock, tables, which):
+    """Envelopes along a line at the time of the last entry, and when it first falls below vapour pressure."""
+    line, envelope = tables.delays[which], tables.envelope
+    n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
+    r, l, low, high = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0
+    for j in range(n):
+        r[j], l[j] = sketch(t, tables.past, places, clock, line, (j + 0.5) / n)
+        s = r[j] + l[j]
+        low += not s >= envelope[0, cell + j]
+        high += not s <= envelope[2, cell + j]
+    if low + high > 0:
+        note(t, r, l, cell, low, high, line["pipe"], tables)
 
 
 @njit
-def record_places(t, y, out, handle, values):
-    """Envelopes along delay lines, and when they first fall below vapour pressure, after every accepted step."""
-    tables = open_tables(handle)
+def widen_all(t, places, tables):
+    """Envelopes along all lines."""
+    clock = clock_of(tables.past, int(tables.past[COUNT]) - 1)
     for i in range(tables.delays.size):
-        line = tables.delays[i]
-        n = line["places"]
-        r, l = tables.scratch[:n], tables.scratch[n : 2 * n]
-        sketch_line(t, tables, i, r, l)
-        record_pipe(t, r, l, tables.pipes[line["pipe"]], line["pipe"], tables)
+        widen_line(t, places, clock, tables, i)
+
+
+@njit
+def write_ends(past, places, tables, entry, out):
+    """Keep what nodes send once more."""
+    for i in range(tables.delays.size):
+        line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
+        write(past, places, line, 0, entry, 0, out[at])
+        write(past, places, line, line["stretches"] - 1, entry, 1, out[at + 3])
+
+
+@njit
+def forget_all(past, places, delays, before):
+    """Take out of all lists what had arrived before a time, and is not asked for any more."""
+    for i in range(delays.size):
+        line = delays[i]
+        for s in range(line["stretch"], line["stretch"] + line["stretches"]):
+            for at in range(jumps_at(places, s, 0), jumps_at(places, s + 1, 0), HEADS):
+                if past[at + ARRIVED] > 0.0:
+                    forget_jumps(past, places, at, before - line["hold"] - same_time(past))

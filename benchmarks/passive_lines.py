@@ -1,0 +1,95 @@
+"""Delay lines in random networks: does anything grow? `python benchmarks/passive_lines.py [N]`, 1 000 of each kind.
+
+Trees of 3 to 6 junctions with one loop, pipes of 2 to 200 m, so that a good half is shorter than a step; a demand stops
+at once or in 50 ms. Printed is the energy of all waves, and of a chamber, 11 s later over that 1 s after it: lossless
+1, but for what reading between steps takes of the shortest waves; with friction or a valve below. Networks with a
+chamber run by rk4, ssp-rk2 or the trapezoidal rule, and once more by Euler, where they grow: those of which a notice
+says that they are not to be trusted are counted apart.
+"""
+
+import sys
+from time import perf_counter
+
+import numpy as np
+from measure import machine
+
+import fvsolve
+from fvsolve.case import load
+from fvsolve.model.build import build
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
+
+LAKE, FLOW, BEGIN, END = 6e6, 0.05, 1.0, 12.0
+METHODS = ("euler", "rk4", "ssp-rk2", "trapezoid")
+
+
+def network(random, kind):
+    """A case: its numbers drawn, parts of that kind added."""
+    many = int(random.integers(3, 7))
+
+    def pipe(a, b, shortest=2.0):
+        part = {"type": "pipe", "from": a, "to": b, "diameter": float(random.uniform(0.1, 0.5)), "wave_speed": 1200.0,
+                "length": float(np.exp(random.uniform(np.log(shortest), np.log(200.0)))), "cells": 40}  # fmt: skip
+        if kind == "friction":
+            part["friction"] = {"model": "steady", "factor": float(random.uniform(0.01, 0.05))}
+        return part
+
+    nodes = {f"n{i}": {"type": "junction"} for i in range(many)} | {"lake": {"type": "reservoir", "pressure": LAKE}}
+    last = float(random.choice([0.0, 0.05]))
+    stop = {"start": 0.1, "duration": last, "value": [FLOW, 0.0]}
+    nodes["n0"]["demand"] = stop if last else {"time": [0.0, 0.1], "value": [FLOW, 0.0], "kind": "step"}
+    links = {"l0": pipe("lake", f"n{many - 1}", 20.0)}
+    links |= {f"p{i}": pipe(f"n{i}", f"n{i + 1}") for i in range(many - 1)}
+    a, b = random.choice(many, 2, replace=False)
+    links["loop"] = pipe(f"n{a}", f"n{b}")
+    if kind == "valve":
+        nodes["sink"] = {"type": "reservoir", "pressure": 1e5}
+        links["tap"] = {"type": "valve", "from": f"n{random.integers(many)}", "to": "sink", "area": 1e-4}
+    if kind == "chamber":
+        nodes["vessel"] = {"type": "chamber", "volume": float(random.uniform(0.5, 5.0))}
+        links["neck"] = pipe(f"n{random.integers(many)}", "vessel")
+    numerics = {"line": "delay", "end": END, "step": float(random.choice([0.004, 0.01, 0.025]))}
+    numerics["method"] = str(random.choice(METHODS))
+    return {
+        "schema": 1, "title": kind, "fluid": {"name": "Water", "law": "linear", "temperature": "20 degC"},
+        "nodes": nodes, "links": links, "numerics": numerics,
+        "output": {"every": END, "fields": 0, "probes": []},
+    }  # fmt: skip
+
+
+def energy(case, end):
+    """Energy of waves and flow at the end of a run, pressures from the lake's [J]; the run's verdict."""
+    model = build(load(case, {"numerics.end": end}))
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), None)
+    ended = run.go()
+    out = run.slate.evaluate(run.loop.t, run.loop.now, np.inf)[1]
+    pipes, nodes, total = model.tables.pipes, model.tables.nodes, 0.0
+    for line, (ahead, back) in zip(model.tables.delays, run.slate.along(run.loop.t, out).values(), strict=True):
+        pipe = pipes[line["pipe"]]
+        ahead, back = ahead + 0.5 * pipe["flow"], back - 0.5 * pipe["flow"]
+        length = float(pipe["speed"] * line["tau"] * line["stretches"])
+        total += float(np.mean(ahead**2 + back**2)) * length / float(pipe["area"])
+    stores = nodes[(nodes["y"] >= 0) & (nodes["stiffness"] > 0.0)]
+    total += 0.5 * float(np.sum(stores["stiffness"] * run.loop.now[stores["y"]] ** 2))
+    return total / 1000.0, ended.ok
+
+
+def main():
+    """Print the worst of each kind."""
+    many = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    print(machine("numpy", "numba"))
+    for kind in ("lossless", "friction", "valve", "chamber", "chamber by Euler"):
+        random, begun, ratios, told = np.random.default_rng(11), perf_counter(), np.zeros(many), 0
+        for k in range(many):
+            case = network(random, kind.split()[0])
+            if kind.startswith("chamber"):
+                case["numerics"]["method"] = "euler" if "Euler" in kind else str(random.choice(METHODS[1:]))
+            early, (late, ok) = energy(case, BEGIN)[0], energy(case, END)
+            ratios[k] = late / early if ok else 0.0
+            told += not ok
+        print(f"{kind:18} {many} networks: {np.median(ratios):.4f} (median), {ratios.max():.4f} (worst, network "
+              f"{np.argmax(ratios)}); {told} told as wrong; {perf_counter() - begun:.0f} s", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""What a store gives back of a delay line's wave: what is predicted to grow does, and nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from model.test_delay_lines import vessel
+
+import fvsolve
+from fvsolve.limits.lines import ANGLES, given_back, read
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
+from fvsolve.steppers.tableau import method_named
+
+
+def test_the_trapezoidal_rule_gives_back_what_comes():
+    """By hand: S = (a cos(theta / 2) - 2 i sin(theta / 2)) / (a cos(theta / 2) + 2 i sin(theta / 2))."""
+    for a in (0.1, 1.0, 7.0):
+        found = given_back(method_named("trapezoid"), a, 5.0) / read(5.0)
+        c, s = a * np.cos(0.5 * ANGLES), 2j * np.sin(0.5 * ANGLES)
+        assert found == pytest.approx((c - s) / (c + s), abs=1e-12)
+
+
+def test_euler_gives_back_more_at_every_angle():
+    """By hand: |S|^2 = ((a - u)^2 + v^2) / ((a + u)^2 + v^2), u + i v = exp(i theta) - 1."""
+    for a in (0.1, 0.7):
+        z = np.exp(1j * ANGLES) - 1.0
+        right = np.abs((a - z) / (a + z))
+        assert np.abs(given_back(method_named("euler"), a, 4.0)) == pytest.approx(right, rel=1e-12)
+        assert (right > 1.0).all()
+
+
+def test_reading_between_steps_magnifies_nothing():
+    for steps in (1.2, 1.5, 2.5, 2.9, 3.1, 7.5):
+        assert np.abs(read(steps)).max() <= 1.0 + 1e-12
+
+
+def energy(case: dict) -> tuple[float, list]:
+    """Of waves, flow and the chamber at the end of a run, pressures from the lake's [J m3/kg]; what it was told."""
+    model = fvsolve.build(fvsolve.load(case))
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), None)
+    warnings = run.go().warnings
+    out = run.slate.evaluate(run.loop.t, run.loop.now, np.inf)[1]
+    total = 0.5 * float(model.tables.nodes["stiffness"].max()) * float(run.loop.now[-1]) ** 2
+    for line, (r, l) in zip(model.tables.delays, run.slate.along(run.loop.t, out).values(), strict=True):  # noqa: E741
+        pipe = model.tables.pipes[line["pipe"]]
+        r, l = r + 0.5 * pipe["flow"], l - 0.5 * pipe["flow"]  # noqa: E741
+        total += float(np.mean(r**2 + l**2) * line["tau"] * line["stretches"] * pipe["speed"] / pipe["area"])
+    return total, [one for one in warnings if "bring back" in one.text]
+
+
+@pytest.mark.parametrize("method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "heun", "ssp-rk3"])
+@pytest.mark.parametrize("volume", [0.6, 0.15])
+def test_what_is_told_to_grow_grows(method, volume):
+    """After 30 s beside after 1 s, without friction; a step takes 0.24 and 0.96 of the time that fills the chamber.
+
+    Jumps that reach it within steps leave some energy of their own, at the longer of these a seventh.
+    """
+    (early, _), (late, told) = (energy(vessel(method, 0.01, end, volume, 200)) for end in (1.0, 30.0))
+    if any(not one.ok for one in told):
+        assert late > 1e3 * early
+    elif not told:
+        assert late < 1.2 * early
