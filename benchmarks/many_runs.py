@@ -11,7 +11,7 @@ import time
 
 from fvsolve import build, load, run, vary
 from fvsolve.studies.many import many
-from fvsolve.studies.row import Rows
+from fvsolve.studies.row import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
@@ -43,7 +43,7 @@ def told(name: str, seconds: float, goal: float | None = None) -> None:
 
 def by(base: dict, name: str, goal: float | None) -> None:
     """Ways to the same numbers."""
-    model, rows = build(load(CASE, base)), Rows(CASE, base)
+    model, rows = build(load(CASE, base)), RowMaker(CASE, base)
     result = run(model)
     steps, seconds = result.summary["steps"], result.summary["seconds"]
     print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them")
@@ -57,17 +57,17 @@ def dask() -> None:
     """Rows here, and on a worker of Dask's, by the CPU time of either process."""
     from distributed import Client, LocalCluster
 
-    rows, points = Rows(CASE, CELLS), [area(k) for k in range(RUNS)]
+    rows, points = RowMaker(CASE, CELLS), [area(k) for k in range(RUNS)]
     rows(points[0])
     began = time.process_time()
     for _ in many(rows, points):
         pass
     here = (time.process_time() - began) / RUNS
     with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
-        for _ in many(Rows(CASE, CELLS), points[:50], dask=cluster.scheduler_address):
+        for _ in many(RowMaker(CASE, CELLS), points[:50], dask=cluster.scheduler_address):
             pass  # which compiles there
         before, began = sum(client.run(time.process_time).values()), time.process_time()
-        for _ in many(Rows(CASE, CELLS), points, dask=cluster.scheduler_address):
+        for _ in many(RowMaker(CASE, CELLS), points, dask=cluster.scheduler_address):
             pass
         there = (sum(client.run(time.process_time).values()) - before) / RUNS
         beside = (time.process_time() - began) / RUNS

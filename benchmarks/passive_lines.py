@@ -43,7 +43,7 @@ def network(random, kind):
     a, b = random.choice(many, 2, replace=False)
     links["loop"] = pipe(f"n{a}", f"n{b}")
     if kind == "valve":
-        nodes["sink"] = {"type": "reservoir", "pressure": 1e5}
+        nodes["sink"] = {"type": "reservoir", "pressure": LAKE}
         links["tap"] = {"type": "valve", "from": f"n{random.integers(many)}", "to": "sink", "area": 1e-4}
     if kind == "chamber":
         nodes["vessel"] = {"type": "chamber", "volume": float(random.uniform(0.5, 5.0))}

@@ -78,12 +78,15 @@ def door(**kinds: Kind) -> Callable:
 
     def guarded(function: Callable) -> Callable:
         signature = inspect.signature(function)
+        order, defaults = [*signature.parameters], {name: one.default for name, one in signature.parameters.items()}
 
         @functools.wraps(function)
         def checked(*given, **named):
-            for name, value in signature.bind(*given, **named).arguments.items():
+            if len(given) > len(order) or not named.keys() <= defaults.keys():
+                signature.bind(*given, **named)  # says what is wrong of it
+            for name, value in (*zip(order, given, strict=False), *named.items()):
                 kind = kinds.get(name)
-                if kind is not None and value is not signature.parameters[name].default and not kind.holds(value):
+                if kind is not None and value is not defaults[name] and not kind.holds(value):
                     said = f"{name} = {show(value)}" + (" cannot be called" if kind is CALL else "")
                     raise FvsolveError(f"{said}; wanted {kind.wanted}")
             return function(*given, **named)

@@ -107,6 +107,7 @@ class Function:
         self.targetoptions = {"nopython": True, "boundscheck": None} | options  # which numba looks for by that name
         self.__code__, self.__defaults__ = function.__code__, function.__defaults__
         self.codes: dict[str, Code] = {}  # by kinds of arguments, behind a dot without doors
+        self.of_numbers: dict[tuple, Callable] = {}  # what Python calls, by types of arguments that are numbers all
         self.declared: Declared | None = None
 
     @functools.cached_property
@@ -146,11 +147,16 @@ class Function:
     def __call__(self, *given: Any) -> Any:
         if self.declared is not None:
             return self.declared(*given)
+        if (python := self.of_numbers.get(kinds := tuple(map(type, given)))) is not None:
+            return python(*given)
         try:
             letters = "".join(map(letter_of, given))
         except KeyError:  # of a kind that has no letter
             return self.numba(*given)
-        return self.code(letters, lambda: tuple(map(_numba().typeof, given))).python(*given)
+        python = self.code(letters, lambda: tuple(map(_numba().typeof, given))).python
+        if LETTERS.keys() >= set(kinds):
+            self.of_numbers[kinds] = python
+        return python(*given)
 
     def code(self, letters: str, kinds: Callable[[], tuple], doors: bool = True) -> Code:
         """Its machine code for arguments of these kinds, with doors for Python and C or for compiled code alone."""

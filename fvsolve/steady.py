@@ -183,13 +183,13 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
         right[len(rows) : len(rows) + len(balances)] = demand[balances] / f_scale
         np.subtract.at(right, to, signs * result.flow[of] / f_scale)
         change = _solve(i, j, np.concatenate((found, constant)), right, len(column), result)
-        if not np.all(np.isfinite(change)):  # what was found last is the best there is
+        if not np.isfinite(change).all():  # what was found last is the best there is
             result.converged = False
             return
         result.flow[active] += change[: len(active)] * f_scale
         result.potential[nodes] += change[len(active) :] * p_scale
-        before, most = most, np.max(np.abs(change), initial=0.0)
-        if most <= 1e-15 * (1.0 + np.max(np.abs(result.flow), initial=0.0) / f_scale) or (sweep > 20 and most < 1e-12):
+        before, most = most, np.abs(change).max(initial=0.0)
+        if most <= 1e-15 * (1.0 + np.abs(result.flow).max(initial=0.0) / f_scale) or (sweep > 20 and most < 1e-12):
             return
         if before <= 2.0 * most < ROUNDING:  # no closer: what is left is rounding
             return
@@ -231,7 +231,7 @@ def _edge_row(found, columns, e, edge, result, scale) -> float:
 
 def _solve(i, j, values, right, size, result):
     """Least-norm solution of the Newton system; remembers whether it had to choose."""
-    if not (np.all(np.isfinite(values)) and np.all(np.isfinite(right))):
+    if not (np.isfinite(values).all() and np.isfinite(right).all()):
         return np.full(size, np.nan)
     if max(len(right), size) > DENSE:
         found, chosen = _solve_sparse(values, i, j, right, size)
@@ -242,7 +242,7 @@ def _solve(i, j, values, right, size, result):
     if len(right) == size:
         try:
             found = np.linalg.solve(matrix, right)
-            if np.all(np.isfinite(found)) and np.max(np.abs(matrix @ found - right)) < 1e-6:
+            if np.isfinite(found).all() and np.abs(matrix @ found - right).max() < 1e-6:
                 return found
         except np.linalg.LinAlgError:
             pass

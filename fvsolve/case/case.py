@@ -157,7 +157,7 @@ class Case(Shown):
         """What it says beyond what practice knows."""
         return ranges.notices(self)
 
-    @property
+    @cached_property
     def elevations_stated(self) -> bool:
         """Whether the places of the fluid state elevations."""
         return any(place.elevation is not None for place in self.places.values())
@@ -179,6 +179,11 @@ class Case(Shown):
                 if self.places[other].elevation is not None:
                     return self.places[other].elevation
         return 0.0
+
+    @cached_property
+    def elevations(self) -> dict[str, float]:
+        """Heights of all places of the fluid above datum [m]."""
+        return {name: self.elevation(name) for name in self.places}
 
     def wave_speed(self, name: str) -> float:
         """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho), 1/K = 1/beta + diameter / (E wall)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from fvsolve import exact, units
 from fvsolve.case import basins, bodies, check, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
+from fvsolve.case.moved import moved
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
@@ -92,7 +93,11 @@ def crossing(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) ->
 
 def _alternatives() -> list[tuple[str, ...]]:
     """Keys of which a table has one at most, over all tables."""
-    models = [Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()]
+    return _alternatives_of((Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()))
+
+
+@functools.lru_cache(maxsize=4)
+def _alternatives_of(models: tuple) -> list[tuple[str, ...]]:
     return list(dict.fromkeys(keys for model in models for keys in model.alternatives))
 
 
@@ -101,12 +106,16 @@ class _Reader:
 
     def __init__(self, raw: Raw, settings: Mapping[str, Any], before: Case | None = None):
         self.raw, self.before = raw, before
-        self.faults: list[Fault] = override(raw, settings, _alternatives())
+        self.refused: list[Fault] = override(raw, settings, _alternatives())  # settings that cannot be made
+        self.faults = self.refused[:]
         self.setting = Setting(folder=raw.folder)
         self.read: dict[tuple, tuple[Any, Any]] = {}  # place -> (what stands there, what it was read as)
         self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
 
     def case(self) -> Case:
+        if (made := moved(self)) is not None:
+            return made
+        self.faults, self.setting, self.read = self.refused[:], Setting(folder=self.raw.folder), {}
         top = self.top()
         if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
             self.before = None  # all that is gauge is other
@@ -156,8 +165,7 @@ class _Reader:
         self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         if None not in (numerics, output, properties) and not self.faults:
-            self.add(size.misfits(numerics, output, links, meshes))
-            self.add(size.standstill(numerics, crossing(links, meshes, properties)))
+            self.add(self.sizes(numerics, output, links, meshes, properties))
         named = self.table("exact", ExactSpec) if "exact" in self.raw.table else None
         self.stop()
         made = Case(
@@ -184,6 +192,11 @@ class _Reader:
             **top,
         )
         return made if named is None else self.exact(made)
+
+    def sizes(self, numerics, output, links, meshes, properties) -> Iterator[tuple[tuple, str]]:
+        """Faults of counts, and of steps that would not move the time."""
+        yield from size.misfits(numerics, output, links, meshes)
+        yield from size.standstill(numerics, crossing(links, meshes, properties))
 
     def exact(self, made: Case) -> Case:
         """The case, if what it names under [exact] holds; settings that leave it no exact solution take that out."""
@@ -415,7 +428,8 @@ class _Reader:
                 f"would cut {worst} into {counts[worst]:.3g} cells; {MOST_CELLS:.0e} at most",
             )
             return links
-        filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()}
+        filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()
+                  if count != links[name].cells}  # fmt: skip
         return {name: filled.get(name, link) for name, link in links.items()}
 
     def probe(self, given: Any, keys: tuple, kinds: dict) -> Probe | None:

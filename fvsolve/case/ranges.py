@@ -11,6 +11,8 @@ from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, Usual
 from fvsolve.units import DIMENSIONS
 
+MOST_LOOKED = 10_000  # parts that are remembered
+LOOKED: dict[int, tuple[Table, Any, list]] = {}  # id -> part, what its file says, what is odd in it
 TOP = {  # keys that stand in no table: fields of a case
     "ambient_pressure": Quantity("pressure", usual=Usual(3e4, 2e6, "mountains to deep caissons")),
     "gravity": Quantity("acceleration", usual=Usual(1.0, 30.0, "the Moon to Jupiter")),
@@ -24,7 +26,17 @@ def notices(case: Any) -> list[Notice]:
     found = [_notice((), (key,), case, *odd) for key, value in TOP.items()
              if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
     return found + [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
-                    for odd in _of_table(part, _said(case.raw, place))]  # fmt: skip
+                    for odd in _of_part(part, _said(case.raw, place))]  # fmt: skip
+
+
+def _of_part(part: Table, said: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:
+    """What is odd in a part, looked for once while it is the same and its file says the same."""
+    known = LOOKED.get(id(part))
+    if known is None or known[0] is not part or known[1] is not said:
+        if len(LOOKED) >= MOST_LOOKED:
+            LOOKED.clear()
+        known = LOOKED[id(part)] = part, said, [*_of_table(part, said)]
+    return known[2]
 
 
 def _of_table(table: Table, said: Any) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

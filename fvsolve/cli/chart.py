@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet
 
@@ -27,6 +27,8 @@ def chart(
     ] = None,
     target: Annotated[float | None, typer.Option(metavar="ERROR", help="print the lines for [numerics]")] = None,
     models: Annotated[bool, typer.Option("--models", help="models of the scene in place of methods")] = False,
+    jobs: Jobs = 1,
+    dask: Dask = None,
     set: Set = [],  # noqa: B006
     out: Out = None,
     as_json: Json = False,
@@ -39,7 +41,8 @@ def chart(
     if target is not None and not 0.0 < target < 1.0:
         raise FvsolveError(f"--target: {target:g} is no error; wanted a part of the range, above 0 and below 1")
     if models:
-        _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, out=out)
+        several = None if jobs == 1 else jobs
+        _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several, dask=dask, out=out)
         from fvsolve.cli.models import show_models
         from fvsolve.studies.accuracy.models import TARGET
 
@@ -47,7 +50,8 @@ def chart(
     folder = folder_of(found, "chart", out)
     sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
     with told() as progress:
-        made = study(found, None, listed(scheme, "--scheme"), methods_of(method), *sizes, target, folder, progress)
+        made = study(found, None, listed(scheme, "--scheme"), methods_of(method), *sizes, target, folder, progress,
+                     jobs, dask)  # fmt: skip
     paths = write(made, folder)
     if as_json:
         print_json(made.plain() | {"files": paths})

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.units import parse
@@ -23,6 +23,8 @@ def map_(
     step: Annotated[str | None, typer.Option(metavar="A,B", help='columns: steps, "1 ms,2 ms"')] = None,
     key: Annotated[str | None, typer.Option(metavar="KEY=A,B", help="columns: values of a key of the case")] = None,
     tolerance: Annotated[float, typer.Option(metavar="X", help="mean error over a probe's range")] = 0.02,
+    jobs: Jobs = 1,
+    dask: Dask = None,
     out: Out = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
@@ -36,7 +38,7 @@ def map_(
     with told() as progress, Points(folder) as points:
         found = failures(
             read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
-            _steps(step), _key(key), tolerance, points, progress,
+            _steps(step), _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip
     files = _written(found, folder)
     if as_json:

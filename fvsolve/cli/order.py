@@ -10,7 +10,7 @@ import typer
 
 from fvsolve.cli import terminal
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
 from fvsolve.output.summary import plain
 from fvsolve.studies.accuracy.picture import NORMS, SHOWN, title, unit
 from fvsolve.studies.sheet import Column, Sheet, columns
@@ -39,6 +39,8 @@ def order(
     scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes, in place of the case's")] = None,
     method: Annotated[str | None, typer.Option(metavar="A,B", help="methods, in place of the case's")] = None,
     against: Annotated[str, typer.Option(help="auto, exact, finer or richardson")] = "auto",
+    jobs: Jobs = 1,
+    dask: Dask = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -50,7 +52,8 @@ def order(
     folder = folder_of(scene, "order", out)
     with told() as progress, Points(folder) as points:
         found = study(scene, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
-                      methods=methods_of(method), against=against, out=points, progress=progress)  # fmt: skip
+                      methods=methods_of(method), against=against, out=points, progress=progress,
+                      jobs=jobs, dask=dask)  # fmt: skip
     found = found if isinstance(found, list) else [found]
     files = [Sheet(FILE, [*lines(found)]).write(folder / "order.csv"), *draw(folder, found)]
     if as_json:

@@ -7,11 +7,8 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, told
-from fvsolve.cli.sweep import Dask, Jobs, Seed, values_of
-from fvsolve.errors import FvsolveError
-
-RANGE = "KEY=LOW,HIGH, for example links.main.wave_speed=900,1300"
+from fvsolve.cli.studying import Dask, Jobs, Out, Seed, folder_of, told
+from fvsolve.cli.sweep import ranges
 
 
 @app.command()
@@ -68,15 +65,6 @@ def fit(
 
     for doubt in made.doubts:
         terminal.line(terminal.console(), doubt, "yellow")
-
-
-def ranges(texts: list[str], option: str) -> dict[str, list]:
-    """`KEY=LOW,HIGH` of each key."""
-    found = [values_of(text, option, RANGE) for text in texts]
-    twice = [key for key, _ in found if [one for one, _ in found].count(key) > 1]
-    if twice:
-        raise FvsolveError(f"{option} {twice[0]} is given twice; keep one")
-    return dict(found)
 
 
 def show(made, last: str) -> None:

@@ -10,7 +10,7 @@ import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.linearise import At, Before, time_of
-from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
 from fvsolve.studies.sheet import Column, Sheet, columns
 
 PICTURES = 12  # pairs beyond which no picture is drawn
@@ -33,12 +33,15 @@ def stability(
     courant: Annotated[float | None, typer.Option(help="without a case: growth at this Courant number")] = None,
     at: At = None,
     before: Before = False,
+    jobs: Jobs = 1,
+    dask: Dask = None,
     out: Out = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
     """The greatest safe step of a case, predicted and measured, and what bounds say of it."""
-    refuse(case, {"--set": set, "--at": at, "--before": before}, {"--cells": cells, "--courant": courant})
+    of_a_case = {"--set": set, "--at": at, "--before": before, "--jobs": jobs if jobs != 1 else None, "--dask": dask}
+    refuse(case, of_a_case, {"--cells": cells, "--courant": courant})
     if case is None:
         from fvsolve.cli.grid import without_case
 
@@ -59,6 +62,8 @@ def stability(
             steps or STEPS,
             out=folder,
             progress=progress,
+            jobs=jobs,
+            dask=dask,
         )
     table = Sheet(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in found.rows])
     files = [table.write(folder / "stability.csv").name]

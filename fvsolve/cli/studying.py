@@ -17,6 +17,9 @@ from fvsolve.errors import FvsolveError, visible
 NOW_AND_THEN = 10.0  # between two lines of progress where no terminal listens [s]
 
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="folder of tables and pictures")]
+Jobs = Annotated[int, typer.Option(metavar="N", help="runs at a time, each in a process of its own")]
+Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="scheduler whose workers run: tcp://10.0.0.1:8786")]
+Seed = Annotated[int, typer.Option(metavar="N", help="which of all samples")]
 
 
 def listed(text: str | None, option: str = "") -> list[str] | None:

@@ -10,20 +10,18 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Out, folder_of, told, writable
+from fvsolve.cli.studying import Dask, Jobs, Out, Seed, folder_of, told, writable
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
     list[str], typer.Option("--set", metavar="KEY=a,b,c", help="values of a key, one run each; one value holds for all")
 ]
 Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="ends of a key, for --sample")]
-Jobs = Annotated[int, typer.Option(metavar="N", help="runs at a time, each in a process of its own")]
-Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="scheduler whose workers run: tcp://10.0.0.1:8786")]
 Outcomes = Annotated[
     list[str], typer.Option("--outcome", metavar="max(PROBE)", help="what is charted, in place of all extremes")
 ]
-Seed = Annotated[int, typer.Option(metavar="N", help="which of all samples")]
 WANTED = "KEY=a,b,c, for example links.main.cells=100,200,400"
+RANGE = "KEY=LOW,HIGH, for example links.main.length=900,1000"
 SHOWN = 6  # columns of a table on a terminal, beside the keys
 MOST = 100  # rows of it
 
@@ -51,7 +49,9 @@ def sweep(
 
     given = dict(values_of(text) for text in set)
     fixed = {key: values[0] for key, values in given.items() if len(values) == 1}
-    moved = {key: values for key, values in given.items() if key not in fixed} | ranges_of(vary, sample)
+    if vary and sample is None:
+        raise FvsolveError(f"--vary {vary[0]}: wants --sample sobol:N beside it; values of a grid are --set KEY=a,b,c")
+    moved = {key: values for key, values in given.items() if key not in fixed} | ranges(vary, "--vary")
     found = load_case(case, [])
     folder = folder_of(found, "sweep", out)
     with told() as progress:
@@ -64,11 +64,13 @@ def sweep(
     sys.exit(0 if all(row["ok"] for row in made.rows) else 1)
 
 
-def ranges_of(texts: list[str], sample: str | None) -> dict[str, list]:
-    """`KEY=LOW,HIGH` as keys and their two ends."""
-    if texts and sample is None:
-        raise FvsolveError(f"--vary {texts[0]}: wants --sample sobol:N beside it; values of a grid are --set KEY=a,b,c")
-    return dict(values_of(text, "--vary", "KEY=LOW,HIGH, for example links.main.length=900,1000") for text in texts)
+def ranges(texts: list[str], option: str) -> dict[str, list]:
+    """`KEY=LOW,HIGH` of each key as its two ends."""
+    found = [values_of(text, option, RANGE) for text in texts]
+    twice = [key for key, _ in found if [one for one, _ in found].count(key) > 1]
+    if twice:
+        raise FvsolveError(f"{option} {twice[0]} is given twice; keep one")
+    return dict(found)
 
 
 def write_charts(made, outcomes: list[str], folder: Path) -> list[Path]:

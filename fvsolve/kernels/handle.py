@@ -12,9 +12,13 @@ from fvsolve.kernels.records import Called
 
 if COMPILING:
 
-    def make_handle(tables: tuple) -> np.ndarray:
-        """int64[3 n]: address, rows and columns of each table."""
-        return np.array([x for a in tables for x in (a.ctypes.data, a.shape[0], a.shape[-1])], dtype=np.int64)
+    def places_of(tables: tuple) -> tuple:
+        """Address, rows and columns of each table, one after the other."""
+        return tuple(x for a in tables for x in (a.ctypes.data, a.shape[0], a.shape[-1]))
+
+    def joined(places: tuple) -> np.ndarray:
+        """int64[3 n]: the handle of tables at these places."""
+        return np.array(places, dtype=np.int64)
 
     @Intrinsic
     def open_tables(typingctx, handle):
@@ -24,10 +28,19 @@ if COMPILING:
         return Tables()(handle), first_word
 else:
 
-    def make_handle(tables: tuple) -> Called:
+    def places_of(tables: tuple) -> tuple:
         """The tables themselves: without compiling there is nothing to copy."""
-        return Called(*tables, *[None] * (len(Called._fields) - len(tables)))
+        return tuple(tables)
+
+    def joined(places: tuple) -> Called:
+        """The handle of these tables."""
+        return Called(*places, *[None] * (len(Called._fields) - len(places)))
 
     def open_tables(handle):
         """The tables behind a handle."""
         return handle
+
+
+def make_handle(tables: tuple):
+    """The handle of these tables."""
+    return joined(places_of(tables))

@@ -6,6 +6,8 @@ crosses q cells a second, s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from fvsolve.kernels.friction import drag_slope
@@ -28,13 +30,21 @@ def rubbed(model) -> Modes:
     """Waves of pipes against friction, at the flow of the start."""
     scheme, found = model.case.numerics.scheme, []
     weights = SCHEMES[scheme].smooth.weights
-    symbols = {n: symbol(weights, PHASES * (1.0 - 0.5 / n)) for n in {mesh.cells for mesh in model.pipes}}
+    symbols = {n: between_ends(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = slope(row)
         if g > 0.0 and row["delay"] < 0:
             z = symbols[mesh.cells]  # between ends no wave is quite two cells long
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
             found.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
+    return found
+
+
+@functools.lru_cache(maxsize=256)
+def between_ends(weights: tuple, n: int) -> np.ndarray:
+    """The symbol of waves between the ends of n cells."""
+    found = symbol(weights, PHASES * (1.0 - 0.5 / n))
+    found.flags.writeable = False
     return found
 
 

@@ -43,6 +43,7 @@ def pipe_limit(scheme: str, method: str, cells: int, returned: tuple[float, ...]
     return low
 
 
+@functools.lru_cache(maxsize=4096)
 def pipe_growth(scheme: str, method: str, cells: int, courant: float, returned: tuple[float, ...] = WORST) -> float:
     """By how much more than one the fastest mode is multiplied in a step; below zero where all decay."""
     r = stability_function(method_named(method))

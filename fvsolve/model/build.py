@@ -75,7 +75,7 @@ def fill_places(draft: Draft) -> None:
     table["y"] = table["shape"] = table["schedule"] = table["row"] = table["ride"] = -1
     table["full"] = np.inf
     for row, (name, node) in zip(table, draft.case.places.items(), strict=True):
-        row["elevation"] = draft.case.elevation(name)
+        row["elevation"] = draft.case.elevations[name]
         lowering_of(type(node)).place(draft, name, node, row)
 
 
@@ -219,7 +219,7 @@ def model_of(draft: Draft) -> Model:
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,
         draft.mass_names, draft.body_names, draft.bushing_names,
-        {name: case.elevation(name) for name in case.places}, case.probes, draft.warnings,
+        dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         draft.basins,
     )  # fmt: skip

@@ -15,7 +15,7 @@ from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.device import Device
 from fvsolve.model.hydraulics import Hydraulics
-from fvsolve.model.lowering import Lowering, rows_in
+from fvsolve.model.lowering import Lowering, lowered
 from fvsolve.model.model import PipeMesh
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.slate import LINE, lined
@@ -76,6 +76,7 @@ class Draft:
     events: list[tuple[str, str]] = field(default_factory=list)  # (what, what it means); "": nothing to a reader
     meshes: list[PipeMesh] = field(default_factory=list)
     basins: list[Any] = field(default_factory=list)
+    links: dict[str, list[tuple]] = field(default_factory=dict)  # table -> links that fill it, see `model.lowering`
     followed: dict[str, Any] = field(default_factory=dict)  # pipe -> by cells or as a delay line, see `model.delay`
 
     # rows
@@ -114,6 +115,7 @@ class Draft:
         case = self.case
         self.fluid, self.hydraulics = case.properties, Hydraulics(case)
         self.warnings += case.notes
+        self.links = lowered(case)
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
@@ -180,7 +182,7 @@ class Draft:
 
     def fill(self, table: str, record: np.dtype) -> tuple[list[str], np.ndarray]:
         """(names of links, the rows that they fill) of a table."""
-        parts = rows_in(self.case, table)
+        parts = self.links.get(table, [])
         names = [name for name, _, lowering in parts for _ in range(lowering.rows)]
         rows, at = np.zeros(len(names), record), 0
         if table == "valve":

@@ -174,7 +174,15 @@ def lowering_of(part: type) -> Lowering:
 PLAIN = Lowering()  # of what lies in no table
 
 
+def lowered(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
+    """Table -> (name, link, what it is lowered by) of the links that have rows in it, in the order of these."""
+    found: dict[str, list[tuple[str, Any, Lowering]]] = {}
+    for name, link in case.conduits.items():
+        lowering = lowering_of(type(link)).of(link)
+        found.setdefault(lowering.table, []).append((name, link, lowering))
+    return {table: sorted(rows, key=lambda one: one[2].rank) for table, rows in found.items()}
+
+
 def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
-    """(name, link, what it is lowered by) of the links that have rows in a table, in the order of these."""
-    links = ((name, link, lowering_of(type(link)).of(link)) for name, link in case.conduits.items())
-    return sorted((one for one in links if one[2].table == table), key=lambda one: one[2].rank)
+    """Those of one table."""
+    return lowered(case).get(table, [])

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.kernels import records as rec
 from fvsolve.model.bodies_start import rounding
-from fvsolve.model.lowering import Lowering, rows_in
+from fvsolve.model.lowering import Lowering
 from fvsolve.model.mechanism import add_line, apart
 
 BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
@@ -35,7 +35,7 @@ def lower_masses(draft) -> None:
     case = draft.case
     draft.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
     draft.mass_index = {name: i for i, name in enumerate(draft.mass_names)}
-    pushes = [link for table in ("brace", "stop", "piston") for _, link, _ in rows_in(case, table)]
+    pushes = [link for table in ("brace", "stop", "piston") for _, link, _ in draft.links.get(table, ())]
     outside = any(None in ends(link) or spatial(draft, *ends(link)) for link in pushes)
     draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
     draft.mass_index |= {None: len(draft.mass_names)}

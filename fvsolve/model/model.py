@@ -190,6 +190,13 @@ class Model(Shown):
         return bool(self.tables.pipes["terms"].any())
 
     @cached_property
+    def places(self) -> tuple:
+        """Where its tables lie, as handles say it."""
+        from fvsolve.kernels.handle import places_of
+
+        return places_of(self.tables)
+
+    @cached_property
     def functions(self):
         """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
         from fvsolve.basins.lower_pieces import of_basins, of_scalars

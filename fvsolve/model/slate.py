@@ -62,10 +62,11 @@ class Slate:
     @cached_property
     def handle(self) -> np.ndarray:
         """The tables of the model, what is written here, and what there is to call, as compiled functions take them."""
-        from fvsolve.kernels.handle import make_handle
+        from fvsolve.kernels.handle import joined, places_of
 
-        functions = self.model.functions
-        return make_handle((*self.tables, *self.written, functions.calls, functions.hooks))
+        functions, model = self.model.functions, self.model
+        shared = model.places if self.tables is model.tables else places_of(self.tables)
+        return joined((*shared, *places_of((*self.written, functions.calls, functions.hooks))))
 
     @property
     def past(self) -> np.ndarray:
@@ -113,6 +114,8 @@ class Slate:
 
     def arm(self, t: float, y: np.ndarray) -> None:
         """Set the flags of all events to what holds at (t, y); what a device does there can hang on other devices."""
+        if not self.armed.size:
+            return
         g = np.zeros(self.armed.size)
         for _ in range(3 + 2 * len(self.model.events)):
             self.model.functions.events(t, y, self.handle, g)

@@ -39,7 +39,7 @@ class MemorySink:
 
     def end(self, summary) -> None:
         """Keep the envelope."""
-        self._envelope = with_start(summary.envelope, self.model)
+        self._envelope = summary.envelope
 
     def close(self) -> None:
         """Nothing is open."""
@@ -48,10 +48,17 @@ class MemorySink:
         """`float64[rows, 1 + probes]`: time and probes in the columns' units."""
         return np.concatenate([np.empty((0, 1 + len(self.columns))), *self._blocks])
 
+    @property
+    def last(self) -> np.ndarray:
+        """The last row of the table."""
+        return self._blocks[-1][-1]
+
     def envelope(self) -> dict:
         """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
+        if not self._envelope:  # of a run that never ended
+            return {}
         columns = envelope_columns(self.model.case)
         return {
             pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns}
-            for pipe, arrays in self._envelope.items()
+            for pipe, arrays in with_start(self._envelope, self.model).items()
         }

@@ -65,11 +65,12 @@ def open_run(directory: str | Path) -> Result:
 
 def model_of(case, set: Mapping | None = None):
     """The model of what `run` takes; what cannot start is a fault with its line, as what cannot be read is."""
-    from fvsolve.case import load, located
+    from fvsolve.case import Case, load, located
     from fvsolve.model import Model, build
 
     if not isinstance(case, Model):
-        case = load(case, dict(set or {}))
+        if set or not isinstance(case, Case):
+            case = load(case, dict(set or {}))
         try:
             return build(case)
         except CaseError as error:

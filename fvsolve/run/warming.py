@@ -6,16 +6,15 @@ What is kept, code and fluid properties, lies in the cache folder, which may be 
 from __future__ import annotations
 
 import os
-import signal
 import time
 from collections.abc import Callable, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from fvsolve import jit, store
 from fvsolve.draw.beside import processors
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, RunError
+from fvsolve.run.crew import Crew
 
 LINEAR = ("dense", "banded", "sparse")  # kinds of `steppers.structure`
 STEPS = ("explicit", "diagonal", "full", "linear")  # kinds of methods
@@ -78,43 +77,25 @@ def kept(folder: Path) -> dict[str, int]:
 
 def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str], None]) -> None:
     """Do tasks, each in some process; those that take longest stand first."""
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from multiprocessing import active_children, get_context
-
-    if not tasks:
-        return
-    others, workers = {*active_children()}, []
-    pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=get_context("spawn"))
+    crew, given = Crew(do, min(jobs, len(tasks))), 0
+    progress(0, "compiling")
     try:
-        with _deaf():
-            asked = {pool.submit(do, *task): task for task in tasks}
-            workers += [one for one in active_children() if one not in others]
-        progress(0, "compiling")
-        for count, done in enumerate(as_completed(asked), 1):
-            done.result()
-            kind, name = asked[done]
-            progress(count, Path(name).stem if kind == "case" else f"{kind} {name}".strip())
+        for count in range(len(tasks)):
+            while given < len(tasks) and given - count < crew.room:
+                crew.give(given, [tasks[given]])
+                given += 1
+            at, answers, _ = crew.take()
+            kind, name = tasks[at]
+            if answers is None:
+                raise RunError(f"the process that compiled {kind} {name} has ended; was memory too small?")
+            progress(count + 1, Path(name).stem if kind == "case" else f"{kind} {name}".strip())
     finally:
-        for one in workers:  # they are idle, or what they compile is not wanted any more
-            one.terminate()
-        pool.shutdown(cancel_futures=True)
+        crew.close()
 
 
-@contextmanager
-def _deaf():
-    """Processes that are started meanwhile never hear Ctrl-C, which goes to all of a terminal: this one ends them."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def do(kind: str, name: str) -> None:
+def do(task: tuple[str, str]) -> None:
     """Compile what a task names, in this process."""
+    kind, name = task
     TASKS[kind](name)
 
 

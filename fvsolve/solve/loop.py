@@ -199,6 +199,8 @@ class Loop:
 
         Returns (number, flow [kg/s] that it has lost) of those that had another.
         """
+        if not len(self.model.tables.columns) and not self.armed.size:  # nor is there an event to be noted
+            return []
         found, out, layout = [], self.evaluate(limit), self.model.layout
         while (event := let_go(self.slate, self.t, self.now, out)) is not None:
             before = self.armed.copy()
@@ -242,9 +244,10 @@ def leap_allowed(model: Model, method: Method) -> bool:
     Nor may pipes ride: a body drives their cells beside their waves.
     """
     settings, numerics = model.tables.settings[0], model.case.numerics
-    plain = np.isin(model.tables.pipes["friction"], (rec.FRICTION_NONE, rec.FRICTION_FACTOR)).all()
+    laws = model.tables.pipes["friction"]
     return bool(
         model.case.law.linear and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and plain and model.shapes.armed == 0 and not len(model.tables.rides)
+        and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.rides)
+        and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip

@@ -190,12 +190,13 @@ class Run:
     def widen(self, rows: np.ndarray) -> None:
         """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
         least, t_least, greatest, t_greatest = self.slate.extremes
-        for k in range(rows.shape[1] - 1):
-            low, high = rows[np.argmin(rows[:, k + 1])], rows[np.argmax(rows[:, k + 1])]
-            if low[k + 1] < least[k]:
-                least[k], t_least[k] = low[k + 1], low[0]
-            if high[k + 1] > greatest[k]:
-                greatest[k], t_greatest[k] = high[k + 1], high[0]
+        t, values = rows[:, 0], rows[:, 1:]
+        at, each = values.argmin(axis=0), np.arange(values.shape[1])
+        lower = values[at, each] < least
+        least[lower], t_least[lower] = values[at, each][lower], t[at][lower]
+        at = values.argmax(axis=0)
+        higher = values[at, each] > greatest
+        greatest[higher], t_greatest[higher] = values[at, each][higher], t[at][higher]
 
     def look(self, t: float, y: np.ndarray) -> None:
         """Let what watches basins see a state."""

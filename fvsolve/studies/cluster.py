@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
 import queue
+import threading
+import uuid
 from typing import Any
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import programs
-from fvsolve.studies.crew import done
+from fvsolve.run.crew import done
 
 PATIENCE = 10.0  # s for a scheduler, and for a first worker
 AHEAD = 2  # chunks of each thread: one that is done, one that waits there
@@ -18,7 +21,7 @@ class Cluster:
     """The workers of the scheduler at an address such as "tcp://10.0.0.1:8786"; their program is this one."""
 
     def __init__(self, work: Any, address: str) -> None:
-        self.work, self.address = work, address
+        self.work, self.name, self.address = pickle.dumps(work), uuid.uuid4().hex, address
         self.client = connected(address)
         try:
             agree(self.client, address)
@@ -31,7 +34,7 @@ class Cluster:
 
     def give(self, chunk: int, tasks: list) -> None:
         """Send a chunk."""
-        future = self.client.submit(done, self.work, tasks, pure=False)
+        future = self.client.submit(done_there, self.name, self.work, tasks, pure=False)
         self.given[future] = chunk
         future.add_done_callback(self.ended.put)
 
@@ -65,6 +68,16 @@ class Cluster:
         """Take back what is not done, and leave."""
         self.client.cancel([*self.given], force=True) if self.client.status == "running" else None
         self.client.close()
+
+
+KNOWN = threading.local()  # of a worker's thread: the work that it did last and its name, with what that has read
+
+
+def done_there(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
+    """`done` on a worker."""
+    if getattr(KNOWN, "name", None) != name:
+        KNOWN.name, KNOWN.work = name, pickle.loads(work)
+    return done(KNOWN.work, tasks)
 
 
 def connected(address: str) -> Any:

@@ -39,22 +39,40 @@ class Hands(Protocol):
 
 
 def many(work: Work, tasks: Sequence, jobs: int = 1, dask: str | None = None) -> Iterator[tuple[int, Any]]:
-    """(number, answer) of every task as they are done, the first one here: it compiles what all need.
+    """(number, answer) of every task as they are done; see `Bench`."""
+    with Bench(work, jobs, dask) as bench:
+        yield from bench.do(tasks)
 
-    jobs : processes of this machine; dask : address of a scheduler, in place of these
+
+class Bench:
+    """Who does tasks of one kind, time and again: the first of all this process, which compiles what all need.
+
+    jobs : processes of this machine; dask : address of a scheduler, in place of these. A context: nobody stays.
     """
-    if jobs < 1:
-        raise FvsolveError(f"jobs = {jobs}; wanted 1 or more")
-    alone = dask is None and jobs == 1
-    for number, task in enumerate(tasks if alone else tasks[:1]):
-        yield number, work(task)
-    if alone or len(tasks) < 2:
-        return
-    hands = opened(work, min(jobs, len(tasks) - 1), dask)
-    try:
-        yield from handed(work, tasks, hands)
-    finally:
-        hands.close()
+
+    def __init__(self, work: Work, jobs: int = 1, dask: str | None = None) -> None:
+        if jobs < 1:
+            raise FvsolveError(f"jobs = {jobs}; wanted 1 or more")
+        self.work, self.jobs, self.dask = work, jobs, dask
+        self.alone, self.begun = dask is None and jobs == 1, False
+        self.hands: Hands | None = None
+
+    def do(self, tasks: Sequence) -> Iterator[tuple[int, Any]]:
+        """(number, answer) of every task as they are done."""
+        here = len(tasks) if self.alone else min(len(tasks), int(not self.begun))
+        for number in range(here):
+            self.begun = True
+            yield number, self.work(tasks[number])
+        if here < len(tasks):
+            self.hands = self.hands or opened(self.work, self.jobs, self.dask)
+            yield from handed(self.work, tasks, self.hands, here)
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        if self.hands is not None:
+            self.hands.close()
 
 
 def opened(work: Work, jobs: int, dask: str | None) -> Hands:
@@ -63,17 +81,17 @@ def opened(work: Work, jobs: int, dask: str | None) -> Hands:
         from fvsolve.studies.cluster import Cluster
 
         return Cluster(work, dask)
-    from fvsolve.studies.crew import Crew
+    from fvsolve.run.crew import Crew
 
     return Crew(work, jobs)
 
 
-def handed(work: Work, tasks: Sequence, hands: Hands) -> Iterator[tuple[int, Any]]:
-    """Answers of all tasks but the first.
+def handed(work: Work, tasks: Sequence, hands: Hands, first: int) -> Iterator[tuple[int, Any]]:
+    """Answers of all tasks from `first` on.
 
     What a process was given that ended is given again in halves: all but what ends processes gets done.
     """
-    waiting, again = deque(range(1, len(tasks))), deque()
+    waiting, again = deque(range(first, len(tasks))), deque()
     given: dict[int, list[int]] = {}
     died: dict[int, int] = {}
     size, count = 1, 0  # a row that took no time may stand beside one without end: each has to have shown what it takes

@@ -46,6 +46,10 @@ class Outcome:
     model: object = None
     slate: object = None
 
+    def __getstate__(self) -> dict:
+        """For another process: without the model, which is made there of the same case and keys."""
+        return vars(self) | {"model": None, "slate": None}
+
     @property
     def cell_updates(self) -> int:
         """Calls of the rates times cells (or states, without cells): a cost that no machine changes."""

@@ -28,7 +28,8 @@ class Points:
     def __init__(self, folder: Path | None = None) -> None:
         self.path = None if folder is None else Path(folder) / "points.jsonl"
         self.found: dict[str, dict] = {}
-        self.reused = 0
+        self.before: set[str] = set()  # keys that were asked for and had been found before this study
+        self.fresh: set[str] = set()  # keys that it has found itself
         self.lock = None if folder is None else locked(Path(folder), "a study")
         self.file = None
         if self.path is not None and self.path.is_file():
@@ -57,6 +58,11 @@ class Points:
         if self.lock is not None:
             let_go(self.lock)
 
+    @property
+    def reused(self) -> int:
+        """How many points that were asked for had been found before."""
+        return len(self.before)
+
     def get(self, case, extra: dict, make: Callable[[], dict]) -> dict:
         """What was found for a case and settings, made now where it is new; None stands for what is not finite."""
         known = self.find(case, extra)
@@ -69,12 +75,14 @@ class Points:
     def known(self, key: str) -> dict | None:
         """What was found before under a key, or None."""
         known = self.found.get(key)
-        self.reused += known is not None
+        if known is not None and key not in self.fresh:
+            self.before.add(key)
         return known
 
     def keep(self, key: str, of: Any, made: dict) -> dict:
         """What was found under a key, kept from now on; RunError where the disk does not take it."""
         made = self.found[key] = plain(made)
+        self.fresh.add(key)
         if self.path is not None:
             line = json.dumps({"key": key, "of": plain(of), "found": made}) + "\n"
             with writing(self.path):

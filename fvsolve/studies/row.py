@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fvsolve.case import Case, load
-from fvsolve.case.raw import Raw, dotted
+from fvsolve.case.raw import dotted
 from fvsolve.errors import CaseError
 from fvsolve.output.summary import plain
 from fvsolve.studies.outcome import grown, refusal
+from fvsolve.studies.sent import Sent
 
 REFUSED = "refused: "
 LOST = "lost: the process that ran it has ended, again and again; was memory too small?"
@@ -30,15 +31,19 @@ class RowMaker:
 
     def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The row of a run; a case that is refused has one too."""
-        from fvsolve.run import run
+        from fvsolve.output.memory import MemorySink
+        from fvsolve.run import model_of
+        from fvsolve.solve import initial_state, solve
 
         try:
-            result = run(self.read(values))
+            model = model_of(self.read(values))
         except CaseError as error:
             return {"ok": False, "reason": refusal(error)}
-        if result.reason.startswith("interrupted"):
+        sink = MemorySink(model)
+        summary = solve(model, initial_state(model), sink)
+        if summary.reason.startswith("interrupted"):
             raise KeyboardInterrupt
-        return plain(row_of(result))
+        return row_of(model, summary, sink)
 
     def read(self, values: Mapping[str, Any]) -> Case:
         """The case with these values; from the second on read by what is known of the first."""
@@ -53,27 +58,44 @@ class RowMaker:
         return {key: one for key, one in self.base.items() if {dotted(key)[:1], dotted(key)[:2]} & tables}
 
     def __getstate__(self) -> dict[str, Any]:
-        """For another process: what the case says, not what it was read as, which may hold functions and meshes."""
-        known = self.case or (self.source if isinstance(self.source, Case) else None)
-        source = self.source if known is None else Raw(known.raw, known.name, known.path, known.folder)
-        return {"source": source, "base": self.base, "case": None}
+        """For another process, which reads the case anew."""
+        return {"sent": Sent(self.case or self.source), "base": self.base}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.source, self.base, self.case = state["sent"].source, state["base"], None
 
     def lost(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The row of a run that ends its process."""
         return {"ok": False, "reason": LOST}
 
 
-def row_of(result) -> dict[str, Any]:
-    """What a run has to say in one row."""
-    row = {"ok": result.ok, "reason": result.reason, "t [s]": result.summary["t"]}
-    row["marks"] = min(result.marks, key=lambda mark: mark.time).text if result.marks else ""
-    row |= {key: result.summary[key] for key in ("warnings", "fluid")}
-    blown = grown(result.reason)  # the numbers before it mean nothing
-    for name, one in result.extremes.items():
-        unit = f"[{result.units[name]}]"
-        said = {f"min({name}) {unit}": one.least, f"t_min({name}) [s]": one.t_least}
-        said |= {f"max({name}) {unit}": one.greatest, f"t_max({name}) [s]": one.t_greatest}
-        said[f"final({name}) {unit}"] = float(result[name][-1])
-        row |= dict.fromkeys(said) if blown else said
-    row["expectations"] = all(claim.ok for claim in result.expectations) if result.expectations else None
-    return row | {"steps": result.summary["steps"], "seconds": result.summary["seconds"]}
+def row_of(model, summary, sink) -> dict[str, Any]:
+    """What a run has to say in one row, as its `summary.json` has it; None for what is not finite."""
+    row = {"ok": bool(summary.ok), "reason": summary.reason, "t [s]": plain(float(summary.t))}
+    row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
+    row["warnings"] = [plain(one.plain()) for one in (*model.warnings, *summary.warnings)]
+    row["fluid"] = plain(model.case.properties.plain())
+    blown, last = grown(summary.reason), sink.last  # the numbers before it mean nothing
+    for k, one in enumerate(sink.columns):
+        least, t_least, greatest, t_greatest = summary.extremes[one.name]
+        name, unit = one.name, f"[{one.unit}]"
+        said = {f"min({name}) {unit}": one.from_si(least), f"t_min({name}) [s]": t_least}
+        said |= {f"max({name}) {unit}": one.from_si(greatest), f"t_max({name}) [s]": t_greatest}
+        said[f"final({name}) {unit}"] = last[1 + k]
+        row |= {key: None if blown else plain(float(x)) for key, x in said.items()}
+    claimed = expectations(model, summary, sink)
+    row["expectations"] = all(claim["ok"] for claim in claimed) if claimed else None
+    return row | {"steps": summary.steps, "seconds": plain(float(summary.seconds))}
+
+
+def expectations(model, summary, sink) -> list[dict[str, Any]]:
+    """What the case claims and whether it holds, as a run says it."""
+    from fvsolve.run import Result
+    from fvsolve.run.claims import expectation
+
+    columns = {one.name: one for one in sink.columns}
+    probes = {name: {"dimension": one.dimension, "unit": one.unit} for name, one in columns.items()}
+    about = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
+    result = Result(about, sink.table, sink.envelope)
+    return [expectation(text, expect, columns[expect.probe.text], summary.extremes, result)
+            for text, expect in model.case.expect.items()]  # fmt: skip

@@ -6,6 +6,7 @@ averages on any cells, probe rows at the rows of a run, and how far off it is it
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -29,6 +30,7 @@ from fvsolve.studies.distance import (
     spans_of,
     waves,
 )
+from fvsolve.studies.errands import Errand, Errands
 from fvsolve.studies.outcome import Outcome, outcome, prepared
 
 FINER = 4  # times the cells of the finest run that is judged
@@ -90,6 +92,7 @@ def once(case, keys: Mapping) -> Outcome:
 def truth(
     case, finest: Mapping | None = None, *, opinions: int | None = None, judged: bool = False, way: str = "both",
     stiff: bool = False, exact: bool = True, run: Callable = once, tell: Callable[[str], None] = lambda what: None,
+    errands: Errands | None = None, stages: tuple[dict, ...] = (),
 ) -> Truth:  # fmt: skip
     """The best truth for runs of a case with the keys `finest` or coarser ones.
 
@@ -98,6 +101,7 @@ def truth(
     way : "both", or "time": the same cells and scheme, where what is judged is the step alone
     stiff : whether something else than waves holds explicit steps back
     exact : whether the solution that the case names under [exact] is used, where it says what is judged
+    errands : who makes the runs, in place of `run`; stages : what was set on their case to make this one
     Raises FvsolveError where no run, or of several none but one, reaches the end.
     """
     from fvsolve.case import load
@@ -106,8 +110,11 @@ def truth(
     known = exact_truth(case) if exact and case.exact is not None and not (way == "time" and pipes(case)) else None
     if known is not None and opinions == 1:
         return known
-    found, told = [], []
-    for name, trials in candidates(case, judged, way, stiff):
+    kinds, found, told = candidates(case, judged, way, stiff), [], []
+    first = list(itertools.islice(kinds, opinions))
+    if errands is not None:
+        run = sent_ahead(errands, (*stages, dict(finest or {})), first, tell)
+    for name, trials in itertools.chain(first, kinds):
         if len(found) == opinions:
             break
         tell(name)
@@ -125,6 +132,15 @@ def truth(
         text = f"the reference run failed, so no error is known ({'; '.join(told)})"
         raise FvsolveError(f"{text}; state another method, a run that ends earlier, or [exact] in the case")
     return judge(found, tuple(told))
+
+
+def sent_ahead(errands: Errands, stages: tuple[dict, ...], kinds: Sequence, tell: Callable[[str], None]) -> Callable:
+    """run(case, keys) by those who make errands, who have been given all runs of these kinds, the coarse ones first."""
+    tell(", ".join(name for name, _ in kinds))
+    by_level = zip(*(trials for _, trials in kinds), strict=True)
+    for _ in errands.ahead([Errand(once, trial, stages) for level in by_level for trial in level]):
+        pass
+    return lambda case, keys: errands(case, Errand(once, keys, stages))
 
 
 def judge(found: Sequence[Truth], told: tuple[str, ...] = ()) -> Truth:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
-from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, PATH, TABLE, door
+from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, door
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
@@ -19,9 +19,10 @@ from fvsolve.studies.accuracy.front import FrontRow, Point, cheapest, coarser, c
 from fvsolve.studies.accuracy.pareto import targets
 from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, left_out, settings
 from fvsolve.studies.accuracy.setting import MethodSetting, adaptive, cell_keys, longest
-from fvsolve.studies.accuracy.timing import GIVEN_UP, best, compile_seconds
+from fvsolve.studies.accuracy.timing import GIVEN_UP, compile_seconds, quickest
 from fvsolve.studies.distance import Distance, distance, moving
-from fvsolve.studies.outcome import Progress, names, prepared, refusal, without_lines
+from fvsolve.studies.errands import Errand, Errands
+from fvsolve.studies.outcome import Progress, names, prepared, without_lines
 from fvsolve.studies.points import Points
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.studies.truth import Truth, truth
@@ -114,6 +115,8 @@ class Chart(Shown):
     target=NUMBER,
     out=PATH,
     progress=CALL,
+    jobs=COUNT,
+    dask=TEXT,
 )
 def chart(
     case,
@@ -126,15 +129,22 @@ def chart(
     target: float | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
 ) -> Chart:
     """Run a case over schemes x methods x cells (or tolerances) and lay error against cost.
 
     cells : of the pipe a wave takes longest to cross; rtol, step : of a case without cells [-], [s]
     target : an error over the trajectory for which a setting is to be found and run
-    out : folder where finished points are kept and found again. Raises CaseError, FvsolveError.
+    out : folder where finished points are kept and found again
+    jobs, dask : who makes the runs, as in `sweep`; processes that share a processor's cache and memory take longer each
+    Raises CaseError, FvsolveError.
     """
-    with Points(out) as kept:
-        return _Study(case, set, kept, progress or (lambda *_: None)).go(schemes, methods, cells, rtol, step, target)
+    from fvsolve.case import load
+
+    read, tell = load(case, set), progress or (lambda *_: None)
+    with Points(out) as kept, Errands(read, jobs, dask) as errands:
+        return _Study(read, kept, tell, errands).go(schemes, methods, cells, rtol, step, target)
 
 
 def toml(value) -> str:
@@ -145,10 +155,8 @@ def toml(value) -> str:
 class _Study:
     """One chart while it is made."""
 
-    def __init__(self, case, set: Mapping | None, points: Points, progress: Progress) -> None:
-        from fvsolve.case import load
-
-        self.case: Case = load(case, set)
+    def __init__(self, case: Case, points: Points, progress: Progress, errands: Errands) -> None:
+        self.case, self.errands = case, errands
         without_lines(self.case, "chart")
         if from_files(self.case):
             what = f"chart refines cells, and those of {listing(from_files(self.case))} are a file's"
@@ -170,6 +178,7 @@ class _Study:
         self.total = len(self.all) + 1
         floor = self.floor()
         self.least_overshoot = floor["overshoot"] or 0.0
+        self.ahead()
         points, least = [self.point(setting) for setting in self.all], floor["trajectory"]
         if target is not None:
             points = self.downwards(points, target)
@@ -191,7 +200,7 @@ class _Study:
         stiff = self.coarse is not None and self.coarse.stiff
         found = truth(
             self.case, None if self.finest is None else cell_keys(self.case, self.finest), stiff=stiff,
-            tell=lambda name: self.progress(self.done, self.total, f"reference {name}"),
+            tell=lambda name: self.progress(self.done, self.total, f"reference {name}"), errands=self.errands,
         )  # fmt: skip
         if not moving(found.run, found):
             told = "every probe stands still, so an error has no range; probe what moves, or run longer"
@@ -214,14 +223,32 @@ class _Study:
         self.done += 1
         return found
 
+    def ahead(self) -> None:
+        """Have others make the runs of all settings that are not known yet, and keep what they amount to."""
+        if self.errands.alone:
+            return
+        dearest_last = sorted(self.all, key=lambda one: (one.cells or 0, -one.size))
+        new = [one for one in dearest_last if self.points.find(self.case, self.extra(one)) is None]
+        if not new:
+            return
+        self.truth  # noqa: B018  which has runs of its own made
+        errands = [Errand(quickest, one.keys) for one in new]
+        for count, at in enumerate(self.errands.ahead(errands), 1):
+            self.progress(self.done + count, self.total, f"{new[at].name}, {new[at].fineness}")
+            self.points.get(self.case, self.extra(new[at]), lambda one=new[at]: self.measure(one))
+
+    def extra(self, setting: MethodSetting) -> dict:
+        """What names a point beside the case."""
+        return {"study": "chart", "keys": setting.keys, "judged by": self.finest}
+
     def point(self, setting: MethodSetting) -> Point:
         """A setting run and measured, or as it was found before; none that costs more than one that was given up."""
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
-        extra, dearer = {"study": "chart", "keys": setting.keys, "judged by": self.finest}, self.given_up
+        dearer = self.given_up
         if setting.curve in dearer:
             found = nothing(f"not tried: already {dearer[setting.curve]} was given up")
         else:
-            found = self.points.get(self.case, extra, lambda: self.measure(setting))
+            found = self.points.get(self.case, self.extra(setting), lambda: self.measure(setting))
         self.done += 1
         if found["reason"].startswith(GIVEN_UP) and grows(setting):
             dearer[setting.curve] = setting.fineness
@@ -253,11 +280,9 @@ class _Study:
 
     def measure(self, setting: MethodSetting) -> dict:
         """What a point stores: errors and cost of a run, or why there are none."""
-        try:
-            model = prepared(self.case, setting.keys)
-        except CaseError as error:
-            return nothing(refusal(error))
-        judge, found = self.truth, best(model)
+        judge, found = self.truth, self.errands(self.case, Errand(quickest, setting.keys))
+        if found.refused:
+            return nothing(found.reason)
         errors = asdict(distance(found, judge))
         ok, reason = found.ok, found.reason
         if ok and not errors["trajectory"] <= WRONG:

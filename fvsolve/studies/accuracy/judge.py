@@ -17,6 +17,7 @@ from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.accuracy.rows import Order, OrderRow
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.distance import NORMS, differences, recorded, size_of
+from fvsolve.studies.errands import Errand, Errands
 from fvsolve.studies.outcome import Outcome, Progress, outcome, prepared
 from fvsolve.studies.points import Points
 from fvsolve.studies.truth import ROUNDING, Truth, of_run, truth
@@ -30,11 +31,20 @@ SURE_FACTOR = 0.25  # error that an extrapolated error may have
 ASTRAY = 0.06, 0.04  # how far from theory an order of three differences may lie: a + b order
 
 
-class Judge:
-    """The rows of one study and what they are measured against."""
+def timed(case, keys: Mapping) -> Outcome:
+    """The run of a row."""
+    return outcome(case, keys, best_of=BEST_OF, run=lasting, budget=BRIEF)
 
-    def __init__(self, case, made: Plan, against: str) -> None:
+
+class Judge:
+    """The rows of one study and what they are measured against.
+
+    errands : who makes its runs; settings : what was set on their case to make this one
+    """
+
+    def __init__(self, case, made: Plan, against: str, errands: Errands, settings: Mapping) -> None:
         self.case, self.plan, self.against = case, made, against
+        self.errands, self.stages = errands, (dict(settings),)
         self.own = tuple(probe.text for probe in case.probes)
         if against == "exact" and case.exact is None:
             raise FvsolveError('against = "exact": the case names no solution under [exact]; wanted "finer"')
@@ -67,13 +77,20 @@ class Judge:
 
     def judged(self, points: Points | None, progress: Progress) -> Order:
         """The study against an exact solution or a finer run."""
-        rows, total = [], len(self.plan.levels) + 1
+        rows, levels = [], self.plan.levels
+        total = len(levels) + 1
 
         def kept(what, make):
             return make() if points is None else points.get(self.case, self.extra(what), make)
 
         known = kept("reference", lambda: self.about(progress, total))
-        for k, level in enumerate(self.plan.levels):
+        if points is not None and not self.errands.alone:
+            new = [k for k in range(len(levels)) if points.find(self.case, self.extra(k)) is None]
+            truth = self.truth if new else None  # before others begin, or they would wait for each other
+            for count, at in enumerate(self.errands.ahead([self.errand(levels[k]) for k in new]), 1):
+                kept(new[at], lambda level=levels[new[at]]: self.row(level).plain())
+                progress(total - len(new) + count - 1, total, truth.words)
+        for k, level in enumerate(levels):
             progress(k + 1, total, words_of(self.plan, level))
             found = kept(k, lambda level=level: self.row(level).plain())
             rows.append(row_of(level, found))
@@ -95,19 +112,23 @@ class Judge:
     def truth(self) -> Truth:
         """What rows are measured against."""
         way = "both" if self.against == "exact" else self.plan.way
-        return self.finer(way, self.against != "finer")
+        return self.finer(way, self.against != "finer", errands=self.errands)
 
     def finer(self, way: str, exact: bool, **others) -> Truth:
         """The truth for the finest row by one kind of runs, made otherwise than it; in time by the same cells."""
         method = METHODS.get(self.case.numerics.method)
         return truth(
             self.case, recorded(self.case, self.plan.levels[-1].set), opinions=1, judged=True, way=way,
-            stiff=method is None or not method.explicit, exact=exact, **others,
+            stiff=method is None or not method.explicit, exact=exact, stages=self.stages, **others,
         )  # fmt: skip
+
+    def errand(self, level: Level) -> Errand:
+        """What the run of a row is."""
+        return Errand(timed, recorded(self.case, level.set), self.stages)
 
     def run(self, level: Level) -> Outcome:
         """The run of a row."""
-        return outcome(self.case, recorded(self.case, level.set), best_of=BEST_OF, run=lasting, budget=BRIEF)
+        return self.errands(self.case, self.errand(level))
 
     def sizes(self) -> dict[str, float]:
         """How large each variable is, by the first row that runs: rounding is measured against it."""
@@ -215,9 +236,11 @@ class Judge:
 
     def richardson(self, progress: Progress) -> Order:
         """Errors of each row but the last: the sum of the differences to the next from there on, and what is left."""
-        runs = []
-        for k, level in enumerate(self.plan.levels):
-            progress(k, len(self.plan.levels), words_of(self.plan, level))
+        runs, levels = [], self.plan.levels
+        for count, at in enumerate(self.errands.ahead([self.errand(level) for level in levels]), 1):
+            progress(count, len(levels), words_of(self.plan, levels[at]))
+        for k, level in enumerate(levels):
+            progress(k, len(levels), words_of(self.plan, level))
             runs.append(self.run(level))
         rows = []
         for level, run, after in zip(self.plan.levels, runs, [*runs[1:], None], strict=True):

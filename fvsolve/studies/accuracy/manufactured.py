@@ -15,6 +15,7 @@ from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
 from fvsolve.studies.accuracy.rows import Order
 from fvsolve.studies.distance import recorded
+from fvsolve.studies.errands import Errands
 from fvsolve.studies.outcome import Outcome, outcome, prepared
 from fvsolve.studies.truth import Truth, of_solution
 
@@ -28,7 +29,7 @@ class Manufactured(Judge):
     def __init__(
         self, case, made, against: str, initial: Callable | None, source: Callable | None, exact: Callable | None
     ) -> None:
-        super().__init__(case, made, "auto")
+        super().__init__(case, made, "auto", Errands(case), {})
         self.against = against
         if against == "exact" and exact is None:
             raise FvsolveError('against = "exact" wants the function exact(pipe, x, t); wanted that, or "finer"')

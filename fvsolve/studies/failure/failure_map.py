@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.doors import CALL, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, door, is_row
+from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, door, is_row
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
+from fvsolve.studies.errands import Errand, Errands
 from fvsolve.studies.failure.columns import Columns, columns, default_schemes
 from fvsolve.studies.failure.eigen_limit import greatest_step, spectrum
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
@@ -87,12 +88,14 @@ KEY = Kind(
     out=OUT,
     progress=CALL,
     set=TABLE,
+    jobs=COUNT,
+    dask=TEXT,
 )
 def failures(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
     key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | Points | None = None,
-    progress: Progress | None = None, set: Mapping | None = None,
+    progress: Progress | None = None, set: Mapping | None = None, jobs: int = 1, dask: str | None = None,
 ) -> FailureMap:  # fmt: skip
     """Run every method, under every scheme, at every step (or value of a key), and say what became of each run.
 
@@ -100,8 +103,9 @@ def failures(
     columns; with key = (NAME, values) these are the columns, and one step, one Courant number, or else the case's own
     control holds.
     out : folder where finished squares are kept and found again; progress(done, total, next)
-    tolerance : mean error over the range of a probe. Raises FvsolveError for names and numbers that are none, and
-    where the reference is no better than the tolerance asks.
+    tolerance : mean error over the range of a probe; jobs, dask : who makes the runs, as in `sweep`
+    Raises FvsolveError for names and numbers that are none, and where the reference is no better than the tolerance
+    asks.
     """
     from fvsolve.case import load
 
@@ -114,12 +118,13 @@ def failures(
     across = columns(case, base, courants, steps, key)
     schemes, methods = _known(names(schemes) or default_schemes(case, across), names(methods) or METHODS)
     asked = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(across.sets))]
-    squares = []
-    with kept_in(out) as points:
-        trials = Trials(case, base, across, tolerance, points)
+    squares, tell = [], progress or (lambda *_: None)
+    with kept_in(out) as points, Errands(case, jobs, dask) as errands:
+        trials = Trials(case, base, across, tolerance, points, errands)
+        if not errands.alone:
+            trials.ahead(asked, tell)
         for scheme, method, k in asked:
-            if progress:
-                progress(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
+            tell(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
             squares.append(trials.square(scheme, method, k))
         found = trials.reference(0)
         words = f"{found.words}, checked by {found.second}"
@@ -133,8 +138,9 @@ def failures(
 class Trials:
     """Runs of one map: what they are measured against, and what becomes of them."""
 
-    def __init__(self, case, base: dict, across: Columns, tolerance: float, points: Points) -> None:
+    def __init__(self, case, base: dict, across: Columns, tolerance: float, points: Points, errands: Errands) -> None:
         self.case, self.base, self.across, self.tolerance, self.points = case, base, across, tolerance, points
+        self.errands, self.looking = errands, False
         self.span = across.span
         self._references: dict[int, Truth] = {}
         self._spectra: dict[tuple, np.ndarray | None] = {}
@@ -149,7 +155,8 @@ class Trials:
         """Of column k; one for all where only the step changes. FvsolveError where it is worth too little."""
         at = k if self.across.keys(k) else 0
         if at not in self._references:
-            found = truth(self.case, {**self.base, **self.across.keys(k)}, stiff=self.across.stiff(k))
+            finest, stiff = {**self.base, **self.across.keys(k)}, self.across.stiff(k)
+            found = truth(self.case, finest, stiff=stiff, errands=self.errands)
             doubt = found.doubt.trajectory
             if doubt > self.tolerance / 2:
                 raise FvsolveError(
@@ -190,16 +197,48 @@ class Trials:
         courant = step * waves if step and waves else None
         return Square(scheme, method, k, step, courant, word, one, errors[0] if errors else None, limit)
 
+    def ahead(self, asked: Sequence[tuple[str, str, int]], tell: Progress) -> None:
+        """Have others make the runs that squares ask for: all that is known to be wanted, then by what came of these
+        the same with shorter steps."""
+        while wanted := self.wanted(asked):
+            wanted.sort(key=lambda one: -one.trial.get("numerics.step", 0.0))  # the dearest last
+            errands = [Errand(watched, one.keys) for one in wanted]
+            for count, at in enumerate(self.errands.ahead(errands), 1):
+                self.measure(wanted[at].trial, wanted[at].column)
+                tell(count, len(wanted), f"{len(asked)} squares")
+
+    def wanted(self, asked: Sequence[tuple[str, str, int]]) -> list[Wanted]:
+        """Runs that are not known and that squares want next, each once."""
+        found, self.looking = {}, True
+        for one in asked:
+            try:
+                self.square(*one)
+            except Wanted as run:
+                found[repr(run.trial)] = run
+        self.looking = False
+        return [*found.values()]
+
     def measure(self, trial: dict, k: int) -> Measures:
-        """A run against its reference, or what was found of it before."""
+        """A run against its reference, or what was found of it before; `Wanted` where that is to be made first."""
         every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # not what is read between two steps
-        reference = self.reference(k)
+        reference, run = self.reference(k), {**trial, "output.every": every}
+        extra = {"study": "map", "set": trial, "reference": reference.words}
+        if self.looking and self.points.find(self.case, extra) is None:
+            raise Wanted(trial, run, k)
 
         def make() -> dict:
-            return asdict(measured(*watched(self.case, {**trial, "output.every": every}), reference))
+            return asdict(measured(*self.errands(self.case, Errand(watched, run)), reference))
 
-        found = self.points.get(self.case, {"study": "map", "set": trial, "reference": reference.words}, make)
+        found = self.points.get(self.case, extra, make)
         return Measures(**{name: math.nan if value is None else value for name, value in found.items()})
+
+
+class Wanted(Exception):
+    """A trial whose run, with these keys, is to be made first; column : whose reference it is measured against."""
+
+    def __init__(self, trial: dict, keys: dict, column: int) -> None:
+        super().__init__(repr(trial))
+        self.trial, self.keys, self.column = trial, keys, column
 
 
 def _shorter(case, trial: dict, times: int) -> dict:

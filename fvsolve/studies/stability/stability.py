@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.doors import CALL, COUNT, FLAG, NAMES, NUMBER, PATH, TABLE, door
-from fvsolve.errors import FvsolveError
+from fvsolve.case import load
+from fvsolve.doors import CALL, COUNT, FLAG, NAMES, NUMBER, PATH, TABLE, TEXT, door
+from fvsolve.errors import FvsolveError, RunError
 from fvsolve.model.energy import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
@@ -23,8 +24,10 @@ from fvsolve.steppers.methods import AUTO
 from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
+from fvsolve.studies.many import Bench
 from fvsolve.studies.outcome import Progress, names
-from fvsolve.studies.points import Points
+from fvsolve.studies.points import Points, key_of
+from fvsolve.studies.sent import Sent
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
 from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
 from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD
@@ -102,19 +105,19 @@ class Side:
     set=TABLE,
     out=PATH,
     progress=CALL,
+    jobs=COUNT,
+    dask=TEXT,
 )
 def stability(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, at: float | None = None,
     before: bool = False, steps: int = STEPS, threshold: float = THRESHOLD, set=None, out: str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, jobs: int = 1, dask: str | None = None,
 ) -> Stability:  # fmt: skip
     """One row for each scheme and method, those of the case if None, about its start or the state at `at` [s].
 
-    Finished rows are kept in `out` and reused. Raises CaseError, and FvsolveError for a state that cannot be
-    linearised or counts of steps that say nothing.
+    Finished rows are kept in `out` and reused; jobs, dask : who makes them, as in `sweep`. Raises CaseError, and
+    FvsolveError for a state that cannot be linearised or counts of steps that say nothing.
     """
-    from fvsolve.case import load
-
     if steps < 10 or not threshold > 1.0:
         raise FvsolveError(f"steps = {steps}, threshold = {threshold:g}: wanted at least 10 steps and growth above 1")
     case = load(case, dict(set or {}))
@@ -122,15 +125,55 @@ def stability(
     asked = names(methods) or [case.numerics.method]
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
     said = (AUTOMATIC,) if AUTO in asked else ()
-    found, makers = [], {scheme: Maker(case, scheme, at, before, steps, threshold) for scheme in schemes}
-    tell = progress or (lambda *_: None)
-    with Points(out) as points:
-        for (scheme, make), method in itertools.product(makers.items(), methods):
-            tell(len(found), len(schemes) * len(methods), f"{scheme} with {method}")
-            extra = {"study": "stability", "scheme": scheme, "method": method, "at": at,
-                     "before": before, "steps": steps, "threshold": threshold}  # fmt: skip
-            found.append(read(points.get(case, extra, lambda make=make, method=method: make.row(method).plain())))
-    return Stability(case.name, tuple(found), said, {name: make.side for name, make in makers.items()})
+    asked = {"at": at, "before": before, "steps": steps, "threshold": threshold}
+    work, pairs = StabilityWork(case, **asked), [*itertools.product(schemes, methods)]
+    with Points(out) as points, Bench(work, jobs, dask) as bench:
+        found = kept_rows(points, case, asked, pairs, bench, progress or (lambda *_: None))
+    return Stability(case.name, tuple(map(read, found)), said, {one: work.maker(one).side for one in schemes})
+
+
+def kept_rows(points: Points, case, asked: dict, pairs: list, bench: Bench, tell: Progress) -> list[dict]:
+    """Rows of pairs of a scheme and a method, those that are not known made by `bench` and kept as they come."""
+    extras = [{"study": "stability", "scheme": scheme, "method": method, **asked} for scheme, method in pairs]
+    found = [points.find(case, extra) for extra in extras]
+    new = [k for k, row in enumerate(found) if row is None]
+
+    def said(count: int) -> None:
+        known = len(pairs) - len(new)
+        tell(known + count, len(pairs), "".join(" with ".join(pairs[k]) for k in new[count : count + 1]))
+
+    said(0)
+    for count, (number, row) in enumerate(bench.do([pairs[k] for k in new]), 1):
+        at = new[number]
+        found[at] = points.keep(key_of(case, extras[at]), extras[at], row)
+        said(count)
+    return found
+
+
+class StabilityWork:
+    """What makes rows of one case about one state, wherever."""
+
+    def __init__(self, case, **asked) -> None:
+        self.sent, self.asked = Sent(case), asked
+        self.makers: dict[str, Maker] = {}
+
+    def __call__(self, pair: tuple[str, str]) -> dict:
+        scheme, method = pair
+        return self.maker(scheme).row(method).plain()
+
+    def maker(self, scheme: str) -> Maker:
+        """What makes the rows of a scheme."""
+        if scheme not in self.makers:
+            self.makers[scheme] = Maker(load(self.sent.source), scheme, **self.asked)
+        return self.makers[scheme]
+
+    def lost(self, pair: tuple[str, str]) -> dict:
+        """Nothing can stand for it."""
+        raise RunError(f"the process that made the row of {' with '.join(pair)} has ended, again and again; was memory "
+                       "too small?")  # fmt: skip
+
+    def __getstate__(self) -> dict:
+        return {"sent": self.sent, "asked": self.asked, "makers": {}}
 
 
 class Maker:

@@ -15,6 +15,7 @@ from typing import Any
 from fvsolve.errors import RunError
 
 READY = "ready"
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # of linear algebra, in every process
 NOT_STARTED = 'another process could not be started; a script that asks for jobs stands under if __name__ == "__main__"'
 
 
@@ -66,7 +67,7 @@ class Worker:
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=serve, args=(theirs, work), daemon=True)
         self.started, self.chunk = False, -1
-        with _no_interrupts():
+        with _no_interrupts(), _one_thread():
             self.process.start()
         theirs.close()  # so that the pipe ends with the process
 
@@ -132,3 +133,15 @@ def _no_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes that are started meanwhile do linear algebra on one thread, if nobody has said on how many."""
+    said = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(said, "1"))
+    try:
+        yield
+    finally:
+        for name in said:
+            del os.environ[name]
