@@ -78,7 +78,9 @@ def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x,
     if depth.size > 0:
         near_values(nx, ny, begin, stop, s, depth, work)
         c = work[: nx * ny]
-    second_order_rates(first, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate)
+    second_order_rates(
+        first, limiter, nx, ny, begin, stop, stop, True, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate
+    )
 
 
 @njit

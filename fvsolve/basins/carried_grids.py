@@ -4,10 +4,12 @@ from fvsolve.basins.advection import add_fifth_order, grid_advection, grid_faste
 from fvsolve.basins.behind import is_given
 from fvsolve.basins.carried import deep, made_ready, turned
 from fvsolve.basins.diffusion import grid_diffusion
+from fvsolve.basins.second_order import second_order_rates
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import RATE
+from fvsolve.kernels.records import MUSCL, RATE, UPWIND
+from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form_looked_at, look
 
 
 @njit(forceinline=True)
@@ -45,12 +47,41 @@ def carry_on_grids(t, y, dydt, out, handle):
         for q in range(tables.scalars.size):
             out[RATE] = max(out[RATE], quick + tables.scalars[q]["decay"])
             n, ring = basin["n"], basin["outside"] + q * basin["outer"]
-            at = basin["carried"] + q * n
+            at, outside = basin["carried"] + q * n, tables.work[ring : ring + basin["outer"]]
+            if asked(tables, b) != OFF:
+                by_blocks(
+                    tables.sums, at, basin["scheme"], basin["limiter"], begin, stop, kx, ky, turned(t, basin), flow_x,
+                    flow_y, outside, y, work, dydt[at : at + n],
+                )  # fmt: skip
+                continue
             grid_advection(
                 basin["scheme"], basin["limiter"], kx.size, ky.size, begin, stop, kx, ky, turned(t, basin), flow_x,
-                flow_y, depth,
-                tables.work[ring : ring + basin["outer"]], seen[at : at + n], work, dydt[at : at + n],
+                flow_y, depth, outside, seen[at : at + n], work, dydt[at : at + n],
             )  # fmt: skip
+    if tables.sums.size > 0 and tables.sums[MODE] == BOTH:
+        form_looked_at(tables.sums)
+
+
+@njit
+def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, flow_y, outside, y, work, rate):
+    """`grid_advection` of values themselves, block by block, and the stages that are asked for formed beside them."""
+    nx, ny, n, known, done = kx.size, ky.size, rate.size, begin, begin
+    rows = max(sums[CELLS] // nx, 1)
+    for row in range(begin, stop, rows):
+        until = min(row + rows, stop)
+        ahead = min(until + 2, stop)
+        if sums[MODE] != LOOK:
+            form(sums, False, at, nx, known, ahead, 0, nx)
+        known = ahead
+        second_order_rates(
+            scheme if scheme == MUSCL else UPWIND, limiter, nx, ny, row, until, stop, row == begin, kx, ky, factor,
+            flow_x, flow_y, outside, y[at : at + n], work[n:], rate,
+        )  # fmt: skip
+        if sums[MODE] == LOOK:
+            look(sums, y, at, nx, row, until, 0, nx)
+        elif sums[MODE] == BOTH:  # the last of these rows is looked at by the next one's rates
+            form(sums, True, at, nx, done, until if until == stop else until - 1, 0, nx)
+            done = until - 1
 
 
 @njit

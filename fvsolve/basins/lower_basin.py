@@ -20,6 +20,7 @@ from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model.schemes import CODES, family
+from fvsolve.model.state_names import Numbered
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
@@ -171,6 +172,14 @@ class BasinRows:
         return "" if self.banded else f"rows of {self.part.physics} are not shared out"
 
     @property
+    def sums_rows(self) -> bool:
+        """Whether who finds rates of its rows can form sums of stages beside them, for nothing comes to these later.
+
+        But at cells that all look at: behind patches.
+        """
+        return False
+
+    @property
     def fifth(self) -> bool:
         """Whether its scheme is of more than second order."""
         return SCHEMES[self.scheme].order > 2
@@ -317,10 +326,10 @@ class BasinRows:
             self.lower_scalars(draft, row)
         row["y"] = draft.size
         for what, scale in zip(self.quantities, self.scales(), strict=True):
-            draft.states([f"{self.name}.{what}[{i}]" for i in range(self.n)], scale)
+            draft.states(Numbered(f"{self.name}.{what}", self.n), scale)
         row["carried"] = draft.size if self.scalars else -1
         for name in self.scalars:
-            draft.states([f"{self.name}.{name}[{i}]" for i in range(self.n)], self.scalar_scale(name))
+            draft.states(Numbered(f"{self.name}.{name}", self.n), self.scalar_scale(name))
         self.memory = 8 * (draft.room() + draft.size - before)
         place = f"nodes.{self.name}"
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]

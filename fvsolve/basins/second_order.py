@@ -102,18 +102,21 @@ def second_order_work(nx, ny):
 
 @njit
 def second_order_rates(
-    scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, outside, c, work, rate
+    scheme, limiter, nx, ny, begin, until, stop, fresh, kx, ky, factor, flow_x, flow_y, outside, c, work, rate
 ):  # fmt: skip
-    """Rates of cells of values c by upwind or muscl; arguments as of `grid_advection`."""
+    """Rates of cells of values c by upwind or muscl, of rows `begin` to `until`; arguments as of `grid_advection`.
+
+    fresh : whether it does not go on where it has ended last, at `begin`; then `stop` is where it ends at last
+    """
     below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
     rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]
     last = (ny - 1) * nx
-    for i in range(nx):
+    for i in range(nx if fresh else 0):
         rows[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
         north[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
         below[i], above[i] = 2.0 * rows[i] - c[i], 2.0 * north[i] - c[last + i]
-    first = max(begin - 1, 0)  # whose own rate may be wrong, but for values at its northern faces
-    for j in range(first - 1, stop):  # values along a row are had a row ahead: they are in memory when they are read
+    first = max(begin - 1, 0) if fresh else begin  # whose own rate may be wrong, but for values at its northern faces
+    for j in range(first - 1 if fresh else begin, until):  # values along a row are had a row ahead
         if j < stop - 1:
             k = j + 1
             fx, qx = flow_x[k * (nx + 1) :], rest[(k % 2) * (nx + 2) :]

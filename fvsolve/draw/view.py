@@ -195,6 +195,8 @@ def read(file: str | Path, field: str) -> Any:
     import pyvista
 
     mesh = pyvista.read(file)
+    if Path(file).suffix == ".pvtu":  # whose pieces have points of their own where they meet
+        mesh = mesh.clean()
     if field in mesh.cell_data:
         values, unit = mesh.cell_data[field], unit_of(mesh, field)
         unit, scale = SHOWN.get(unit, (unit, 1.0))

@@ -629,11 +629,14 @@ RECORDS = {
 Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
 Written = namedtuple(
     "Written",
-    ("clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "envelope", "extremes", "past"),
-)
+    (
+        "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
+        "past",
+    ),
+)  # fmt: skip
 Called = namedtuple("Called", (*Tables._fields, *Written._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are no records float64[:]
-INTEGERS = ("integers", "bands", "joint", "calls", "hooks")  # but int64
+INTEGERS = ("integers", "bands", "joint", "sums", "calls", "hooks")  # but int64
 
 
 @functools.cache

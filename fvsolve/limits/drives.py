@@ -52,7 +52,7 @@ def lumped(model) -> np.ndarray:
     """Numbers of the states that are no cell's and no line's: of vessels, columns, bodies and devices : int64[k]."""
     pipes = model.tables.pipes
     lines = set(pipes["y"][pipes["delay"] >= 0].tolist())
-    names = enumerate(model.state_names)
+    names = model.state_names.single()
     return np.array([i for i, name in names if "[" not in name and i not in lines], dtype=np.int64)
 
 

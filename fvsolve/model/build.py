@@ -128,7 +128,7 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
         clock=1, work=draft.work_size, marks=marks_of(draft),
         armed=limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
         scratch=scratch_of(draft), spare=int(layout["size"][0]), seen=draft.size if len(draft.wall_table) else 0,
-        bands=2 * len(draft.basin_table), joint=0,
+        bands=2 * len(draft.basin_table), joint=0, sums=0,
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_size(draft.delay_table),
     )  # fmt: skip
 

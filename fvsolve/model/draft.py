@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +19,7 @@ from fvsolve.model.lowering import Lowering, lowered
 from fvsolve.model.model import PipeMesh
 from fvsolve.model.schedules import Schedules
 from fvsolve.model.slate import LINE, lined
+from fvsolve.model.state_names import StateNames
 
 
 def rows(record: np.dtype) -> Any:
@@ -44,8 +47,8 @@ class Draft:
 
     # states
     size: int = 0
-    state_names: list[str] = field(default_factory=list)
-    scale: list[float] = field(default_factory=list)  # what counts as a small deviation of each
+    state_names: StateNames = field(default_factory=StateNames)
+    scale: array = field(default_factory=lambda: array("d"))  # what counts as a small deviation of each
     cells: int = 0  # of pipes
     tanks: int = 0
     moving: int = 0  # places whose pressure follows what they hold by a stiffness that changes
@@ -124,10 +127,10 @@ class Draft:
         if self.faults:
             raise CaseError(self.faults, str(self.case.path or self.case.name))
 
-    def states(self, names: list[str], scale: float | list[float]) -> int:
+    def states(self, names: Sequence[str], scale: float | list[float]) -> int:
         """Offset of new states, `scale` of each or of all of them."""
-        self.state_names += names
-        self.scale += scale if isinstance(scale, list) else [scale] * len(names)
+        self.state_names.add(names)
+        self.scale += array("d", scale) if isinstance(scale, list) else array("d", [scale]) * len(names)
         self.size += len(names)
         return self.size - len(names)
 

@@ -22,6 +22,7 @@ from fvsolve.units import show
 if TYPE_CHECKING:
     from fvsolve.basins.lower_basin import BasinRows
     from fvsolve.case import Case
+    from fvsolve.model.state_names import StateNames
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class Model(Shown):
     case: Case
     tables: rec.Tables
     shapes: rec.Written
-    state_names: list[str]
+    state_names: StateNames
     scale: np.ndarray
     breaks: list[tuple[float, bool]]
     step_max: float

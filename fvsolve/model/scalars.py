@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ def settle_scalars(draft) -> None:
         for node, place in zip(draft.node_table, places_of(draft, row), strict=True):
             if node["kind"] in STORES:
                 scale[place] = typical * max(node["mass"], scale[node["y"]])
-    draft.scale = scale.tolist()
+    draft.scale = array("d", scale.tobytes())
 
 
 def places_of(draft, row) -> np.ndarray:

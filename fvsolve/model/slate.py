@@ -38,7 +38,7 @@ class Slate:
     armed : 1.0 where an event has happened and still holds; marks : first times of what a model cannot follow [s]
     envelope, extremes : least and greatest of all cells and of all probes, each above its time
     bands : of every basin, the first of the rows, of a mesh of the cells, that are stepped here and one beyond the
-    last; joint : see `kernels.joint`, empty where all are
+    last; joint : see `kernels.joint`, empty where all are; sums : see `kernels.sums`
     """
 
     def __init__(self, model: Model) -> None:

@@ -15,6 +15,7 @@ from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
 from fvsolve.output.lines import LineSeries, clear_lines
 from fvsolve.output.lock import let_go, locked
+from fvsolve.output.pieces import Pieces
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary import read_summary
 
@@ -90,6 +91,11 @@ class RunDirectory:
                 self.lines.write(self.fields.frames, frame)
             if self.fields:
                 self.fields.write(t, frame)
+
+    def among(self, comm, rows: dict) -> None:
+        """Let ranks write frames of basins together, each its rows; see `pieces.Pieces`."""
+        if self.fields:
+            self.fields.pieces = Pieces(comm, rows)
 
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by one that knows this state and all rows and frames so far."""
@@ -183,7 +189,7 @@ def clear(folder: Path) -> None:
     """Delete what an earlier run left in `folder`, and nothing else."""
     for name in (ENDED, *OWN, *PICTURES):
         (folder / name).unlink(missing_ok=True)
-    for path in (folder / "fields").glob("*.vtu"):
+    for path in (folder / "fields").glob("*.*vtu"):
         path.unlink()
     clear_lines(folder)
 

@@ -31,17 +31,20 @@ TAIL = "</Collection>\n</VTKFile>\n"
 
 
 class FieldSeries:
-    """Writes one .vtu per frame; the .pvd beside them is whole after each."""
+    """Writes one .vtu per frame; the .pvd beside them is whole after each.
+
+    pieces : None, or `Pieces` of the basins that ranks write together
+    """
 
     def __init__(self, folder: Path, model):
-        self.folder = folder
+        self.folder, self.model, self.pieces = folder, model, None
         self.frames = 0
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
         self.places = places
         if model.pipes:
             self.places = places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = geometry(model, places)
-            self.model, self.owner = model, ride(model, self.points)
+            self.owner = ride(model, self.points)
         riding = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
         self.places = places = {**places, **riding}  # in the world, as bodies are
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
@@ -68,7 +71,7 @@ class FieldSeries:
         if len(kept) < many or not all(one and (self.folder / one[1]).is_file() for one in named):
             raise RunError(f"{listed} lacks frames; start the run again with --force")
         (self.folder / "fields").mkdir(exist_ok=True)
-        for path in (self.folder / "fields").glob("*.vtu"):
+        for path in (self.folder / "fields").glob("*.*vtu"):
             number = path.stem.rpartition("-")[2]
             if number.isdecimal() and int(number) >= frames:
                 path.unlink()
@@ -80,6 +83,12 @@ class FieldSeries:
         name = f"fields/{self.frames:06d}.vtu"
         for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
             file = f"fields/{basin}-{self.frames:06d}.vtu"
+            if self.pieces is not None and basin in self.pieces.rows:
+                file = f"fields/{basin}-{self.frames:06d}.pvtu"
+                whole = self.model.basins[part - 1]
+                self.pieces.write(self.folder / file, whole, self.places[basin], frame[basin], units)
+                self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
+                continue
             found = {key: parted(value, cells) for key, value in frame[basin].items()}
             if basin in frame["points"]:  # what moves
                 points = np.append(self.places[basin], 0.0) + frame["points"][basin]
@@ -129,10 +138,15 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
 
     meshio.Mesh(points, cells, cell_data=data).write(path)
     text = path.read_bytes()
-    for name, unit in units.items():
+    for name in units:
         end = text.index(ARRAY, text.index(f' Name="{name}"'.encode()))
-        text = text[:end] + UNIT.format(html.escape(unit, quote=False)).encode() + text[end:]
+        text = text[:end] + unit_of(units, name).encode() + text[end:]
     path.write_bytes(text)
+
+
+def unit_of(units: dict[str, str], name: str) -> str:
+    """What an array says of its unit, nothing where it has none."""
+    return UNIT.format(html.escape(units[name], quote=False)) if name in units else ""
 
 
 def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -187,13 +201,18 @@ def ride(model, points: np.ndarray) -> np.ndarray:
 def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
     """Corners float64[p, 3] [m] of a basin's cells, on their bed, and blocks of cells of a kind, in their order."""
     mesh = basin.mesh
-    x, y = np.ascontiguousarray(mesh.points.T)
-    points = np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
+    points = placed(basin, origin, mesh.points)
     three = mesh.cells[:, 3] < 0
     ends = np.flatnonzero(np.diff(three)) + 1
     blocks = np.split(np.arange(len(three)), ends)
     named = {True: ("triangle", 3), False: ("quad", 4)}
     return points, [(named[three[b[0]]][0], mesh.cells[b, : named[three[b[0]]][1]]) for b in blocks]
+
+
+def placed(basin, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points of a mesh where they are drawn : float64[p, 3] [m]."""
+    x, y = np.ascontiguousarray(points.T)
+    return np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
 
 
 def parted(values: np.ndarray, blocks: list) -> list[np.ndarray]:

@@ -14,6 +14,8 @@ from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.value import PROFILE, Misfit, Quantity, Range, Setting, Value, anything
 from fvsolve.units import show
 
+MANY = 2**16  # points at a time, so that what a formula is made of stays small
+
 
 @dataclass(frozen=True)
 class Formula:
@@ -24,7 +26,10 @@ class Formula:
 
     def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Values at points : float64[n]; ValueError where one is none."""
-        found = np.array(np.broadcast_to(self.rule(x, y), np.shape(x)), dtype=float)
+        found = np.empty(np.shape(x))
+        for first in range(0, found.size, MANY):
+            part = slice(first, first + MANY)
+            found[part] = self.rule(x[part], y[part])
         if not np.isfinite(found).all():
             k = int(np.argmax(~np.isfinite(found)))
             raise ValueError(f"{show(self.said)} is no number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")

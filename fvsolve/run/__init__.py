@@ -133,6 +133,8 @@ def _solve(model, sink, progress, threads, comm):
     kept = sink.restart
     state = initial_state(model) if kept is None else State(kept.t, kept.y, kept.memory)
     sink.begin(model, state)
+    if comm is not None and sink.folder is not None:
+        sink.among(comm, ranks.rows_of(model, comm.size))
     try:
         return solve(model, state, sink, progress, threads, comm)
     except MemoryMisfit as error:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from functools import cache
 
 from fvsolve.errors import FvsolveError
-from fvsolve.solve.bands import threads_of
+from fvsolve.solve.bands import cut, threads_of
 from fvsolve.solve.loop import Loop
 
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")  # how MPI's starters say how many processes there are
@@ -78,6 +78,12 @@ def gathered(comm, model):
     if faults:
         raise FvsolveError(faults[0])
     return comm
+
+
+def rows_of(model, many: int) -> dict:
+    """First rows of ranks, and how many there are, of the basins that they share out : name -> int64[many + 1]."""
+    found = cut(model, many)
+    return {model.basins[b].name: rows for b, rows in zip(found.basins, found.firsts, strict=True)}
 
 
 def follow(make: Callable) -> None:

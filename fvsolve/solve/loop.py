@@ -14,6 +14,7 @@ from fvsolve.model import Model, Slate
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
 from fvsolve.solve.bands import cut
+from fvsolve.solve.formed import formed
 from fvsolve.solve.meeting import let_go, shut_places
 from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.ledger import SUMS
@@ -75,9 +76,11 @@ class Loop:
             self.orders[slots.SIZE] = numerics.courant / model.wave_rate
         given = self.orders[slots.CONTROL] == slots.FIXED_STEP
         self.slate.clock["step"] = self.orders[slots.SIZE] if given else 0.0
-        self.team = None
+        self.team, one = None, cut(model, 1)
+        if method.explicit and numerics.method != automatic.AUTO:
+            stepper.shape = formed(one, 0)
+            self.slate.written = self.slate.written._replace(sums=stepper.shape)
         if numerics.rtol is not None:  # errors are summed by rows
-            one = cut(model, 1)
             stepper.spans, stepper.sums = one.spans(0), np.zeros(one.sums)
         if comm is not None:
             from fvsolve.solve.ranks import Ranks

@@ -135,6 +135,9 @@ class Ranks:
         stepper, written = self.loop.stepper, self.loop.slate.written
         while True:
             asked, given = self.comm.bcast(None)
+            if callable(asked):  # by whom rank 0 writes to
+                asked(self.comm, self.loop.model, *given)
+                continue
             if asked == CLOSE:
                 return
             if asked == WHOLE:

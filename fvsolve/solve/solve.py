@@ -26,6 +26,7 @@ from fvsolve.solve.summary import (
     mass_ledger,
     run_downs,
 )
+from fvsolve.solve.team import undisturbed
 from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.ledger import SUMS
 from fvsolve.units import show
@@ -204,7 +205,8 @@ class Run:
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.look(t, y)
-        self.sink.field(t, self.slate.fields(t, y, out))
+        with undisturbed():  # other ranks may be writing too
+            self.sink.field(t, self.slate.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows and frames that are due at a jump or at the end, which are written apart."""

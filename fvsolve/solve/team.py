@@ -24,6 +24,7 @@ from fvsolve.kernels.handle import make_handle
 from fvsolve.model import Slate
 from fvsolve.model.slate import lined
 from fvsolve.solve.bands import Cut
+from fvsolve.solve.formed import formed
 from fvsolve.steppers import slots
 from fvsolve.steppers.signatures import JOIN, compiled_as
 from fvsolve.steppers.stepper import Stepper
@@ -57,7 +58,8 @@ class Member:
         own[joint.BOARD], own[joint.ROOM] = team.board.ctypes.data, team.room.ctypes.data
         own[joint.ALIKE], own[joint.STATES], own[joint.FLOWS] = len(cut.alike()), len(states), len(flows)
         own[joint.HEAD :] = np.concatenate([states, flows]).ravel()
-        self.written = self.slate.written._replace(bands=cut.bands(k), joint=own)
+        self.stepper.shape = formed(cut, k)
+        self.written = self.slate.written._replace(bands=cut.bands(k), joint=own, sums=self.stepper.shape)
         self.tables = (*self.slate.tables, *self.written, team.functions.calls, team.functions.hooks)
         self.handle = make_handle(self.tables)
         at, by = loop.stepper.within

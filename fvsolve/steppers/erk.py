@@ -3,6 +3,7 @@
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.sums import AHEAD, BOTH, EDGES, LOOKED, MODE, OFF, OTHERS, ask, sum_runs
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.slots import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
 from fvsolve.steppers.step import BEGIN, STOP, combine, error_of_bands
@@ -26,20 +27,30 @@ def attempt(
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    supply[i] keeps the ledger rates of stage i. What implicit methods need beside is not looked at.
+    supply[i] keeps the ledger rates of stage i. shape : what is formed beside rates, see `kernels.sums`; what else
+    implicit methods need is not looked at.
     """
-    s = k.shape[0]
-    c, last_is_new = nodes_of(coefficients, s), orders[FSAL] == 1.0
+    s, b = k.shape[0], weights_of(coefficients, k.shape[0])
+    c, last_is_new, formed = nodes_of(coefficients, s), orders[FSAL] == 1.0, shape.size > 0
     for i in range(1, s):
-        target = y[new] if last_is_new and i == s - 1 else y[3]
-        for m in range(spans.shape[0]):
-            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, target)
+        last, row = i == s - 1, row_of(coefficients, s, i)
+        target = y[new] if last and (last_is_new or formed) else y[3]
+        if formed:
+            sum_runs(shape, 0, shape[OTHERS] + shape[LOOKED] + shape[EDGES], y[now], h, row, i, k, target)
+            ask(shape, BOTH if last and not last_is_new else AHEAD, y[now], h, row, i, k, target, b)
+        else:
+            for m in range(spans.shape[0]):
+                combine(spans[m, BEGIN], spans[m, STOP], y[now], h, row, i, k, target)
         rhs(t + c[i] * h, target, k[i], out, handle)
+        if formed:
+            shape[MODE] = OFF
         for m in range(supply.shape[1]):
             supply[i, m] = out[where + m]
-    if not last_is_new:
+    if formed and s > 1 and not last_is_new:
+        sum_runs(shape, 0, shape[OTHERS] + shape[LOOKED], y[now], h, b, s, k, y[new])
+    elif not last_is_new:
         for m in range(spans.shape[0]):
-            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, weights_of(coefficients, s), s, k, y[new])
+            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, b, s, k, y[new])
     memory[CALLS] += s - 1.0
     if orders[WATCH] != 0.0:
         memory[RADIUS] = quotient(k[s - 1], k[s - 2], y[new], y[3], scale)

@@ -7,6 +7,7 @@ model (functions of declared type).
 from math import isfinite
 
 from fvsolve.jit import COMPILING, njit
+from fvsolve.kernels.sums import BAD, LOOK, MODE, OFF
 from fvsolve.steppers.coefficients import error_of, row_of, weights_of
 from fvsolve.steppers.control import closing_step, end_of, grown, kept, next_step, reduced, shortest, too_short, watch
 from fvsolve.steppers.events import arm, fallen, locate, turned
@@ -129,6 +130,7 @@ def march(
     implicit step keeps.
     """
     s, reuse, met, t_new = k.shape[0], False, False, 0.0  # met: g_new is of the end of the step behind
+    formed = orders[KIND] == EXPLICIT and shape.size > 0
     b = weights_of(coefficients, s)
     steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
     for j in range(s):  # the last stage does not, where it is the end
@@ -152,16 +154,20 @@ def march(
                     begin, end = spans[m, BEGIN], spans[m, STOP]
                     copy(k[s - 1, begin:end], k[0, begin:end])
             else:
+                if formed:
+                    shape[MODE], shape[BAD] = LOOK, 0
                 rhs(memory[T], y[now], k[0], out, handle)
+                if formed:
+                    shape[MODE] = OFF
                 memory[CALLS] += 1.0
-            reuse = False
+            looked, reuse = formed and not reuse, False
             flags[PHASE] = EMIT
             record(memory[T], y[now], out, handle, values)
             if out[STATUS] == AMENDED:
                 rhs(memory[T], y[now], k[0], out, handle)
                 memory[CALLS] += 1.0
                 record(memory[T], y[now], out, handle, values)
-            if not all_finite(join, handle, spans, sums, y[now]):
+            if not all_finite(join, handle, spans, sums, y[now], shape, looked):
                 out[STATUS] = NOT_FINITE
         if flags[PHASE] <= EMIT:
             if out[STATUS] == NOT_FINITE or not isfinite(out[RATE]):

@@ -3,51 +3,13 @@
 from math import sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.sums import BAD, BASINS, HEAD, HUGE, OTHERS, combine, copy, endless
 
-HUGE = 1e100  # values beyond it count as not finite
-
-
-@njit(forceinline=True)
-def copy(source, target):
-    """target = source, by a plain loop: numba's slice assignment looks for overlaps first."""
-    for i in range(target.size):
-        target[i] = source[i]
-
+__all__ = ["HUGE", "combine", "copy"]
 
 # Columns of `spans`, int64[q, 4], the states that a band steps: from where to where, the number of the first sum, and
 # how many there are: errors are summed by rows, and these added in the order of their numbers, whatever the bands are.
 BEGIN, STOP, FIRST, SUMS = range(4)
-
-
-@njit
-def combine(begin, end, y, h, weights, count, k, out):
-    """out = y + h sum of weights[j] k[j] over j < count, of [begin:end]; three terms a pass where there are so many."""
-    one, two, moved = -1, -1, False
-    y, out = y[begin:end], out[begin:end]
-    base = y
-    for j in range(count):
-        if weights[j] == 0.0:
-            continue
-        if one < 0:
-            one = j
-        elif two < 0:
-            two = j
-        else:
-            c0, c1, c2 = h * weights[one], h * weights[two], h * weights[j]
-            k0, k1, k2 = k[one, begin:end], k[two, begin:end], k[j, begin:end]
-            for i in range(out.size):
-                out[i] = base[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
-            base, moved, one, two = out, True, -1, -1
-    if two >= 0:
-        c0, c1, k0, k1 = h * weights[one], h * weights[two], k[one, begin:end], k[two, begin:end]
-        for i in range(out.size):
-            out[i] = base[i] + (c0 * k0[i] + c1 * k1[i])
-    elif one >= 0:
-        c0, k0 = h * weights[one], k[one, begin:end]
-        for i in range(out.size):
-            out[i] = base[i] + c0 * k0[i]
-    elif not moved:
-        copy(y, out)
 
 
 @njit(forceinline=True)
@@ -130,33 +92,33 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, out):
         out[i] = y[i] + (h01 * (y_new[i] - y[i]) + (h10 * f[i] + h11 * f_new[i]))
 
 
-@njit(forceinline=True)
-def endless(begin, end, y):
-    """How many values of [begin:end] are not finite or have no finite square: in integers, which is vectorised."""
-    bad = 0
-    for i in range(begin, end):
-        bad += not abs(y[i]) < HUGE
-    return bad
-
-
 @njit
-def all_finite(join, handle, spans, sums, y):
+def all_finite(join, handle, spans, sums, y, formed, looked):
     """Whether all values of all bands are, and their squares; sums : room for what bands tell each other.
 
-    A single sum is that of one band, of all.
+    A single sum is that of one band, of all. formed : see `kernels.sums`; looked : whether who found rates has looked
     """
+    bad, last = 0, spans.shape[0] - 1
+    if looked:
+        bad, first = formed[BAD], HEAD + formed[BASINS]
+        for r in range(formed[OTHERS]):
+            bad += endless(formed[first + 2 * r], formed[first + 2 * r + 1], y)
+    elif sums.size == 1:
+        bad = endless(0, y.size, y)
+    else:
+        for m in range(spans.shape[0]):
+            bad += endless(spans[m, BEGIN], spans[m, STOP], y)
     if sums.size == 1:
-        return endless(0, y.size, y) == 0
+        return bad == 0
     for m in range(spans.shape[0]):
-        first = spans[m, FIRST]
-        for r in range(first, first + spans[m, SUMS]):
+        for r in range(spans[m, FIRST], spans[m, FIRST] + spans[m, SUMS]):
             sums[r] = 0.0
-        sums[first] = endless(spans[m, BEGIN], spans[m, STOP], y)
+    sums[spans[last, FIRST]] = bad  # of rows of this band, or of what all have
     join(sums, spans, handle)
-    bad = 0.0
+    total = 0.0
     for r in range(sums.size):
-        bad += sums[r]
-    return bad == 0.0
+        total += sums[r]
+    return total == 0.0
 
 
 @njit(forceinline=True)

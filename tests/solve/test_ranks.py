@@ -7,12 +7,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
+import meshio
 import numpy as np
 import pytest
 from solve.test_threads import SCENES, water
 
 import fvsolve
+from fvsolve.draw.view import read, unit_of
+from fvsolve.output.fields import read_series
 
 pytest.importorskip("mpi4py", reason="the extra mpi is not there")
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
@@ -39,10 +43,22 @@ def same(one: Path, other: Path) -> bool:
     """Whether two runs have the same history, ledgers and frames, of which the last is their end."""
     said, again = (json.loads((run / "summary.json").read_text()) for run in (one, other))
     keys = ("ledgers", "extremes", "steps", "reason", "marks")
-    frames = [[path.read_bytes() for path in sorted(run.rglob("*.vtu"))] for run in (one, other)]
+    frames = [[drawn(path) for _, path in read_series(run / "fields.pvd")] for run in (one, other)]
     history = [(run / "history.csv").read_bytes() for run in (one, other)]
     kept = all(said[key] == again[key] for key in keys)
     return kept and frames[0] == frames[1] != [] and history[0] == history[1]
+
+
+def drawn(path: Path) -> dict[str, bytes]:
+    """Corners of all cells of a frame, and what these hold, of all pieces where it has some, in their order."""
+    pieces = [path]
+    if path.suffix == ".pvtu":
+        pieces = [path.parent / one.attrib["Source"] for one in ElementTree.parse(path).getroot().iter("Piece")]
+    meshes = [meshio.read(one) for one in pieces]
+    found = {"corners": [one.points[block.data].ravel() for one in meshes for block in one.cells]}
+    for name in meshes[0].cell_data:
+        found[name] = [np.ravel(values) for one in meshes for values in one.cell_data[name]]
+    return {name: np.concatenate(parts).tobytes() for name, parts in found.items()}
 
 
 @pytest.mark.parametrize("many", [2, pytest.param(3, marks=pytest.mark.slow)])
@@ -55,6 +71,22 @@ def test_ranks_give_the_bits_of_one_process(tmp_path, many):
         assert same(tmp_path / "one" / name, tmp_path / "ranks" / name), name
         said = json.loads((tmp_path / "ranks" / name / "summary.json").read_text())
         assert said["threads"] == many and run.summary["threads"] == 1
+
+
+def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_path):
+    """Each has written its rows; a reader of VTK sees one basin, units and all."""
+    case = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 1}} for name in ("a dye",)}
+    found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps(case), tmp_path, "{}")
+    assert found.returncode == 0, found.stderr
+    fvsolve.run(case["a dye"], out=tmp_path / "one")
+    names = sorted(path.name for path in (tmp_path / "a dye" / "fields").iterdir())
+    assert names == [f"sheet{part}-00000{k}.{kind}" for part, kind in (("", "pvtu"), (".0", "vtu"), (".1", "vtu"))
+                     for k in range(2)]  # fmt: skip
+    runs = [tmp_path / name / "fields" / f"sheet-000001.{kind}" for name, kind in (("one", "vtu"), ("a dye", "pvtu"))]
+    one, two = (read(path, "dye") for path in runs)
+    assert two.n_cells == one.n_cells == 132 and two.n_points == one.n_points and unit_of(two, "dye") == "mg/l"
+    assert np.array_equal(two.cell_centers().points, one.cell_centers().points)
+    assert np.array_equal(two["dye"], one["dye"])
 
 
 @pytest.mark.slow

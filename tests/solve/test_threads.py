@@ -128,6 +128,25 @@ def test_any_number_of_threads_gives_the_bits_of_one(name):
         assert summary.threads == threads and summary.ledgers == one.ledgers
 
 
+FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk3", "a tolerance",
+          "a tolerance, first same as last", "a liquid", "a liquid between walls", "a liquid, upwind5", "a dye",
+          "walls all around")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FORMED)
+@pytest.mark.parametrize("cells", [1, 20, 10**6])
+def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
+    """In blocks of a row, of two, and of all; by one thread and by three."""
+    bits, _ = told(SCENES[name], 1)
+    here = importlib.import_module("fvsolve.solve.formed")
+    monkeypatch.setattr(here, "FEWEST", 0)
+    monkeypatch.setattr(here, "BLOCK", cells)
+    model = fvsolve.build(fvsolve.load(SCENES[name]))
+    assert Loop(model).stepper.shape.size > 0
+    assert told(SCENES[name], 1)[0] == bits
+    assert told(SCENES[name], 3)[0] == bits
+
+
 def test_as_many_threads_as_rows():
     assert told(water(), 12)[0] == told(water(), 1)[0]
 

@@ -46,6 +46,7 @@ __all__ = ["PLANS", "WORK", "grid_rates"]
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # rows of cells at hand
+REACH = 3  # rows beside a cell that its rates look at, at most
 BLOCK, SIDE, FLUX = FIELDS * STRIDE, SIDES * STRIDE, FLUXES * STRIDE
 WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # floats that `grid_rates` works in
 MOVING = WORK + 3 * STRIDE
@@ -148,8 +149,8 @@ def grid_rates(
     for first in range(0, nx, MOST):
         last = min(first + MOST, nx)
         rate = column_rates(
-            g, scheme, limiter, nx, ny, begin, stop, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
-            through, work, rate_h, rate_x, rate_y, moves,
+            g, scheme, limiter, nx, ny, begin, stop, True, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x,
+            flow_y, through, work, rate_h, rate_x, rate_y, moves,
         )  # fmt: skip
         most = max(most, rate)
     return most
@@ -157,24 +158,29 @@ def grid_rates(
 
 @njit
 def column_rates(
-    g, scheme, limiter, nx, ny, begin, stop, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y, through,
-    work, rate_h, rate_x, rate_y, moves,
+    g, scheme, limiter, nx, ny, begin, stop, fresh, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
+    through, work, rate_h, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """The same of columns `first` to `last`, no more than MOST of them, row by row."""
+    """The same of columns `first` to `last`, no more than MOST of them, row by row.
+
+    fresh : whether it does not go on where it has ended last, at `begin`
+    """
     n, fifth = last - first, scheme == LINEAR or scheme == WENO5
     ring, at = work[: RING * BLOCK], RING * BLOCK
     sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
     fluxes, deep, top = work[at : at + 3 * FLUX], work[at + 3 * FLUX :], work[at + 3 * FLUX + STRIDE :]
     ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]  # of a row, from one cell before it on
-    for i in range(STRIDE):
-        top[i] = 0.0
     reach = 3 if fifth else 2
-    ahead = min(begin + reach, ny)
-    for j in range(max(begin - reach, 0), ahead):
-        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
-    for j in range(-1, begin - 1 - reach, -1):
-        put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
-    for j in range(begin - 1, stop + 1):
+    ahead = begin + reach
+    if fresh:
+        for i in range(STRIDE):
+            top[i] = 0.0
+        ahead = min(ahead, ny)
+        for j in range(max(begin - reach, 0), ahead):
+            put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
+        for j in range(-1, begin - 1 - reach, -1):
+            put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
+    for j in range(begin - 1 if fresh else begin + 1, stop + 1):
         while ahead < j + reach:
             put_row(g, ahead, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves)
             ahead += 1

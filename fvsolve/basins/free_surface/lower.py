@@ -70,6 +70,10 @@ class FreeSurfaceRows(BasinRows):
         if valves:
             yield Pieces(home=HOME, brake="patches: quickest_inflow")
 
+    @property
+    def sums_rows(self) -> bool:
+        return not (self.whole or self.scalars)
+
     def scales(self) -> list[float]:
         flow = SCALE * np.sqrt(self.case.gravity * SCALE)
         return [SCALE, flow, flow]

@@ -9,6 +9,7 @@ from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import NO_DRAG, RATE
+from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form_looked_at, look
 
 MINE = kind_of(__package__)
 
@@ -28,27 +29,73 @@ def through_faces(begin, stop, kx, ky, flow_x, flow_y):
 
 
 @njit
-def finish_water(tables, b, rate, y, rates, out):
-    """Add friction to rates of water, book what passes an open boundary, and let steps follow both and the waves."""
-    st, basin = tables.settings[0], tables.basins[b]
+def rub(tables, b, a, z, y, rates, out):
+    """Add friction to rates of cells `a` to `z` of water, and let steps follow it."""
+    basin = tables.basins[b]
+    n, o, seen, roughness = (
+        basin["n"],
+        basin["y"],
+        seen_of(basin, tables.seen, y),
+        tables.basins["roughness"][b : b + 1],
+    )
+    east, north = o + n, o + 2 * n
+    fades = add_friction(
+        basin["friction"], tables.settings[0]["gravity"], roughness, FASTEST, tables.plane[basin["plan"] + a :],
+        seen[o + a : o + z], seen[east + a : east + z], seen[north + a : north + z],
+        y[east + a : east + z], y[north + a : north + z],
+        rates[n + a : n + z], rates[2 * n + a : 2 * n + z],
+    )  # fmt: skip
+    out[RATE] = max(out[RATE], fades)
+
+
+@njit
+def finish_water(tables, b, rate, out):
+    """Book what passes an open boundary, and let steps follow the waves."""
+    book_open(tables, b, tables.settings[0]["rho"], out)
+    out[RATE] = max(out[RATE], tables.basins[b]["unsplit"] * rate)
+
+
+@njit
+def finish_block(tables, b, row, until, first, last, y, rates, out):
+    """Add friction to rates of columns `first` to `last` of these rows, form their end, or look at them."""
+    basin, sums, nx = tables.basins[b], tables.sums, tables.basins[b]["nx"]
     if basin["friction"] != NO_DRAG:
-        n, o, seen, roughness = (
-            basin["n"],
-            basin["y"],
-            seen_of(basin, tables.seen, y),
-            tables.basins["roughness"][b : b + 1],
-        )
-        a, z = cells_of(tables, b)
-        east, north = o + n, o + 2 * n
-        fades = add_friction(
-            basin["friction"], st["gravity"], roughness, FASTEST, tables.plane[basin["plan"] + a :],
-            seen[o + a : o + z], seen[east + a : east + z], seen[north + a : north + z],
-            y[east + a : east + z], y[north + a : north + z],
-            rates[n + a : n + z], rates[2 * n + a : 2 * n + z],
-        )  # fmt: skip
-        out[RATE] = max(out[RATE], fades)
-    book_open(tables, b, st["rho"], out)
-    out[RATE] = max(out[RATE], basin["unsplit"] * rate)
+        if first == 0 and last == nx:
+            rub(tables, b, nx * row, nx * until, y, rates, out)
+        for j in range(row, until if last - first < nx else row):
+            rub(tables, b, nx * j + first, nx * j + last, y, rates, out)
+    for q in range(3):
+        at = basin["y"] + q * basin["n"]
+        if sums[MODE] == LOOK:
+            look(sums, y, at, nx, row, until, first, last)
+        elif sums[MODE] == BOTH:  # ghosts of columns before these were seen as the stage has them
+            form(sums, True, at, nx, row, until, max(first - grid.GHOSTS, 0), last)
+
+
+@njit
+def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y, rates, out):
+    """`grid.grid_rates` block by block, with friction, and the stages that are asked for formed beside them."""
+    basin, none, most = tables.basins[b], tables.work[:0], 0.0
+    nx, ny, n, begin, stop = basin["nx"], basin["ny"], basin["n"], tables.bands[2 * b], tables.bands[2 * b + 1]
+    for first in range(0, nx, grid.MOST):
+        last = min(first + grid.MOST, nx)
+        left, right, known = max(first - grid.GHOSTS, 0), min(last + grid.GHOSTS, nx), begin
+        rows = max(tables.sums[CELLS] // (last - first), 1)
+        for row in range(begin, stop, rows):
+            until = min(row + rows, stop)
+            ahead = min(until + grid.REACH, stop)
+            for q in range(3 if tables.sums[MODE] != LOOK else 0):
+                form(tables.sums, False, basin["y"] + q * n, nx, known, ahead, left, right)
+            known = ahead
+            rate = grid.column_rates(
+                g, basin["scheme"], basin["limiter"], nx, ny, row, until, row == begin, first, last, kx, ky, reflect,
+                plan, dh, qx, qy, none, none, through, work, rates[:n], rates[n : 2 * n], rates[2 * n :], None,
+            )  # fmt: skip
+            most = max(most, rate)
+            finish_block(tables, b, row, until, first, last, y, rates, out)
+    if tables.sums[MODE] == BOTH:
+        form_looked_at(tables.sums)
+    return most
 
 
 @njit
@@ -64,18 +111,24 @@ def on_grid(tables, b, y, dydt, out, moves):
     dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
+    kx, ky, passing = plane[k : k + nx], plane[k + nx : k + nx + ny], work[through : through + basin["outer_given"]]
+    reflect, toil = plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], work[basin["work"] :]
+    if moves is None and asked(tables, b) != OFF:
+        rate = by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, passing, toil, y, rates, out)
+        finish_water(tables, b, rate, out)
+        return
     rate = grid.grid_rates(
-        g, basin["scheme"], basin["limiter"], nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1],
-        plane[k : k + nx], plane[k + nx : k + nx + ny],
-        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow_x, flow_y,
-        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rates[n : 2 * n],
-        rates[2 * n :], moves,
+        g, basin["scheme"], basin["limiter"], nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], kx, ky, reflect,
+        plan, dh, qx, qy, flow_x, flow_y, passing, toil, rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
     )  # fmt: skip
     if f >= 0:
         through_faces(
             tables.bands[2 * b], tables.bands[2 * b + 1], plane[k : k + nx], plane[k + nx : k + nx + ny], flow_x, flow_y
         )
-    finish_water(tables, b, rate, y, rates, out)
+    if basin["friction"] != NO_DRAG:
+        a, z = cells_of(tables, b)
+        rub(tables, b, a, z, y, rates, out)
+    finish_water(tables, b, rate, out)
 
 
 @njit
@@ -107,7 +160,10 @@ def on_mesh(tables, b, y, dydt, out, moves):
         work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rates[n : 2 * n],
         rates[2 * n :], moves,
     )  # fmt: skip
-    finish_water(tables, b, rate, y, rates, out)
+    if basin["friction"] != NO_DRAG:
+        a, z = cells_of(tables, b)
+        rub(tables, b, a, z, y, rates, out)
+    finish_water(tables, b, rate, out)
 
 
 @njit

@@ -191,6 +191,18 @@ def steepest(kx, ky):
 
 
 @njit
+def first_row(begin, ny):
+    """The first row that faces of a band look at."""
+    return max(min(begin - BEYOND, ny - EDGE), 0)
+
+
+@njit
+def row_known(j, ny):
+    """One beyond the last row that is looked at when faces before row j are found."""
+    return min(max(j + BEYOND, EDGE), ny)
+
+
+@njit
 def work_size(nx, ny):
     """Floats that `grid_rates` works in."""
     return (2 * RING + 4) * nx + 2 * (nx + 2 * BEYOND) + 2 * (nx + 1) + SPARE
@@ -224,17 +236,42 @@ def grid_rates(
     stand still; what they find on faces of the boundary, as `faces.liquid_rates` has it; density at rest [kg/m3]; and
     of columns or rows that stretch `wide`, see `basins.stretch`
     """
+    row_rates(
+        c, small, scheme, limiter, nx, ny, begin, stop, begin, stop, kx, ky, reflect, sides_of(reflect, nx, ny), r, mx,
+        my, through, work, rate_r, rate_x, rate_y, moves,
+    )  # fmt: skip
+    return c * steepest(kx, ky)
+
+
+@njit
+def sides_of(reflect, nx, ny):
+    """Kinds of the western, eastern, southern and northern side."""
+    south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
+    return side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
+
+
+@njit
+def row_rates(
+    c, small, scheme, limiter, nx, ny, begin, stop, row, until, kx, ky, reflect, kinds, r, mx, my, through, work,
+    rate_r, rate_x, rate_y, moves,
+):  # fmt: skip
+    """Rates of rows `row` to `until` of a band, from `begin` on in turn; those behind these may be half done.
+
+    kinds : of sides, see `sides_of`; all else as `grid_rates` has it
+    """
     wide, f = nx + 2 * BEYOND, nx + 1
     up, down, work = work[: RING * nx], work[RING * nx : 2 * RING * nx], work[2 * RING * nx :]
     between, work = work[: 4 * nx], work[4 * nx :]
     east, west, work = work[:wide], work[wide : 2 * wide], work[2 * wide :]
     fe, fw, spare = work[:f], work[f : 2 * f], work[2 * f :]
-    half, rows = 0.5 * c, max(min(begin - BEYOND, ny - EDGE), 0)
+    half, rows = 0.5 * c, first_row(begin, ny)
+    if row > begin:
+        rows = max(rows, row_known(row, ny))
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
-    to_w, to_e, to_s, to_n = side_of(reflect[:ny]), side_of(reflect[ny : 2 * ny]), side_of(south), side_of(north)
+    to_w, to_e, to_s, to_n = kinds
     along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
-    for j in range(begin, stop + 1):  # faces between rows j - 1 and j
-        while rows < min(max(j + BEYOND, EDGE), ny):
+    for j in range(row if row == begin else row + 1, until + 1):  # faces between rows j - 1 and j
+        while rows < row_known(j, ny):
             a, z, at = rows * nx, (rows + 1) * nx, (rows % RING) * nx
             put_waves(half, r[a:z], my[a:z], up[at : at + nx], down[at : at + nx])
             if rows < begin or rows >= stop:
@@ -280,11 +317,11 @@ def grid_rates(
             if not first:
                 continue
             for k in range(BEYOND):
-                row = ny + k if side == 1 else -1 - k
-                a, at = fold(row, ny) * nx, (row % RING) * nx
-                one, other = (down, up) if image(row, ny) else (up, down)
+                beyond = ny + k if side == 1 else -1 - k
+                a, at = fold(beyond, ny) * nx, (beyond % RING) * nx
+                one, other = (down, up) if image(beyond, ny) else (up, down)
                 put_waves(half, r[a : a + nx], my[a : a + nx], one[at : at + nx], other[at : at + nx])
-                if moves is not None and moves[1].size > 0 and image(row, ny):
+                if moves is not None and moves[1].size > 0 and image(beyond, ny):
                     out = -moves[1][0] if side == 0 else moves[1][ny]
                     drive_row(
                         False, c, moves[3], out, (down if side == 1 else up)[at:], (up if side == 1 else down)[at:], nx
@@ -332,4 +369,3 @@ def grid_rates(
             settle_column(c, ky[j - 1], between[before:], between[before + nx :], fu, fd, rate_r[a:z], rate_y[a:z])
         if moves is not None and j > begin:
             swell_row(moves[0].size > 0, moves[4], 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
-    return c * steepest(kx, ky)

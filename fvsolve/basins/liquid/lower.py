@@ -71,6 +71,10 @@ class LiquidRows(BasinRows):
     def even_paced(self) -> bool:
         return self.linear and not self.moves
 
+    @property
+    def sums_rows(self) -> bool:
+        return self.linear and not self.whole
+
     def scales(self) -> list[float]:
         return [SCALE / self.speed**2, SCALE / self.speed, SCALE / self.speed]
 

@@ -7,6 +7,7 @@ from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
+from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form_looked_at, look
 
 MINE = kind_of(__package__)
 
@@ -60,12 +61,42 @@ def finish_liquid(tables, b, rate, out):
 
 
 @njit
+def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, rate_x, rate_y):
+    """`grid.grid_rates` block by block, and the stages that are asked for formed beside them."""
+    basin, sums, nx, ny = tables.basins[b], tables.sums, tables.basins[b]["nx"], tables.basins[b]["ny"]
+    begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
+    known, rows, kinds = begin, max(sums[CELLS] // nx, 1), grid.sides_of(reflect, nx, ny)
+    for row in range(begin, stop, rows):
+        until = min(row + rows, stop)
+        ahead = min(grid.row_known(until, ny), stop)
+        for q in range(3 if sums[MODE] != LOOK else 0):
+            form(sums, False, basin["y"] + q * basin["n"], nx, known, ahead, 0, nx)
+        known = ahead
+        grid.row_rates(
+            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, begin, stop, row, until, kx, ky,
+            reflect, kinds, r, mx, my, through, work, rate_r, rate_x, rate_y, None,
+        )  # fmt: skip
+        for q in range(3):
+            if sums[MODE] == LOOK:
+                look(sums, y, basin["y"] + q * basin["n"], nx, row, until, 0, nx)
+            elif sums[MODE] == BOTH:
+                form(sums, True, basin["y"] + q * basin["n"], nx, row, until, 0, nx)
+    if sums[MODE] == BOTH:
+        form_looked_at(sums)
+    return basin["speed"] * grid.steepest(kx, ky)
+
+
+@njit
 def linear_grid(tables, b, y, dydt, out, moves, raised):
     """Rates under law linear on a grid; moves : as in `grid.grid_rates`; raised : None, or densities in their place."""
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
     reflect, through, work = outside_of(tables, basin)
+    if moves is None and raised is None and asked(tables, b) != OFF:
+        rate = by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, rate_x, rate_y)
+        finish_liquid(tables, b, rate, out)
+        return
     if raised is not None:
         r = raised
     rate = grid.grid_rates(

@@ -21,6 +21,11 @@ class TransportRows(BasinRows):
     def pieces(self, valves: bool) -> Iterator[Pieces]:
         yield Pieces(home=__package__, observe="observe: observe_given_flows")
 
+    @property
+    def sums_rows(self) -> bool:
+        spreads = any(self.case.scalars[name].diffusivity > 0.0 for name in self.scalars)
+        return not (self.whole or self.fifth or spreads)
+
     def lower(self, draft, row) -> None:
         given, mesh = self.part.velocity, self.mesh
         flows = self.flows(draft)

@@ -1,0 +1,120 @@
+"""A large dam break stopped by one process and resumed by two ranks, with --back the other way round too: hashes.
+
+Run with the number of cells along a side, 4096 if nothing is said: each rank wants some 13 GiB for these while it makes
+its model, one after the other, and up to 10 after that.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from measure import machine
+from planes_scenes import SIZE, scene, square
+
+from fvsolve.case import load
+from fvsolve.model import State, build
+from fvsolve.output.memory import MemorySink
+from fvsolve.run import ranks
+from fvsolve.solve import initial_state
+from fvsolve.solve.loop import Loop
+from fvsolve.solve.solve import Run
+
+STEPS, STOP = 6, 3  # in all, and where it is stopped
+
+
+class Kept(MemorySink):
+    """Keeps the last checkpoint."""
+
+    def checkpoint(self, state, extra: dict) -> None:
+        self.state = state
+
+
+def model_of(cells: int):
+    """A dam break over a bed, from wall to wall, in steps that are given."""
+    pool = square(cells) | {"level": 1.0, "bed": "0.3*sin(x)*cos(y)", "manning": 0.02,
+                            "start": {"level": f"where(x < {0.4 * SIZE}, 1.5, 1)"}}  # fmt: skip
+    step = 0.05 * SIZE / cells
+    numerics = scene(pool, STEPS * step)["numerics"] | {"step": step}
+    del numerics["courant"]
+    output = {"fields": 0, "every": STEPS * step}
+    return build(load(scene(pool, STEPS * step) | {"numerics": numerics, "output": output}))
+
+
+def stepped(model, state: State, parts: list[int], comm) -> list[State]:
+    """The states that so many steps, and so many more, make of one, with all that a resumed run needs."""
+    run = Run(model, state, sink := Kept(model), None, comm=comm)
+    if run.fresh:
+        run.open()
+    else:
+        run.loop.resume(run.end, np.inf)
+    found = []
+    for steps in parts:
+        run.loop.run(float(steps))
+        run.save()
+        found.append(sink.state)
+    run.loop.close()
+    return found
+
+
+def part(cells: int, begin: str, end: str, *parts: str) -> None:
+    """Step a checkpoint, or the start, as one process or as a rank; rank 0 keeps what the first part makes."""
+    comm, start = ranks.world(), perf_counter()
+    if comm is not None and comm.rank > 0:
+        comm.bcast(None)  # rank 0 has its model: two at a time would want more memory
+        loop = Loop(model_of(cells), comm=comm)
+        loop.team.serve(*loop.functions)
+        return
+    model = model_of(cells)
+    if comm is not None:
+        comm.bcast(0)
+    state = initial_state(model)
+    if begin != "-":
+        with np.load(begin) as found:
+            state = State(float(found["t"]), found["y"], found["memory"])
+    states = stepped(model, state, [int(one) for one in parts], comm)
+    if end != "-":
+        np.savez(end, t=states[0].t, y=states[0].y, memory=states[0].memory)
+    said = " ".join(hashlib.sha256(one.y.tobytes()).hexdigest()[:16] for one in states)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    print(f"{said}; {perf_counter() - start:.0f} s, peak {peak:.1f} GiB", flush=True)
+
+
+def asked(many: int, *words) -> list[str]:
+    """What a part says that so many processes do; its hashes."""
+    command = [sys.executable, __file__, "--part", *map(str, words)]
+    if many > 1:
+        command = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(many), *command]
+    found = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ).stdout
+    steps = " and ".join(map(str, words[3:]))
+    print(f"  {many} {'ranks' if many > 1 else 'process'}, {steps} steps: {found.strip()}", flush=True)
+    return found.partition(";")[0].split()
+
+
+def main() -> None:
+    if "--part" in sys.argv:
+        part(int(sys.argv[2]), *sys.argv[3:])
+        return
+    cells = int(sys.argv[1]) if len(sys.argv) > 1 else 4096
+    print(f"{machine('fvsolve', 'numba', 'mpi4py')}\ndam break on {cells}^2 cells; hashes of states", flush=True)
+    with tempfile.TemporaryDirectory(prefix="fvsolve-resumed-") as folder:
+        one, two = Path(folder) / "one.npz", Path(folder) / "two.npz"
+        half, whole = asked(1, cells, "-", one, STOP, STEPS - STOP)
+        (again,) = asked(2, cells, one, "-", STEPS - STOP)
+        print(f"stopped by one and resumed by two ranks: states are {'equal' if whole == again else 'NOT'}", flush=True)
+        if "--back" in sys.argv:
+            (other,) = asked(2, cells, "-", two, STOP)
+            (back,) = asked(1, cells, two, "-", STEPS - STOP)
+            same = half == other and whole == back
+            print(f"stopped by two and resumed by one: states are {'equal' if same else 'NOT'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""Names of states, those of cells made when they are asked for: a plane has millions. Knows words; knows no tables."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+
+
+class Numbered(Sequence):
+    """`stem[0]`, `stem[1]` and so on, so many."""
+
+    def __init__(self, stem: str, many: int) -> None:
+        self.stem, self.many = stem, many
+
+    def __len__(self) -> int:
+        return self.many
+
+    def __getitem__(self, i):
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(self.many))]
+        if not -self.many <= i < self.many:
+            raise IndexError(i)
+        return f"{self.stem}[{int(i) % self.many}]"
+
+
+class StateNames(Sequence):
+    """Names of all states, part by part."""
+
+    def __init__(self) -> None:
+        self.parts: list[Sequence[str]] = []
+        self.firsts: list[int] = []
+        self.many = 0
+
+    def add(self, names: Sequence[str]) -> None:
+        """Put names behind the others."""
+        self.parts.append(names)
+        self.firsts.append(self.many)
+        self.many += len(names)
+
+    def __len__(self) -> int:
+        return self.many
+
+    def __getitem__(self, i):
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(self.many))]
+        if not -self.many <= i < self.many:
+            raise IndexError(i)
+        i = int(i) % self.many
+        k = bisect_right(self.firsts, i) - 1
+        return self.parts[k][i - self.firsts[k]]
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for part in self.parts for name in part)
+
+    def __eq__(self, other) -> bool:
+        return isinstance(other, Sequence) and len(other) == self.many and all(map(str.__eq__, self, other))
+
+    __hash__ = None
+
+    def __repr__(self) -> str:
+        return repr(list(self))
+
+    def single(self) -> Iterator[tuple[int, str]]:
+        """Number and name of those that are given one by one, not by cells."""
+        for first, part in zip(self.firsts, self.parts, strict=True):
+            if not isinstance(part, Numbered):
+                yield from enumerate(part, first)
