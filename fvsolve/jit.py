@@ -33,6 +33,7 @@ __all__ = ["Intrinsic", "add_sources", "beside", "cache_folder", "inner", "njit"
 
 ROOM = 65536  # bytes that a folder must take to be one for caches
 DIGEST = hashlib.sha256().digest_size
+PATIENCE = 60.0  # for a process that compiles beside this one [s]
 KEPT = 3  # generations of compiled code kept beside the present one
 
 PACKAGE = Path(__file__).resolve().parent
@@ -333,7 +334,8 @@ def beside(code: str, cached: str):
     second = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, **quiet)
     try:
         yield
-        second.wait()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            second.wait(PATIENCE)
     finally:
         second.kill()
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.kernels.delay.history import COUNT
 from fvsolve.model.past import LEAST_ROOM, begin_past, doubled, room_left, without_past
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Slate:
             self.tables.plane[:] = model.tables.plane
         if len(model.tables.rides):  # who asks what joints hold makes it heavy
             self.tables = self.tables._replace(rides=model.tables.rides.copy())
-        self.clock = self.written.clock[0]
+        self.clock, self.full_at = self.written.clock[0], -np.inf  # entries of a past, at which its rings are full
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
         begin_past(self.written.past, model.tables.delays)
@@ -75,7 +76,7 @@ class Slate:
 
     @past.setter
     def past(self, past: np.ndarray) -> None:
-        self.written = self.written._replace(past=past)
+        self.written, self.full_at = self.written._replace(past=past), -np.inf
         self.__dict__.pop("handle", None)
 
     def recall(self, state) -> None:
@@ -88,9 +89,12 @@ class Slate:
         delays = self.model.tables.delays
         if not len(delays):
             return np.inf
-        while (left := room_left(self.past, delays)) < LEAST_ROOM:
-            self.past = doubled(self.past, delays)
-        return float(left)
+        count = self.past[COUNT]
+        if self.full_at - count < LEAST_ROOM:  # which holds for any steps: looked at again only where it runs short
+            while (left := room_left(self.past, delays)) < LEAST_ROOM:
+                self.past = doubled(self.past, delays)
+            self.full_at = count + left
+        return float(self.full_at - count)
 
     def along(self, t: float, out: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """Pipe -> both waves in the middle of its cells, of delay lines [kg/s]."""

@@ -15,7 +15,7 @@ from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
 from fvsolve.output.lines import LineSeries, clear_lines
 from fvsolve.output.lock import let_go, locked
-from fvsolve.output.pieces import Pieces
+from fvsolve.output.pieces import Shares
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
 from fvsolve.output.summary import read_summary
 
@@ -93,9 +93,9 @@ class RunDirectory:
                 self.fields.write(t, frame)
 
     def among(self, comm, rows: dict) -> None:
-        """Let ranks write frames of basins together, each its rows; see `pieces.Pieces`."""
+        """Let ranks write frames of basins together, each its rows; see `pieces.Shares`."""
         if self.fields:
-            self.fields.pieces = Pieces(comm, rows)
+            self.fields.pieces = Shares(comm, rows)
 
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz by one that knows this state and all rows and frames so far."""

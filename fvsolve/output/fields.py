@@ -33,7 +33,7 @@ TAIL = "</Collection>\n</VTKFile>\n"
 class FieldSeries:
     """Writes one .vtu per frame; the .pvd beside them is whole after each.
 
-    pieces : None, or `Pieces` of the basins that ranks write together
+    pieces : None, or `Shares` of the basins that ranks write together
     """
 
     def __init__(self, folder: Path, model):

@@ -14,7 +14,7 @@ from fvsolve.output import fields
 KINDS = {"f": "Float", "i": "Int", "u": "UInt"}
 
 
-class Pieces:
+class Shares:
     """Who writes what of the basins whose rows ranks share out.
 
     comm : MPI's, of all ranks; rows : basin -> int64[ranks + 1]  first rows of all, and how many rows there are

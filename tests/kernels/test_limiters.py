@@ -51,7 +51,9 @@ def carried(code: int) -> np.ndarray:
     flows, c, outside = rng.normal(size=2 * n * (n + 1)), rng.random(n * n), rng.random(4 * n)
     ones, work = np.ones(n), np.zeros(second_order.second_order_work(n, n))
     along, across = flows[: n * (n + 1)], flows[n * (n + 1) :]
-    second_order.second_order_rates(rec.MUSCL, code, n, n, 0, n, ones, ones, 1.0, along, across, outside, c, work, rate)
+    second_order.second_order_rates(
+        rec.MUSCL, code, n, n, 0, n, n, True, ones, ones, 1.0, along, across, outside, c, work, rate
+    )
     return rate
 
 

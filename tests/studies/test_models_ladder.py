@@ -46,8 +46,10 @@ def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
     assert slow.change_time == pytest.approx(20.0) and quick.change_time == 0.0
     assert slow.travel_time == pytest.approx(LENGTH / SPEED)
     assert "waves hardly matter" in slow.thumb[1] and "waves matter" in quick.thumb[1]
-    coarse = ladder(shutting(0.0), target=0.01)  # 40 cells err by more than the target behind a jump themselves
-    assert named(coarse, "full line").error > 0.01 and coarse.cheapest.name == "delay lines"  # exact at any step
+    coarse = ladder(shutting(0.0, every=0.0437), target=0.01)  # 40 cells err by more behind a jump, lines at no time
+    # but its own: no row is there
+    assert named(coarse, "full line").error > 0.01 > named(coarse, "delay lines").error  # exact at any step
+    assert coarse.cheapest.name in ("delay lines", "2 times the cells")  # by their time, which is about the same
 
 
 def test_the_cheapest_is_within_the_target_and_nothing_quicker_is():

@@ -54,7 +54,7 @@ def test_every_command_of_the_page_names_a_case_and_settings_that_it_takes(words
 def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, capsys):
     asked = []
 
-    def noted(case, *given):
+    def noted(case, *given, **more):
         asked.append(case.name)
         raise FvsolveError("far enough: nothing is run")
 

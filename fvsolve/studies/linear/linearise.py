@@ -54,7 +54,7 @@ class Linear:
     @property
     def states(self) -> list[str]:
         """Names of x: deviations from the profile."""
-        return self.at.model.state_names
+        return list(self.at.model.state_names)
 
     @property
     def state_units(self) -> list[str]:
