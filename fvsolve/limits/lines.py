@@ -18,6 +18,7 @@ from fvsolve.kernels.delay.lines import drag_and_slope
 from fvsolve.limits.lumped import GROWS, times
 from fvsolve.steppers.tableau import Method
 
+LITTLE = 4.0  # times a: what no method adds to a wave that comes back once
 EASY = 1.5  # of a: up to here rk4 gives back no more than came
 ANGLES = np.pi * (np.arange(720) + 1.0) / 720.0  # of a step
 
@@ -30,9 +31,11 @@ def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
     for name, row, a in stores(model, h):
         for line in lines_at(model, row):
             pipe, steps = model.tables.pipes[line["pipe"]], line["hold"] / h
+            round_trip = 2.0 * line["stretches"] * line["hold"]
+            if LITTLE * a * span / round_trip < 1.0:
+                continue
             takes = line["tau"] * line["stretches"] * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
             once = np.max(np.abs(given_back(method, a, steps)) * np.abs(read(steps))) * np.exp(-takes)
-            round_trip = 2.0 * line["stretches"] * line["hold"]
             found.append((times(float(once) - 1.0, span / round_trip), name, a))
     grows, name, a = max(found, default=(0.0, "", 0.0))
     if grows < GROWS:
