@@ -49,7 +49,7 @@ def energy(case: dict) -> tuple[float, list]:
     return total, [one for one in warnings if "bring back" in one.text]
 
 
-@pytest.mark.parametrize("method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "heun", "ssp-rk3"])
+@pytest.mark.parametrize("method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "ssp-rk3"])
 @pytest.mark.parametrize("volume", [0.6, 0.15])
 def test_what_is_told_to_grow_grows(method, volume):
     """After 30 s beside after 1 s, without friction; a step takes 0.24 and 0.96 of the time that fills the chamber.
@@ -57,7 +57,8 @@ def test_what_is_told_to_grow_grows(method, volume):
     Jumps that reach it within steps leave some energy of their own, at the longer of these a seventh.
     """
     (early, _), (late, told) = (energy(vessel(method, 0.01, end, volume, 200)) for end in (1.0, 30.0))
-    if any(not one.ok for one in told):
+    assert all(not one.ok for one in told)
+    if told:
         assert late > 1e3 * early
-    elif not told:
+    else:
         assert late < 1.2 * early

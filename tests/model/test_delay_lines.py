@@ -296,6 +296,15 @@ def test_random_networks_do_not_grow():
         assert found.reason == "finished" and max(late) <= 1.05 * max(early) and max(early) < 4.0 * JUMP
 
 
+@pytest.mark.parametrize("control", [{"courant": 0.9, "method": "rk4"}, {"rtol": 1e-5, "method": "rodas-5p"}])
+def test_what_a_store_is_given_is_taken_from_its_own_line(control):
+    """Beside a lake, whose supply is booked by the method alone, and a line shorter than a step."""
+    case = vessel("rk4", 0.01)
+    del case["numerics"]["step"]
+    found = fvsolve.run(case | {"numerics": case["numerics"] | control})
+    assert found.reason == "finished" and found.ledger["mass"]["relative"] < 1e-14
+
+
 def test_jumps_that_find_no_room_are_told(monkeypatch):
     """Two of each wave are kept, where some hundred live."""
     monkeypatch.setattr(past, "LEAST_JUMPS", 2)

@@ -103,10 +103,11 @@ def stores(tables, i):
 
 
 @njit(forceinline=True)
-def mend(past, tables, y, i, flow, missed):
-    """Give a store what a flow that began within the step has brought."""
+def mend(past, tables, y, pipe, i, flow, missed):
+    """Give a store what a flow out of a line that began within the step has brought, and take it from the line."""
     if stores(tables, i) and flow * missed != 0.0:
         y[tables.nodes[i]["y"]] += flow * missed
+        y[pipe["y"]] -= flow * missed
         past[MENDED] = NAN
 
 
@@ -118,9 +119,7 @@ def meet(past, places, tables, y, which, side, t, size, missed):
     node = tables.nodes[i]
     if node["kind"] != JUNCTION:
         send(past, places, tables, end_of(line, side), side, t, -size, pipe)
-        mend(past, tables, y, i, 2.0 * size, missed)
-        if stores(tables, i):
-            y[pipe["y"]] -= 2.0 * size * missed
+        mend(past, tables, y, pipe, i, 2.0 * size, missed)
         return
     change = 2.0 * size / node["admittance"]
     for k in range(node["line_count"]):
@@ -150,19 +149,13 @@ def pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed
     past[place + queue], past[KNOWN_TIME] = 0.0, NAN
     run(CLOSE, t, y, y[:0], spare, handle)
     past[place + queue], past[KNOWN_TIME] = size, NAN
-    mended = False
-    for i in range(tables.nodes.size):
-        if stores(tables, i):
-            mend(past, tables, y, i, out[layout["net"] + i] - spare[layout["net"] + i], missed)
-            mended = True
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], layout["ends"] + 4 * line["pipe"]
-        if mended:
-            left = (out[at] - out[at + 1]) - (out[at + 2] - out[at + 3])
-            y[pipe["y"]] += missed * (left - ((spare[at] - spare[at + 1]) - (spare[at + 2] - spare[at + 3])))
         for side in range(2):
+            come = out[at + 1 + side] - spare[at + 1 + side]
             change = out[at + 3 * side] - spare[at + 3 * side]
+            mend(past, tables, y, pipe, pipe["to_node"] if side == 1 else pipe["from_node"], come - change, missed)
             if abs(change) > enough(past, tables, pipe):
                 keep(past, places, end_of(line, side), side, when, change, pipe)
 
