@@ -21,9 +21,8 @@ class Told:
 
 
 REFUSALS = ("above every source", "no steady state")
-IN_PARTS = (
-    1e-3  # of a kind: what a step errs by; rounding may decide which steps of Newton are taken in parts, as runs say
-)
+# Of a kind, what a step errs by: rounding may decide which steps of Newton are taken in parts, as runs say.
+IN_PARTS = 1e-3
 
 
 def told(source, **more) -> Told:

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 import fvsolve
 from fvsolve.case.text import write
 from restated import sayings
-from restated.drawing import drawn, networks
-from restated.telling import alike, told
+from restated.drawing import IMPLICIT, drawn, networks
+from restated.telling import IN_PARTS, alike, told
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
@@ -25,7 +25,13 @@ ROUND = 1e-9
 
 
 def near(case: dict) -> float:
-    """How far apart the same in other words may be, over the greatest value of the quantity."""
+    """How far apart the same in other words may be, over the greatest value of the quantity.
+
+    An implicit step with weno5 may have two roots, apart by what it errs by, and rounding chooses (one seen: both are
+    right to 5e-12, and 1.4e-6 apart).
+    """
+    if case["numerics"]["scheme"] == "weno5" and case["numerics"]["method"] in IMPLICIT:
+        return IN_PARTS
     return 10 * case["numerics"].get("rtol", 0.1 * ROUND)
 
 
