@@ -96,14 +96,15 @@ class Slate:
             self.full_at = count + left
         return float(self.full_at - count)
 
-    def along(self, t: float, out: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Pipe -> both waves in the middle of its cells, of delay lines [kg/s]."""
+    def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """Pipe -> both waves in the middle of so many equal parts of its cells, of delay lines [kg/s]."""
         found = {}
         if len(self.model.tables.delays):
             from fvsolve.kernels.delay.along import along_lines
 
             for which, row in enumerate(self.model.tables.delays):
-                found[int(row["pipe"])] = r, l = np.zeros(row["places"]), np.zeros(row["places"])  # noqa: E741
+                n = parts * int(row["places"])
+                found[int(row["pipe"])] = r, l = np.zeros(n), np.zeros(n)  # noqa: E741
                 along_lines(t, out, self.handle, which, r, l)
         return found
 

@@ -159,7 +159,7 @@ def field_gaps(run: Outcome, truth) -> dict[tuple, Gap]:
     """
     model, found = run.model, {}
     theirs = truth.fields(model) if model.pipes or model.basins else {}
-    mine = fields(model, waves(model, run.y)) if model.pipes else {}
+    mine = fields(model, waves(run)) if model.pipes else {}
     for k, pipe in enumerate(model.pipes):
         lengths, span = np.full(pipe.cells, pipe.length / pipe.cells), truth.spans.get(pipe.name, math.nan)
         per = float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
@@ -210,13 +210,14 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
     return found
 
 
-def waves(model, y: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Sum and difference of both waves in the cells of every pipe [kg/s]."""
-    found = {}
-    for row, pipe in zip(model.tables.pipes, model.pipes, strict=True):
-        o, n = int(row["y"]), pipe.cells
-        r, l = y[o : o + n], y[o + n : o + 2 * n]  # noqa: E741
-        found[pipe.name] = r + l, r - l
+def waves(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Sum and difference of both waves in the cells of every pipe at the end [kg/s]."""
+    found = dict(run.lines)
+    for row, pipe in zip(run.model.tables.pipes, run.model.pipes, strict=True):
+        if pipe.name not in found:
+            o, n = int(row["y"]), pipe.cells
+            r, l = run.y[o : o + n], run.y[o + n : o + 2 * n]  # noqa: E741
+            found[pipe.name] = r + l, r - l
     return found
 
 
@@ -236,7 +237,7 @@ def size_of(run: Outcome, name: str) -> float:
     """How large a variable of a run is."""
     if name in ("pressure", "flow"):
         k = ("pressure", "flow").index(name)
-        return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, waves(run.model, run.y)).values())
+        return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, waves(run)).values())
     for basin in run.model.basins:
         for what, one in contents(basin, run.y).items():
             if name == variable_of(basin, what):

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.delay import followed
 from fvsolve.run import model_of
+from fvsolve.studies.lines import averages, lines
 
 
 def names(given: str | Sequence[str] | None) -> list[str] | None:
@@ -29,7 +29,7 @@ class Outcome:
     y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
     envelope : pipe -> "least_pressure", "greatest_pressure" [Pa], ... of its cells over the run
     counts : steps, rejections, rhs, ...; seconds : stepping alone, nothing compiled [s]; processor : its CPU time [s]
-    slate : what the run wrote, its envelope and flags
+    slate : what the run wrote, its envelope and flags; lines : of delay lines at the end, see `lines.averages`
     """
 
     reason: str
@@ -45,6 +45,7 @@ class Outcome:
     processor: float = float("nan")
     model: object = None
     slate: object = None
+    lines: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict:
         """For another process: without the model, which is made there of the same case and keys."""
@@ -52,8 +53,10 @@ class Outcome:
 
     @property
     def cell_updates(self) -> int:
-        """Calls of the rates times cells (or states, without cells): a cost that no machine changes."""
-        cells = self.model.cells + sum(basin.n for basin in self.model.basins)
+        """Calls of the rates times cells and stretches (or states, without any): a cost that no machine changes."""
+        delays, cells = self.model.tables.delays, self.model.all_cells
+        if len(delays):  # of which stretches are stepped
+            cells += int((delays["stretches"] - delays["places"]).sum())
         return self.counts.get("rhs", 0) * max(1, cells or self.model.y_size)
 
 
@@ -126,6 +129,7 @@ def _once(model, y, run) -> Outcome:
     return Outcome(
         summary.reason, summary.finished, False, summary.t, made.loop.now.copy(), rows, names,
         summary.envelope, summary.counts, summary.seconds, made.processor, model, made.slate,
+        averages(made.slate, summary.t, made.loop.stepper.out),
     )  # fmt: skip
 
 
@@ -134,8 +138,7 @@ Progress = Callable[[int, int, str], None]  # (points finished, points in all, w
 
 def without_lines(case, study: str, beside: str = "") -> None:
     """Raises FvsolveError where pipes are delay lines, of whose past a study knows nothing yet; beside : a hint."""
-    names = [name for name, one in followed(case).items() if one.line == "delay"]
-    if names:
+    if names := lines(case):
         raise FvsolveError(f"{study} does not know delay lines yet; {listing(names)} would be: {beside}say "
                            'numerics.line = "cells", and line of no pipe')  # fmt: skip
 

@@ -16,7 +16,7 @@ import numpy as np
 from fvsolve import exact as room
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.methods import METHODS
-from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, keys, pipes, scaled, total
+from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, in_cells, keys, scaled, total
 from fvsolve.studies.accuracy.plane import contents, lowered
 from fvsolve.studies.accuracy.timing import finished, lasting, tasted
 from fvsolve.studies.distance import (
@@ -31,6 +31,7 @@ from fvsolve.studies.distance import (
     waves,
 )
 from fvsolve.studies.errands import Errand, Errands
+from fvsolve.studies.lines import lines as delayed
 from fvsolve.studies.outcome import Outcome, outcome, prepared
 
 FINER = 4  # times the cells of the finest run that is judged
@@ -91,14 +92,15 @@ def once(case, keys: Mapping) -> Outcome:
 
 def truth(
     case, finest: Mapping | None = None, *, opinions: int | None = None, judged: bool = False, way: str = "both",
-    stiff: bool = False, exact: bool = True, run: Callable = once, tell: Callable[[str], None] = lambda what: None,
-    errands: Errands | None = None, stages: tuple[dict, ...] = (),
+    stiff: bool = False, exact: bool = True, lines: bool = False, run: Callable = once,
+    tell: Callable[[str], None] = lambda what: None, errands: Errands | None = None, stages: tuple[dict, ...] = (),
 ) -> Truth:  # fmt: skip
     """The best truth for runs of a case with the keys `finest` or coarser ones.
 
     opinions : how many kinds of runs there are to be, two at least to know what kinds share; all if None
     judged : whether the case's own scheme and method are what is judged, so that others are to find it
     way : "both", or "time": the same cells and scheme, where what is judged is the step alone
+    lines : whether it is delay lines that are judged, by the same case in cells: any way to follow these will do
     stiff : whether something else than waves holds explicit steps back
     exact : whether the solution that the case names under [exact] is used, where it says what is judged
     errands : who makes the runs, in place of `run`; stages : what was set on their case to make this one
@@ -107,10 +109,10 @@ def truth(
     from fvsolve.case import load
 
     case = load(case, finest or {})
-    known = exact_truth(case) if exact and case.exact is not None and not (way == "time" and pipes(case)) else None
+    known = exact_truth(case) if exact and case.exact is not None and not (way == "time" and in_cells(case)) else None
     if known is not None and opinions == 1:
         return known
-    kinds, found, told = candidates(case, judged, way, stiff), [], []
+    kinds, found, told = candidates(case, judged, way, stiff, lines), [], []
     first = list(itertools.islice(kinds, opinions))
     if errands is not None:
         run = sent_ahead(errands, (*stages, dict(finest or {})), first, tell)
@@ -218,10 +220,10 @@ def start_of(model) -> room.ExactStart:
 # finer runs -------------------------------------------------------------------------------------------------------
 
 
-def candidates(case, judged: bool, way: str, stiff: bool) -> Iterator[tuple[str, list[dict]]]:
+def candidates(case, judged: bool, way: str, stiff: bool, lines: bool) -> Iterator[tuple[str, list[dict]]]:
     """(what a kind of run is in words, the keys of three of it from coarse to fine), the best kind first."""
     numerics, cells = case.numerics, counts(case)
-    if way == "time" and (cells or basins(case)):
+    if way == "time" and (cells or basins(case) or delayed(case)):
         yield of_steps(case)
         return
     able = {scheme for scheme, *_ in WAVES} <= {*case.schemes}
@@ -229,8 +231,10 @@ def candidates(case, judged: bool, way: str, stiff: bool) -> Iterator[tuple[str,
     if judged:  # by others, and not by characteristics, which the schemes that they are judged with may be
         own = [numerics.scheme == one[0] if cells else numerics.method == one[1] for one in table]
         table = [one for _, one in sorted(zip(own, table, strict=True), key=lambda pair: pair[0]) if one[4] != SHARP]
+    if lines and able and any(jump for _, jump in prepared(case).breaks):  # which nothing else in cells carries
+        table = sorted(WAVES, key=lambda one: one[4] != SHARP)
     for scheme, method, control, size, factor, *limiters in table:
-        if judged and cells:
+        if judged and cells and not lines:
             method = other_method(METHODS[method].explicit, numerics.method)
         if control == "rtol" and numerics.rtol is not None:
             size = max(LEAST_RTOL, min(size, SHARE * numerics.rtol))
@@ -298,7 +302,7 @@ def of_run(run: Outcome, words: str = "") -> Truth:
     """A run as what others are measured against."""
 
     def fields_of(model) -> dict:
-        fine = waves(run.model, run.y)
+        fine = waves(run)
         cells = {pipe.name: pipe.cells for pipe in model.pipes}
         found = fields(model, {name: tuple(averaged(one, cells[name]) for one in pair) for name, pair in fine.items()})
         pairs = zip(run.model.basins, model.basins, strict=True)

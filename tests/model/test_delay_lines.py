@@ -6,7 +6,22 @@ import json
 
 import numpy as np
 import pytest
-from truth.delays import AREA, BORE, FLOW, JUMP, LENGTH, SPEED, STOP, TRAVEL, beside_jumps, fork, main, pipe, square
+from truth.delays import (
+    AREA,
+    BORE,
+    FLOW,
+    JUMP,
+    LENGTH,
+    SPEED,
+    STOP,
+    TRAVEL,
+    beside_jumps,
+    fork,
+    main,
+    pipe,
+    square,
+    turned,
+)
 from truth.scenes import RHO, scene
 
 import fvsolve
@@ -244,14 +259,6 @@ def test_more_steps_than_were_foreseen():
     assert found.reason == "finished" and found.summary["steps"] > 2000
 
 
-def turned(case: dict) -> dict:
-    """Every pipe drawn the other way."""
-    for link in case["links"].values():
-        if link["type"] == "pipe":
-            link["from"], link["to"] = link["to"], link["from"]
-    return case
-
-
 def test_drawn_the_other_way():
     one = fvsolve.run(short("delay", method="euler", step=0.01))
     other = fvsolve.run(turned(short("delay", method="euler", step=0.01)))
@@ -362,7 +369,7 @@ def test_what_knows_no_lines_says_so():
     for call in (lambda: model.rhs(0.0, model.start), lambda: model.jacobian(0.0, model.start)):
         with pytest.raises(FvsolveError, match="delay lines"):
             call()
-    for study in (studies.stability, studies.energy, studies.order, studies.chart):
+    for study in (studies.stability, studies.energy, studies.chart):
         with pytest.raises(FvsolveError, match="does not know delay lines yet; main would be"):
             study(case)
 

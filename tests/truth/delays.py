@@ -48,6 +48,14 @@ def fork(numerics: dict, end: float = 6.0, every: float = 0.05, **keys) -> dict:
     return scene(nodes, links, end, numerics, probes, every)
 
 
+def turned(case: dict) -> dict:
+    """Every pipe drawn the other way."""
+    for link in case["links"].values():
+        if link["type"] == "pipe":
+            link["from"], link["to"] = link["to"], link["from"]
+    return case
+
+
 def square(t, first: float, period: float) -> np.ndarray:
     """1 and -1 in turn from `first` on, each for half a period; 0 before."""
     return np.where(t < first, 0.0, np.where(np.floor((t - first) / (0.5 * period) + 1e-9) % 2 == 0, 1.0, -1.0))

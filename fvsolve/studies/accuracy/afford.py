@@ -24,7 +24,7 @@ def affordable(
 ) -> Plan:  # fmt: skip
     """The rows of a refinement; where nothing says on how many cells it begins, as many as a minute or two allow."""
     made = plan(case, refine, key, levels, cells)
-    if cells is not None or key is not None or made.way == "time":
+    if cells is not None or key is not None or made.way == "time" or not counts(case):
         return made
     asked = {"study": "order", "what": "first cells", "way": made.way, "levels": len(made.levels), "against": against}
     known = None if points is None else points.find(case, asked)

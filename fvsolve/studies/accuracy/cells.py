@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
+from fvsolve.model.delay import followed
 from fvsolve.parts import Basin, Pipe
 from fvsolve.schemes import SCHEMES
 from fvsolve.studies.accuracy.plane import contents
+from fvsolve.studies.lines import lines
 from fvsolve.studies.outcome import prepared
 
 Counts = dict[str, tuple[int, ...]]  # dotted key -> numbers of cells: one of a pipe, two of a basin
@@ -24,14 +26,20 @@ def pipes(case) -> dict[str, Pipe]:
     return {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
 
 
+def in_cells(case) -> dict[str, Pipe]:
+    """Those of them that have cells, and so are no delay lines."""
+    delayed = lines(case)
+    return {name: pipe for name, pipe in pipes(case).items() if name not in delayed}
+
+
 def basins(case) -> dict[str, Basin]:
     """The basins of a case that have cells, by name."""
     return {name: case.nodes[name] for name in case.meshes}
 
 
 def counts(case) -> Counts:
-    """Numbers of cells that a case may be given: of pipes, and of basins that are rectangles."""
-    found: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in pipes(case).items()}
+    """Numbers of cells that refine a case: of pipes that are no delay lines, and of basins that are rectangles."""
+    found: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in in_cells(case).items()}
     return found | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
 
 
@@ -92,7 +100,8 @@ def loads(case, found: Counts) -> bool:
 def greatest_rate(case, found: Mapping[str, tuple[int, ...]]) -> float:
     """Cells that the quickest wave crosses in a second [1/s], in basins as they count them and at the start."""
     rates = [case.wave_speed(name) * found[f"links.{name}.cells"][0] / pipe.length
-             for name, pipe in pipes(case).items()]  # fmt: skip
+             for name, pipe in in_cells(case).items()]  # fmt: skip
+    rates += [one.rate for one in followed(case).values() if one.line == "delay"]
     if basins(case):
         own = {key: numbers for key, numbers in counts(case).items() if key.startswith("nodes.")}
         finer = max((max(found[key]) / max(numbers) for key, numbers in own.items()), default=1.0)

@@ -18,6 +18,7 @@ from fvsolve.studies.accuracy.rows import Order, OrderRow
 from fvsolve.studies.accuracy.timing import lasting
 from fvsolve.studies.distance import NORMS, differences, recorded, size_of
 from fvsolve.studies.errands import Errand, Errands
+from fvsolve.studies.lines import EXACT, EXPECTED, READING, cells_for_lines, lines
 from fvsolve.studies.outcome import Outcome, Progress, outcome, prepared
 from fvsolve.studies.points import Points
 from fvsolve.studies.truth import ROUNDING, Truth, of_run, truth
@@ -28,6 +29,7 @@ WORTH = 10.0  # times the truth's own error that an error must be to mean anythi
 UNSURE = "reference"  # the mark of rows that the reference cannot judge
 FINEST = "finest"  # the mark of a row that ran, with no finer one to judge it
 SURE_FACTOR = 0.25  # error that an extrapolated error may have
+RIGHT = 1e-12  # of the size of a variable: errors that steps and stretches have no part in
 ASTRAY = 0.06, 0.04  # how far from theory an order of three differences may lie: a + b order
 
 
@@ -116,9 +118,11 @@ class Judge:
 
     def finer(self, way: str, exact: bool, **others) -> Truth:
         """The truth for the finest row by one kind of runs, made otherwise than it; in time by the same cells."""
-        method = METHODS.get(self.case.numerics.method)
+        method, last = METHODS.get(self.case.numerics.method), self.plan.levels[-1]
+        delayed = way != "time" and lines(self.case)
+        keys = last.set | (cells_for_lines(self.case, last.step) if delayed else {})
         return truth(
-            self.case, recorded(self.case, self.plan.levels[-1].set), opinions=1, judged=True, way=way,
+            self.case, recorded(self.case, keys), opinions=1, judged=True, way=way, lines=bool(delayed),
             stiff=method is None or not method.explicit, exact=exact, stages=self.stages, **others,
         )  # fmt: skip
 
@@ -161,7 +165,10 @@ class Judge:
         self.refuse(rows, fits, words)
         left_out = self.case.exact is None and "exact" in self.case.raw
         notes = ["[exact] does not hold with these settings and is left out"] if left_out else []
-        notes += [*notes_of(rows, doubtful), *self.expected(), *self.way_out(fits)]
+        exact = bool(lines(self.case)) and all(e <= RIGHT * sizes[name] for row in rows for name, norms in row.errors.items()
+                    for e in norms.values() if name not in ("pressure", "flow"))  # fmt: skip
+        notes += notes_of(rows, [] if exact else doubtful)
+        notes += [*self.expected(exact), *self.way_out(fits)]
         numerics = self.case.numerics
         known = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
         return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
@@ -181,7 +188,12 @@ class Judge:
             )
 
     def smooth_order(self) -> float:
-        """Order that scheme and method have together where all is smooth; NaN where rows are tolerances."""
+        """Order that scheme and method have together where all is smooth; NaN where rows are tolerances.
+
+        Delay lines may show that by which they read what was sent, whatever the method.
+        """
+        if lines(self.case) and self.plan.measure != "rtol":
+            return READING
         numerics, space = self.case.numerics, space_order(self.case)
         if self.plan.way == "space" or (self.plan.way == "both" and numerics.rtol is not None):
             return space
@@ -193,6 +205,8 @@ class Judge:
     def theory(self) -> dict[str, float]:
         """Norm -> order expected, NaN: none; jumps (s = 0) and kinks (s = 1) leave (s + 1) p / (p + 1) of p in L1."""
         p, breaks = self.smooth_order(), self.breaks
+        if lines(self.case):
+            return dict.fromkeys(NORMS, np.nan)
         if self.plan.way == "time" or not breaks:
             return dict.fromkeys(NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p)
         s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
@@ -200,9 +214,11 @@ class Judge:
             return {"L1": 1.0, "L2": 0.5, "max": 0.0}  # bores keep steep
         return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
 
-    def expected(self) -> list[str]:
-        """What is to be said where jumps or kinks of schedules run through pipes."""
+    def expected(self, exact: bool) -> list[str]:
+        """What is to be said where jumps or kinks of schedules run through pipes; exact : no row shows an error."""
         breaks = self.breaks
+        if lines(self.case):
+            return [EXACT if exact else EXPECTED]
         if self.plan.way == "time" or not breaks:
             return []
         jump, told = any(jumps for _, jumps in breaks), self.theory()
@@ -343,7 +359,9 @@ def plain_numbers(found: Mapping) -> dict:
 
 def words_of(made: Plan, level: Level) -> str:
     """A row in words."""
-    return f"{level.cells} cells" if made.way != "time" else f"{made.measure.split(' ')[0]} {level.size:.4g}"
+    if made.way != "time" and level.cells:
+        return f"{level.cells} cells"
+    return f"{made.measure.split(' ')[0]} {level.size:.4g}"
 
 
 def notes_of(rows, doubtful: list[str]) -> list[str]:

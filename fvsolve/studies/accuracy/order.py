@@ -10,6 +10,7 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.rows import Order
 from fvsolve.studies.errands import Errands
+from fvsolve.studies.lines import settled
 from fvsolve.studies.outcome import Progress, names, without_basins, without_lines
 from fvsolve.studies.points import OUT, Points, kept_in
 
@@ -76,7 +77,9 @@ def _order(case, settings: Mapping, rows: tuple, against, given, points, progres
     from fvsolve.case import load
 
     case = load(case, settings)
-    without_lines(case, "order")
+    if kept := settled(case):
+        settings = settings | kept
+        case = load(case, kept)
     made = affordable(case, *rows, against, points)
     if given == (None, None, None):
         from fvsolve.studies.accuracy.judge import Judge
@@ -85,4 +88,5 @@ def _order(case, settings: Mapping, rows: tuple, against, given, points, progres
     from fvsolve.studies.accuracy.manufactured import Manufactured
 
     without_basins(case, "order by functions of pipes")
+    without_lines(case, "order by functions of pipes")
     return Manufactured(case, made, against, *given).study(points, progress)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import (
@@ -13,6 +15,7 @@ from fvsolve.studies.accuracy.cells import (
     counts,
     from_files,
     greatest_rate,
+    in_cells,
     keys,
     most,
     pipes,
@@ -22,6 +25,8 @@ from fvsolve.studies.accuracy.cells import (
     space_order,
     total,
 )
+from fvsolve.studies.lines import lines
+from fvsolve.studies.outcome import prepared
 
 WAYS = ("both", "space", "time")
 TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
@@ -59,6 +64,8 @@ class Plan:
 def resolutions(case) -> dict[str, str]:
     """Key -> the way it refines, of every key of a case that is a resolution."""
     found = dict.fromkeys(counts(case), "both")
+    if lines(case):
+        found["numerics.accuracy"] = "space"
     if pipes(case) or basins(case):
         found["numerics.courant"] = "time"
     if by_cell_time(case):
@@ -68,7 +75,7 @@ def resolutions(case) -> dict[str, str]:
 
 def by_cell_time(case) -> list[str]:
     """Pipes that state no cells."""
-    return [name for name in pipes(case) if "cells" not in case.raw["links"][name]]
+    return [name for name in in_cells(case) if "cells" not in case.raw["links"][name]]
 
 
 def plan(
@@ -76,8 +83,9 @@ def plan(
 ) -> Plan:
     """The rows of a refinement of a case, coarsest first.
 
-    refine : "both" (cells and steps halved together, the default with cells), "space" (cells halved, one step that
-    suits the finest), "time" (steps halved, or rtol where the case steps by error; the default without cells)
+    refine : "both" (cells, stretches of delay lines and steps halved together, the default with any), "space" (cells
+    and stretches halved, one step that suits the finest), "time" (steps halved, or rtol where the case steps by error;
+    the default without cells)
     key : one resolution in place of all; cells : of the coarsest row, along the pipe or side with most (the others in
     proportion). Raises FvsolveError for a way, key or number of levels that cannot be.
     """
@@ -85,10 +93,10 @@ def plan(
     if key is not None and key not in known:
         near = did_you_mean(key, known)
         raise FvsolveError(f"{key} is no resolution{near}; those of this case are {', '.join(known)}")
-    refine = refine or (known[key] if key else "both" if counts(case) else "time")
+    refine = refine or (known[key] if key else "both" if counts(case) or lines(case) else "time")
     if refine not in WAYS:
         raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}; wanted {", ".join(WAYS)}')
-    if refine != "time":
+    if refine != "time" and not lines(case):
         refinable(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
         raise FvsolveError(f'{key} refines {"time" if known[key] == "time" else "space"}, not "{refine}"')
@@ -99,7 +107,50 @@ def plan(
         raise FvsolveError(
             f"cells = {cells}: here steps alone are refined, cells stay; leave it out, or set the case's"
         )
-    return time_plan(case, key, levels) if refine == "time" else space_plan(case, refine, key, levels, cells)
+    if refine == "time":
+        return time_plan(case, key, levels)
+    if lines(case) and (key == "numerics.accuracy" or not counts(case)):
+        if cells is not None:
+            raise FvsolveError(f"cells = {cells}: those of delay lines are places where fields are told; leave it out")
+        return lines_plan(case, refine, levels)
+    return space_plan(case, refine, key, levels, cells)
+
+
+# delay lines ------------------------------------------------------------------------------------------------------
+
+
+def lines_plan(case, way: str, levels: int) -> Plan:
+    """What lines may be off by halved from row to row, which cuts them into twice the stretches; steps with it, or not.
+
+    Sizes are steps, or without these the stretches themselves of the line that has most in the last row.
+    """
+    count, step = total(case, counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
+    rows = [lines_keys(case, way, k) for k in range(levels)]
+    if way == "both":
+        by_error = math.isnan(step)
+        first = 1.0 / greatest_rate(case, counts(case)) if by_error else step
+        made = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
+                for k, row in enumerate(rows)]  # fmt: skip
+        return Plan(way, "longest step [s]" if by_error else "step [s]", tuple(made), STRETCHED[by_error])
+    stretches = [prepared(case, row).tables.delays for row in rows]
+    most = int(np.argmax(stretches[-1]["stretches"]))
+    if stretches[0]["stretches"][most] == stretches[-1]["stretches"][most]:
+        raise FvsolveError("a smaller numerics.accuracy cuts no delay line of this case into more stretches, for want "
+                           'of friction or because steps are as long; wanted refine "both" or "time"')  # fmt: skip
+    made = [Level(row, float(one["tau"][most]), count, step) for row, one in zip(rows, stretches, strict=True)]
+    return Plan(way, "stretch [s]", tuple(made), f"{STRETCHES}, one step for all rows")
+
+
+STRETCHES = "what delay lines may be off by halved, which cuts them into twice the stretches"
+STRETCHED = {False: f"{STRETCHES}, and steps with it", True: f"{STRETCHES}, and their longest step with it"}
+
+
+def lines_keys(case, way: str, k: int) -> dict:
+    """Keys by which row k has delay lines cut into stretches 2^-k as long, and steps that go by their cells too."""
+    found = {"numerics.accuracy": case.numerics.accuracy / 2**k} if lines(case) else {}
+    if way == "both" and (case.numerics.rtol is not None or (counts(case) and case.numerics.courant is not None)):
+        found |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in lines(case)}
+    return found
 
 
 # space ------------------------------------------------------------------------------------------------------------
@@ -121,10 +172,14 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
     for k, own in enumerate(now):
         step, stepping = stepping_of(case, own, own if way == "both" else {**now[-1]}, k, courant)
         length = max(size(case, name, own[name]) for name in moving)
-        rows.append(Level(keys(own) | stepping, length, total(case, own), step))
+        stretched = lines_keys(case, way, k) if key is None else {}
+        if stretched and way == "both" and courant is not None:
+            step = courant / greatest_rate(case, first) / 2**k
+        rows.append(Level(keys(own) | stepping | stretched, length, total(case, own), step))
     names = ", ".join(name.split(".")[1] for name in moving)
-    everything = " and ".join(word for word, there in (("pipes", pipes(case)), ("basins", basins(case))) if there)
+    everything = " and ".join(word for word, there in (("pipes", in_cells(case)), ("basins", basins(case))) if there)
     what = f"cells of all {everything}" if len(moving) == len(first) and not from_files(case) else f"cells of {names}"
+    what += " and stretches of delay lines" if lines(case) and key is None else ""
     return Plan(way, "cell size [m]", tuple(rows), f"{what} doubled, {time_words(case, way, courant)}")
 
 
@@ -174,7 +229,9 @@ def time_words(case, way: str, courant: float | None) -> str:
     if way == "space":
         finest = "" if courant is None else f": Courant number {courant:g}"
         return f"one step for all rows, that of the finest{finest}"
-    return "steps halved with them" if numerics.step is not None else f"Courant number {numerics.courant:g} in all rows"
+    if numerics.step is not None or lines(case):
+        return "steps halved with them"
+    return f"Courant number {numerics.courant:g} in all rows"
 
 
 # time -------------------------------------------------------------------------------------------------------------

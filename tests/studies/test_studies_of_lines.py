@@ -1,0 +1,69 @@
+"""Studies of scenes with delay lines: orders, against cells and rays; what is exact is said to be."""
+
+from __future__ import annotations
+
+import pytest
+from truth import pulses
+from truth.delays import fork, main, turned
+
+from fvsolve import studies
+from fvsolve.errors import FvsolveError
+
+
+def rough(**numerics) -> dict:
+    """A pulse of demand in a pipe with much friction, as one delay line."""
+    case = pulses.case(exact=False, points=pulses.FEW)
+    case["links"]["main"]["friction"] = {"model": "steady", "factor": 0.5}
+    demand = case["nodes"]["gate"]["demand"]
+    demand["value"] = [one + 0.2 for one in demand["value"]]
+    given = {"line": "delay", "method": "euler", "step": 0.00125, "accuracy": 0.01, **numerics}
+    return case | {"numerics": {"end": pulses.END, **given}}
+
+
+def test_friction_of_lines_is_of_second_order_beside_cells():
+    found = studies.order(rough())
+    assert found.kind == "finer" and found.words.startswith("upwind5 on 2560 cells")
+    for probe in ("gate.pressure", "main.pressure@0.37"):
+        assert found.fits[probe]["L1"].order == pytest.approx(2.0, abs=0.1)
+    stretched = studies.order(rough(step=0.0002), refine="space")
+    assert stretched.fits["gate.pressure"]["L1"].order == pytest.approx(2.0, abs=0.2)
+    assert [row.level.size for row in stretched.rows] == pytest.approx([0.1 / n for n in (6, 11, 21, 41)])
+
+
+def test_drawn_the_other_way_or_by_two_the_study_is_the_same():
+    one, other = studies.order(rough(), levels=2), studies.order(turned(rough()), levels=2)
+    two = studies.order(rough(), levels=2, jobs=2)
+    for row, same, as_well in zip(one.rows, two.rows, other.rows, strict=True):
+        assert same.errors == row.errors
+        for name in ("pressure", "flow", "gate.pressure"):
+            assert as_well.errors[name] == pytest.approx(row.errors[name], rel=1e-8)
+
+
+def test_smooth_waves_between_steps_are_of_sixth_order():
+    """Against rays, in the middle of a pipe; at the gate each wave is back after whole steps, and exact."""
+    case = pulses.case(line="delay", method="euler", courant=0.9)
+    found = studies.order(case, levels=3)
+    errors = [row.errors["main.pressure@0.37"]["L1"] for row in found.rows]
+    assert found.kind == "exact" and errors[0] > 30.0 * errors[1] > 30.0**2 * errors[2]
+    assert max(row.errors["gate.pressure"]["max"] for row in found.rows) < 1e-6
+
+
+def test_what_is_exact_at_any_step_is_said_to_be():
+    found = studies.order(main(4.0), levels=3)
+    assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
+    with pytest.raises(FvsolveError, match="for want of friction"):
+        studies.order(main(4.0), refine="space")
+
+
+def test_lines_beside_cells_are_refined_with_them():
+    case = fork(
+        {"scheme": "upwind5", "method": "rk4", "courant": 0.9},
+        every=0.0499,
+        friction={"model": "steady", "factor": 0.05},
+    )
+    case["links"]["up"]["line"] = "auto"
+    case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
+    found = studies.order(case, levels=3)
+    assert [row.level.cells for row in found.rows] == [5, 10, 20]
+    errors = [row.errors["gate.pressure"]["L1"] for row in found.rows]
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
