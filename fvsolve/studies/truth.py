@@ -220,7 +220,7 @@ def start_of(model) -> room.ExactStart:
 # finer runs -------------------------------------------------------------------------------------------------------
 
 
-def candidates(case, judged: bool, way: str, stiff: bool, lines: bool) -> Iterator[tuple[str, list[dict]]]:
+def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -> Iterator[tuple[str, list[dict]]]:
     """(what a kind of run is in words, the keys of three of it from coarse to fine), the best kind first."""
     numerics, cells = case.numerics, counts(case)
     if way == "time" and (cells or basins(case) or delayed(case)):

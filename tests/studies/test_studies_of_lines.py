@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from truth import pulses
 from truth.delays import fork, main, turned
@@ -67,3 +69,36 @@ def test_lines_beside_cells_are_refined_with_them():
     assert [row.level.cells for row in found.rows] == [5, 10, 20]
     errors = [row.errors["gate.pressure"]["L1"] for row in found.rows]
     assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
+
+
+def test_a_chart_of_lines_is_judged_by_cells():
+    """Shorter steps help until friction is left, whose places stay: a fourteenth of it in four times the stretches."""
+    steps, methods = [0.013, 0.0031, 0.00078], ["euler"]
+    found = studies.chart(rough(accuracy=0.005), methods=methods, step=steps)
+    assert found.reference.startswith("upwind5 on") and found.floor["trajectory"] < 1e-6 and found.default == "rk4"
+    errors = [point.trajectory for point in found.curves()["euler"]]
+    assert errors[0] > 20.0 * errors[1] > 20.0 * errors[2]
+    finer = studies.chart(rough(accuracy=0.00125), methods=methods, step=[0.00078])
+    assert finer.curves()["euler"][0].trajectory == pytest.approx(errors[2] * (11.0 / 41.0) ** 2, rel=0.2)
+    other = turned(rough(accuracy=0.005))
+    other["output"]["probes"] = ["gate.pressure", "main.pressure@0.63"]
+    two = studies.chart(other, methods=methods, step=steps, jobs=2)
+    assert [one.trajectory for one in two.points] == pytest.approx([one.trajectory for one in found.points], rel=1e-8)
+
+
+def test_a_chart_of_lines_has_steps_and_no_more():
+    for asked in ({"schemes": ["upwind"]}, {"cells": [10]}, {"rtol": [1e-3]}):
+        with pytest.raises(FvsolveError, match="their resolution is step"):
+            studies.chart(rough(), **asked)
+    with pytest.raises(FvsolveError, match="where delay lines are exact any step will do"):
+        studies.chart(main(2.0, every=0.0499), methods=["euler"], step=[0.05])
+
+
+def test_a_chart_of_lines_beside_cells_refines_the_cells():
+    case = fork({"scheme": "upwind5", "method": "rk4", "courant": 0.9}, 2.0, every=0.0499)
+    case["links"]["up"]["line"] = "delay"
+    case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
+    found = studies.chart(case, schemes=["upwind5"], methods=["rk4"], cells=[6, 12, 24])
+    errors = [one.trajectory for one in found.curves()["upwind5 rk4"]]
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2] and math.isfinite(found.floor["trajectory"])
+    assert "links.up.cells" not in found.points[0].setting.keys and found.default == "weno5 rk4"

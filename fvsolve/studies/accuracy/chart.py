@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from fvsolve.case import load
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
 from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, door
@@ -22,7 +23,8 @@ from fvsolve.studies.accuracy.setting import MethodSetting, adaptive, cell_keys,
 from fvsolve.studies.accuracy.timing import GIVEN_UP, compile_seconds, quickest
 from fvsolve.studies.distance import Distance, distance, moving
 from fvsolve.studies.errands import Errand, Errands
-from fvsolve.studies.outcome import Progress, names, prepared, without_lines
+from fvsolve.studies.lines import cells_for_lines, in_cells, lines, settled
+from fvsolve.studies.outcome import Progress, names, prepared
 from fvsolve.studies.points import Points
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.studies.truth import Truth, truth
@@ -134,15 +136,15 @@ def chart(
 ) -> Chart:
     """Run a case over schemes x methods x cells (or tolerances) and lay error against cost.
 
-    cells : of the pipe a wave takes longest to cross; rtol, step : of a case without cells [-], [s]
+    cells : of the pipe a wave takes longest to cross; rtol, step : of a case without cells [-], [s]; of one whose pipes
+    are all delay lines step alone
     target : an error over the trajectory for which a setting is to be found and run
     out : folder where finished points are kept and found again
     jobs, dask : who makes the runs, as in `sweep`; processes that share a processor's cache and memory take longer each
     Raises CaseError, FvsolveError.
     """
-    from fvsolve.case import load
-
     read, tell = load(case, set), progress or (lambda *_: None)
+    read = load(read, settled(read)) if settled(read) else read
     with Points(out) as kept, Errands(read, jobs, dask) as errands:
         return _Study(read, kept, tell, errands).go(schemes, methods, cells, rtol, step, target)
 
@@ -157,11 +159,11 @@ class _Study:
 
     def __init__(self, case: Case, points: Points, progress: Progress, errands: Errands) -> None:
         self.case, self.errands = case, errands
-        without_lines(self.case, "chart")
         if from_files(self.case):
             what = f"chart refines cells, and those of {listing(from_files(self.case))} are a file's"
             raise FvsolveError(f"{what}; order --refine time does without")
         self.points, self.progress = points, progress
+        self.celled = load(case, in_cells(lines(case))) if lines(case) else case
         self.default, self.compiling = default_curve(self.case), 0.0
         self.coarse: Coarse | None = None  # with pipes
         self.done, self.total, self.least_overshoot = 0, 0, 0.0
@@ -170,7 +172,7 @@ class _Study:
     def go(self, schemes, methods, cells, rtol, step, target) -> Chart:
         schemes, methods = names(schemes), names(methods)
         known(schemes, methods)
-        if longest(self.case):
+        if longest(self.celled):
             self.coarse = Coarse(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarsely))
             self.compiling += self.coarse.compile_seconds
         self.all = settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
@@ -199,7 +201,7 @@ class _Study:
             self.compiling += self.compile(setting)
         stiff = self.coarse is not None and self.coarse.stiff
         found = truth(
-            self.case, None if self.finest is None else cell_keys(self.case, self.finest), stiff=stiff,
+            self.case, self.judged(), stiff=stiff,
             tell=lambda name: self.progress(self.done, self.total, f"reference {name}"), errands=self.errands,
         )  # fmt: skip
         if not moving(found.run, found):
@@ -207,9 +209,17 @@ class _Study:
             raise FvsolveError(f"{self.case.name}: {told}")
         return found
 
+    def judged(self) -> dict | None:
+        """Keys of the finest cells that references are to judge; delay lines are judged by as fine ones."""
+        if not lines(self.case):
+            return None if self.finest is None else cell_keys(self.case, self.finest)
+        main, cells = longest(self.case) or longest(self.celled), self.finest or max(self.coarse.levels)
+        keys = cell_keys(self.case, cells) if self.finest else {}
+        return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
+
     def coarsely(self) -> dict:
         """The coarse run, kept, so that the same cells are found again."""
-        return asdict(coarse(self.case))
+        return asdict(coarse(self.case if longest(self.case) else self.celled))
 
     def floor(self) -> dict:
         """What the references are called and how far they disagree."""
@@ -299,7 +309,7 @@ class _Study:
             )
         found = cheapest(points, target, floor["trajectory"], "seconds")
         if found is None:
-            finer = "more cells" if self.coarse else "a smaller rtol"
+            finer = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
             raise FvsolveError(
                 f"no setting reaches {target:g}; the best is at {min(errors_of(points)):.2g}: give {finer}"
             )
@@ -322,7 +332,7 @@ def nothing(reason: str) -> dict:
 
 def grows(setting: MethodSetting) -> bool:
     """Whether the finer settings of a curve cost more: an implicit method may gain by a smaller tolerance."""
-    if setting.cells is not None or not adaptive(setting.method):
+    if setting.cells is not None or setting.control == "step" or not adaptive(setting.method):
         return True
     return setting.method != AUTO and METHODS[setting.method].explicit
 
@@ -336,6 +346,7 @@ def _aim(target: float, point: Point) -> Aim:
 def _useless(case: Case, points: list[Point], floor: dict) -> str:
     finest = min(errors_of(points), default=math.nan)
     told = f"all errors (least {finest:.2g})" if math.isfinite(finest) else "what can be told, for no run came near"
-    way = "fewer --cells (references have four times the finest)" if longest(case) else "a larger --rtol"
+    way = "a larger --step (where delay lines are exact any step will do)" if lines(case) else "a larger --rtol"
+    way = "fewer --cells (references have four times the finest)" if longest(case) else way
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
             f"{floor['trajectory']:.2g}, more than {told}; try {way}, or end the run earlier")  # fmt: skip

@@ -97,7 +97,7 @@ def setting_between(case: Case, coarse: MethodSetting, fine: MethodSetting, shar
     """The setting at a share of the way between two of a curve."""
     if coarse.cells is not None:
         return with_cells(case, coarse.scheme, coarse.method, math.ceil(between(coarse.cells, fine.cells, share)))
-    return without_cells(coarse.method, float(f"{between(coarse.size, fine.size, share):.2g}"))
+    return without_cells(coarse.method, float(f"{between(coarse.size, fine.size, share):.2g}"), coarse.control)
 
 
 def coarser(case: Case, setting: MethodSetting) -> MethodSetting | None:
@@ -106,7 +106,7 @@ def coarser(case: Case, setting: MethodSetting) -> MethodSetting | None:
         return with_cells(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None
     size = float(f"{setting.size * (10.0 if setting.control == 'rtol' else 2.0):.6g}")
     most = COARSEST_RTOL if setting.control == "rtol" else case.numerics.end - case.numerics.start
-    return without_cells(setting.method, size) if size <= most else None
+    return without_cells(setting.method, size, setting.control) if size <= most else None
 
 
 def fineness(points, name: str | None, where: Crossing | None) -> str:

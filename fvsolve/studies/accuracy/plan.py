@@ -12,7 +12,7 @@ from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.model.checks import rhs_seconds
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.methods import AUTO, METHODS
-from fvsolve.studies.accuracy.cells import counts, greatest_rate, total
+from fvsolve.studies.accuracy.cells import counts, greatest_rate, pipes, total
 from fvsolve.studies.accuracy.setting import (
     MethodSetting,
     adaptive,
@@ -23,11 +23,14 @@ from fvsolve.studies.accuracy.setting import (
     without_cells,
 )
 from fvsolve.studies.accuracy.timing import capped, compile_seconds, finished
+from fvsolve.studies.lines import lines
 from fvsolve.studies.outcome import prepared
 
 CHART_SCHEMES = ("upwind", "muscl", "upwind5", "weno5")
 EXPLICIT, IMPLICIT, IMPLICIT_SCHEME = ("ssp-rk3", "rk4", "dormand-prince"), "rodas-5p", "upwind5"
 LUMPED = ("rk4", "bogacki-shampine", "dormand-prince", "radau-iia-5", "rodas-5p", AUTO)
+DELAYED = ("euler", "trapezoid", "ssp-rk3", "rk4")
+PARTS = tuple(4 * 2**k for k in range(8))  # of the time in which a wave crosses the slowest delay line, about
 TOLERANCES = tuple(float(f"1e-{k}") for k in range(2, 11))
 STEPS = tuple(32 * 4**k for k in range(7))  # of methods that estimate no error
 LEVELS, MOST_CELLS = 5, 400
@@ -115,7 +118,9 @@ def default_scheme(case: Case) -> str:
 
 def default_curve(case: Case) -> str:
     """Name of the curve that the program's defaults lie on."""
-    return f"{default_scheme(case)} {DEFAULT_METHOD}" if longest(case) else DEFAULT_METHOD_RTOL
+    if longest(case):
+        return f"{default_scheme(case)} {DEFAULT_METHOD}"
+    return DEFAULT_METHOD if lines(case) else DEFAULT_METHOD_RTOL
 
 
 def left_out(case: Case, schemes: Sequence[str] | None) -> list[str]:
@@ -128,6 +133,8 @@ def settings(case: Case, found: Coarse | None, schemes, methods, cells, rtol, st
 
     found : the coarse run of a case with pipes, None of one without. Raises FvsolveError for what the case has not.
     """
+    if not longest(case) and lines(case):
+        return _delayed(case, schemes, methods, cells, rtol, step)
     if found is None:
         return _lumped(case, schemes, methods, cells, rtol, step)
     if rtol or step:
@@ -147,6 +154,17 @@ def _lumped(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetti
         sizes = sorted(rtol or TOLERANCES, reverse=True) if adaptive(method) else steps
         found += [without_cells(method, size) for size in sizes]
     return found
+
+
+def _delayed(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
+    """Of delay lines, whose resolution is the step: the error of a step does not see what is read between steps."""
+    if schemes or cells or rtol:
+        asked = "scheme" if schemes else "cells" if cells else "rtol"
+        raise FvsolveError(f"{case.name} has delay lines alone, so no {asked} to choose; their resolution is step")
+    travel = max(one.length / case.wave_speed(name) for name, one in pipes(case).items())
+    steps = sorted(step or [float(f"{travel / n:.2g}") for n in PARTS], reverse=True)
+    return [without_cells(method, size, "step")
+            for method in dict.fromkeys([*(methods or DELAYED), DEFAULT_METHOD]) for size in steps]  # fmt: skip
 
 
 def chosen(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
 from fvsolve.steppers.methods import AUTO, METHODS
-from fvsolve.studies.accuracy.cells import basins, counts, keys, pipes, scaled
+from fvsolve.studies.accuracy.cells import basins, counts, in_cells, keys, scaled
 
 TOLERANCE = 1e-4  # of implicit methods where there are cells: their steps follow what moves, not the cells
 
@@ -43,11 +43,14 @@ class MethodSetting:
 
 
 def longest(case: Case) -> str | None:
-    """Name of the part whose cells count: the basin with most along a side, else the pipe that a wave crosses last."""
+    """Name of the part whose cells count: the basin with most along a side, else the pipe that a wave crosses last.
+
+    None where there is none: delay lines have no cells.
+    """
     found = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
     if found:
         return max(found, key=found.get)
-    found = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items()}
+    found = {name: pipe.length / case.wave_speed(name) for name, pipe in in_cells(case).items()}
     return max(found, key=found.get, default=None)
 
 
@@ -65,14 +68,15 @@ def cell_keys(case: Case, cells: int) -> dict:
     main, own = longest(case), own_cells(case)
     if own is not None:
         return keys(scaled(counts(case), cells / own))
-    stated = {name for name in pipes(case) if case.raw["links"][name].get("cells") is not None}
-    factor = cells / pipes(case)[main].cells
-    found = {f"links.{name}.cells": max(1, round(pipes(case)[name].cells * factor)) for name in stated}
+    pipes = in_cells(case)
+    stated = {name for name in pipes if case.raw["links"][name].get("cells") is not None}
+    factor = cells / pipes[main].cells
+    found = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in stated}
     if main not in stated:
-        found["numerics.cell_time"] = pipes(case)[main].length / case.wave_speed(main) / cells
-    elif len(stated) < len(pipes(case)):
-        free = [pipe for name, pipe in pipes(case).items() if name not in stated]
-        travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items() if name not in stated)
+        found["numerics.cell_time"] = pipes[main].length / case.wave_speed(main) / cells
+    elif len(stated) < len(pipes):
+        free = [pipe for name, pipe in pipes.items() if name not in stated]
+        travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes.items() if name not in stated)
         found["numerics.cell_time"] = travel / (max(pipe.cells for pipe in free) * factor)
     return found
 
@@ -86,9 +90,10 @@ def with_cells(case: Case, scheme: str, method: str, cells: int) -> MethodSettin
     return MethodSetting(scheme, method, control, size, cells, keys | cell_keys(case, cells))
 
 
-def without_cells(method: str, size: float) -> MethodSetting:
-    """A setting of ordinary differential equations: by tolerance, or by step where a method estimates no error."""
-    control = "rtol" if adaptive(method) else "step"
+def without_cells(method: str, size: float, control: str | None = None) -> MethodSetting:
+    """A setting of ordinary differential equations or delay lines: by tolerance, or by step where there is no error
+    estimate, if `control` does not say."""
+    control = control or ("rtol" if adaptive(method) else "step")
     return MethodSetting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
 
 
