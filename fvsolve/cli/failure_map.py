@@ -111,6 +111,8 @@ def _show(found, files: list[Path]) -> None:
     terminal.line(console, f"tolerance: {found.tolerance:g} of a probe's range, mean over the run, worst probe")
     terminal.line(console, f"reference: {found.reference}; off by up to {found.doubt:.2g}")
     terminal.line(console, "predicted limit: first step at which an eigenvalue grows by 1000 within the run (13)")
+    if found.lines:
+        terminal.line(console, "or a wave between a store and a delay line does, of which jumps are not known")
     if found.limited:
         terminal.line(
             console, f"of {', '.join(found.limited)}: by the weights in smooth flow, an estimate and no bound"

@@ -23,11 +23,14 @@ EASY = 1.5  # of a: up to here rk4 gives back no more than came
 ANGLES = np.pi * (np.arange(720) + 1.0) / 720.0  # of a step
 
 
-def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
-    """A notice for the store where waves of a line grow most, if they do; far ends as if they gave back all."""
+def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, str, float]:
+    """(times that waves of a line grow in a run, the store where they grow most, h k Y); far ends give back all.
+
+    0 where nothing is known to grow.
+    """
     found = []
     if method.kind == "linear":  # Rosenbrock's, whose stages see what comes by its slope
-        return []
+        return 0.0, "", 0.0
     for name, row, a in stores(model, h):
         for line in lines_at(model, row):
             pipe, steps = model.tables.pipes[line["pipe"]], line["hold"] / h
@@ -37,7 +40,12 @@ def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
             takes = line["tau"] * line["stretches"] * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
             once = np.max(np.abs(given_back(method, a, steps)) * np.abs(read(steps))) * np.exp(-takes)
             found.append((times(float(once) - 1.0, span / round_trip), name, a))
-    grows, name, a = max(found, default=(0.0, "", 0.0))
+    return max(found, default=(0.0, "", 0.0))
+
+
+def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
+    """A notice for the store where waves of a line grow most, if they do."""
+    grows, name, a = wave_growth(model, method, h, span)
     if grows < GROWS:
         return []
     wrong, other = grows >= GROWS**2, '"rk4" or "trapezoid"' if a < EASY else '"trapezoid"'

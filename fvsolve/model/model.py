@@ -289,6 +289,10 @@ class Model(Shown):
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
         self.refuse_lines("jacobian")
+        return self.held_jacobian(t, y)
+
+    def held_jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
+        """The same where what arrives from delay lines stands still."""
         (t, y), n = self.given(t, y), self.y_size
         found = np.empty((n, n))
         for j in range(n):
@@ -296,7 +300,7 @@ class Model(Shown):
             high, low = y.copy(), y.copy()
             high[j] += step
             low[j] -= step
-            found[:, j] = (self.rhs(t, high) - self.rhs(t, low)) / (high[j] - low[j])
+            found[:, j] = (self.evaluate(t, high)[0] - self.evaluate(t, low)[0]) / (high[j] - low[j])
         return found
 
     def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:

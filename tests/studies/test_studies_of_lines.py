@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from model.test_delay_lines import vessel
 from truth import pulses
 from truth.delays import fork, main, turned
 
@@ -102,3 +103,27 @@ def test_a_chart_of_lines_beside_cells_refines_the_cells():
     errors = [one.trajectory for one in found.curves()["upwind5 rk4"]]
     assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2] and math.isfinite(found.floor["trajectory"])
     assert "links.up.cells" not in found.points[0].setting.keys and found.default == "weno5 rk4"
+
+
+def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
+    """A chamber that fills within 10 ms, behind 0.1 s of a line: the limit, and runs beside it."""
+    case = vessel("rk4", 0.01, 6.0, 0.15, 60)
+    found = studies.failures(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
+    assert found.wave_rate is None and found.reference.startswith("upwind5")
+    for method, safe in (("rk4", 2), ("implicit-midpoint", 1)):
+        row = found.row("weno5", method)
+        assert [one.step <= one.limit for one in row] == [True] * safe + [False] * (3 - safe)
+        assert [one.verdict == "blown up" for one in row] == [False] * safe + [True] * (3 - safe)
+    assert found.row("weno5", "rodas-5p")[0].limit is None
+    with pytest.raises(FvsolveError, match="Courant numbers are for pipes in cells"):
+        studies.failures(case, courants=[0.5])
+
+
+def test_a_map_of_lines_without_stores_predicts_no_limit():
+    case = main(2.0, every=0.0499)
+    case["output"]["probes"] = ["gate.pressure"]
+    found = studies.failures(case, methods=["euler"], steps=[0.03, 0.11])
+    assert [one.verdict for one in found.squares] == ["stable", "stable"]
+    assert all(math.isinf(one.limit) for one in found.squares)
+    two = studies.failures(turned(case), methods=["euler"], steps=[0.03, 0.11], jobs=2)
+    assert [one.measures.error for one in two.squares] == [one.measures.error for one in found.squares]

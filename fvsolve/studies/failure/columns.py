@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.case import load
+from fvsolve.case.sections import DEFAULT_CELLS
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.failure.eigen_limit import spectrum
+from fvsolve.studies.lines import cells_for_lines, lines
 from fvsolve.studies.outcome import prepared
 
 COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)
@@ -20,18 +23,17 @@ TAKEN = tuple(f"numerics.{name}" for name in ("scheme", "method", "courant", "st
 
 @dataclass(frozen=True)
 class Columns:
-    """What the columns set; `rates` : fastest rate and wave rate [1/s] of each, or of all."""
+    """What the columns set; `rates` : fastest rate and wave rate [1/s] of each, or of all, delay lines as cells.
+
+    wave_rate : cells that a wave crosses in a second [1/s], of the first column; None without any
+    """
 
     name: str
     values: list
     sets: list[dict]
     rates: list[tuple[float, float | None]]
     span: float
-
-    @property
-    def wave_rate(self) -> float | None:
-        """Cells that a wave crosses in a second [1/s], of the first column; None without pipes."""
-        return self.rates[0][1]
+    wave_rate: float | None
 
     def keys(self, k: int) -> dict:
         """What column k changes in the scene itself."""
@@ -56,13 +58,14 @@ def columns(case, base: dict, courants, steps, key) -> Columns:
         name, values = key
         control = _control(courants, steps)
         sets = [{name: value, **control} for value in values]
-        return Columns(name, list(values), sets, [_rates(case, {**base, name: value}) for value in values], span)
-    rates = _rates(case, base)
-    if courants is not None and rates[1] is None:
-        raise FvsolveError("Courant numbers are for pipes, and this case has none; give --step")
-    chosen = [c / rates[1] for c in courants] if courants is not None else steps
-    chosen = list(chosen if chosen is not None else _default_steps(case, rates))
-    return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span)
+        rates = [_rates(case, {**base, name: value}) for value in values]
+        return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
+    rates, waves = _rates(case, base), _wave_rate(case, base)
+    if courants is not None and waves is None:
+        raise FvsolveError("Courant numbers are for pipes in cells, and this case has none; give --step")
+    chosen = [c / waves for c in courants] if courants is not None else steps
+    chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
+    return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)
 
 
 def _control(courants, steps) -> dict:
@@ -73,6 +76,7 @@ def _control(courants, steps) -> dict:
 
 def _rates(case, set: dict) -> tuple[float, float | None]:
     """(fastest rate, wave rate) [1/s] of a case; of many states the fastest is taken as that of the waves."""
+    set = set | as_cells(case, set)
     model = prepared(case, set)
     waves = float(model.wave_rates.max()) if model.cells else None
     found = spectrum(case, set)
@@ -80,12 +84,36 @@ def _rates(case, set: dict) -> tuple[float, float | None]:
     return fastest, waves
 
 
-def _default_steps(case, rates) -> list[float]:
-    """Around Courant 1 where waves are the fastest; else from below 2 / |lambda| to the longest of any use."""
-    fastest, waves = rates
+def _wave_rate(case, set: dict) -> float | None:
+    """Cells that a wave crosses in a second [1/s], in pipes that are no delay lines; None without any."""
+    model = prepared(case, set)
+    return float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0)) or None
+
+
+def as_cells(case, set: dict) -> dict:
+    """Keys by which delay lines of a case with keys set are cells, as many in the slowest as a case has by default."""
+    case = load(case, set)
+    travel = _travel(case)
+    return cells_for_lines(case, travel / DEFAULT_CELLS) if travel else {}
+
+
+def _travel(case) -> float:
+    """The time that a wave takes along the slowest delay line [s]; 0 without any."""
+    return max((case.links[name].length / case.wave_speed(name) for name in lines(case)), default=0.0)
+
+
+def _default_steps(case, rates, waves: float | None) -> list[float]:
+    """Around Courant 1 where waves are the fastest; else from below 2 / |lambda| to the longest of any use.
+
+    Of delay lines alone from a hundredth of the slowest one, or where something stores less, to all of it.
+    """
+    fastest, span, travel = rates[0], case.numerics.end - case.numerics.start, _travel(case)
+    if not waves and travel:
+        quickest = float(np.abs(spectrum(case, {})).max(initial=0.0))
+        shortest = min(travel / 100, 0.3 / quickest if quickest > 0.0 else math.inf)
+        return [float(f"{h:.2g}") for h in np.geomspace(shortest, min(span / 10, travel), COLUMNS)]
     if waves and fastest <= STIFF * waves:
         return [c / waves for c in COURANTS]
-    span = case.numerics.end - case.numerics.start
     longest = min(span / 10, 1.5 / waves if waves else math.inf)
     shortest = min((1.5 if waves else 0.3) / fastest if fastest > 0 else longest, longest / 10)
     return [float(f"{h:.2g}") for h in np.geomspace(shortest, longest, COLUMNS)]

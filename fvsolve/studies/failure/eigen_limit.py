@@ -15,7 +15,8 @@ MOST_STATES = 1200  # of a dense spectrum
 def spectrum(case, set: dict) -> np.ndarray | None:
     """Eigenvalues [1/s] of the rates at the profile, by the schedules of the start and of the end, in one array.
 
-    A limited scheme is taken by its weights in smooth flow. None where there are too many states.
+    A limited scheme is taken by its weights in smooth flow, what arrives from delay lines as if it stood still. None
+    where there are too many states.
     """
     from fvsolve.studies.outcome import prepared
 
@@ -26,7 +27,7 @@ def spectrum(case, set: dict) -> np.ndarray | None:
         return None
     rest = np.zeros(model.y_size)
     times = (model.case.numerics.start, model.case.numerics.end)
-    return np.concatenate([np.linalg.eigvals(model.jacobian(t, rest)) for t in times])
+    return np.concatenate([np.linalg.eigvals(model.held_jacobian(t, rest)) for t in times])
 
 
 def twin(case, scheme: str) -> str:

@@ -9,15 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
+from fvsolve.case import load
 from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, door, is_row
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
 from fvsolve.studies.errands import Errand, Errands
-from fvsolve.studies.failure.columns import Columns, columns, default_schemes
+from fvsolve.studies.failure.columns import Columns, as_cells, columns, default_schemes
 from fvsolve.studies.failure.eigen_limit import greatest_step, spectrum
+from fvsolve.studies.failure.lines_limit import LinesLimit
 from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
 from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.outcome import Progress, names, without_basins, without_lines
+from fvsolve.studies.lines import lines, settled
+from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
 from fvsolve.studies.truth import Truth, truth
 
@@ -47,7 +50,8 @@ class FailureMap:
     """key : what changes along the columns ("step" [s] or a key of the case); values : the columns.
 
     squares : schemes x methods x columns, in that order; reference : what errors are measured against; doubt : how
-    far its check is from it; limited : the schemes whose limits are those of their weights in smooth flow
+    far its check is from it; limited : the schemes whose limits are those of their weights in smooth flow; lines :
+    whether there are delay lines
     """
 
     case: str
@@ -61,6 +65,7 @@ class FailureMap:
     doubt: float
     wave_rate: float | None
     limited: tuple[str, ...]
+    lines: bool = False
 
     def row(self, scheme: str, method: str) -> list[Square]:
         """The squares of a method under a scheme, by column."""
@@ -107,11 +112,9 @@ def failures(
     Raises FvsolveError for names and numbers that are none, and where the reference is no better than the tolerance
     asks.
     """
-    from fvsolve.case import load
-
     case = load(case, dict(set or {}))
     without_basins(case, "map")
-    without_lines(case, "map")
+    case = load(case, settled(case))
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
@@ -131,7 +134,7 @@ def failures(
     limited = tuple(name for name in schemes if name in LIMITED and across.wave_rate)
     return FailureMap(
         case.name, across.name, tuple(across.values), schemes, methods, tuple(squares), tolerance,
-        words, trials.doubt, across.wave_rate, limited,
+        words, trials.doubt, across.wave_rate, limited, bool(lines(case)),
     )  # fmt: skip
 
 
@@ -145,6 +148,7 @@ class Trials:
         self._references: dict[int, Truth] = {}
         self._spectra: dict[tuple, np.ndarray | None] = {}
         self._limits: dict[tuple, float | None] = {}
+        self._of_lines: dict[int, LinesLimit] = {}
 
     @property
     def doubt(self) -> float:
@@ -156,6 +160,7 @@ class Trials:
         at = k if self.across.keys(k) else 0
         if at not in self._references:
             finest, stiff = {**self.base, **self.across.keys(k)}, self.across.stiff(k)
+            finest |= as_cells(self.case, finest)
             found = truth(self.case, finest, stiff=stiff, errands=self.errands)
             doubt = found.doubt.trajectory
             if doubt > self.tolerance / 2:
@@ -169,14 +174,26 @@ class Trials:
         return self._references[at]
 
     def limit(self, scheme: str, method: str, k: int) -> float | None:
-        """The predicted greatest step [s]; None where there is no spectrum."""
+        """The predicted greatest step [s], by eigenvalues and by what stores give back to delay lines; None where there
+        is no spectrum."""
         at = scheme, k if self.across.keys(k) else 0
         if at not in self._spectra:
             self._spectra[at] = spectrum(self.case, {**self.base, **self.across.keys(k), "numerics.scheme": scheme})
         found = self._spectra[at]
         if (method, *at) not in self._limits:
-            self._limits[method, *at] = None if found is None else greatest_step(method, found, self.span)
+            both = None if found is None else greatest_step(method, found, self.span), self.lines_limit(method, *at)
+            self._limits[method, *at] = None if None in both else min(both)
         return self._limits[method, *at]
+
+    def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
+        """The same by waves between stores and delay lines; inf where there are no lines, or no fixed steps."""
+        set = {**self.base, **self.across.keys(k), "numerics.scheme": scheme}
+        steps = [one["numerics.step"] for one in self.across.sets if "numerics.step" in one]
+        if not steps or not lines(load(self.case, set)):
+            return math.inf
+        if k not in self._of_lines:
+            self._of_lines[k] = LinesLimit(self.case, set, steps)
+        return self._of_lines[k](method)
 
     def square(self, scheme: str, method: str, k: int) -> Square:
         """One run, and where its error is too great the same by shorter steps."""
