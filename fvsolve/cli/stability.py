@@ -92,7 +92,7 @@ def pictures(found, folder: Path) -> list[str]:
 
     names = []
     for row in found.rows:
-        if row.limited:
+        if row.limited or row.lines:
             continue
         side = found.side(row.scheme)
         known = np.isfinite(row.predicted) and row.predicted > 0.0

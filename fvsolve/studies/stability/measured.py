@@ -19,6 +19,7 @@ STAGES = 10.0  # times as far as states, at most, the stages of a step reach
 RANDOM = 2  # starts at random, beside the one that is predicted to grow most
 BELOW = (0.3, 0.6, 0.85)  # of the predicted limit: steps that are to be safe, tried too
 LONGEST = 20.0  # that measuring may take [s]
+NEVER = (10.0, 100.0)  # steps over 1 / ||J|| that are run where none is predicted to fail
 WIDEN, DEEPEN = 12, 40  # times 1.3 up and down, to find both ends of a bracket
 
 
@@ -33,6 +34,7 @@ class Runs:
     def __init__(self, at: Frozen, method: str, form: EnergyForm, worst=None, steps: int = STEPS,
                  threshold: float = THRESHOLD, small: float | None = None, a=None) -> None:  # fmt: skip
         self.at, self.method, self.form, self.tried = at, method, form, 0.0
+        self.states = at.model.y_size
         self.steps, self.threshold = steps, threshold
         rng = np.random.default_rng(7)
         starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM, form.size))]
@@ -123,3 +125,30 @@ class Runs:
                 return halved(self.fails, high / RISE, high)
             high /= RISE
         return Limit(np.nan, high)
+
+
+def measure(runs: Runs, guess: float, size: float, left_out: dict[str, str], what: str = "measured") -> dict:
+    """The measured limit around a guess; where it is not found in time, why, in `left_out`."""
+    try:
+        return measured(runs, guess, size)
+    except TimeoutError:
+        left_out[what] = too_long(runs)
+        return {}
+
+
+def too_long(runs: Runs) -> str:
+    """Why there is no limit of these runs."""
+    return f"real runs of {runs.states} states take longer than {LONGEST:g} s"
+
+
+def measured(runs: Runs, guess: float, size: float) -> dict:
+    """The measured limit around a guess; where none is predicted, two long steps that are to be safe."""
+    if np.isfinite(guess) and guess > 0.0:
+        found = runs.limit(guess)
+        return {"measured": found.step, "measured_up_to": found.fails if np.isfinite(found.fails) else runs.tried}
+    if guess == 0.0 or size == 0.0:
+        return {}
+    for factor in NEVER:
+        if runs.fails(factor / size):
+            return {"measured": runs.below(factor / size).step, "measured_up_to": factor / size}
+    return {"measured": np.inf, "measured_up_to": NEVER[-1] / size}

@@ -17,6 +17,7 @@ class StabilityRow:
     eigenvalues, field_of_values, von_neumann : greatest step that keeps these in the method's region
     rate : greatest wave rate [1/s], a step times it is the Courant number; 0 without cells
     frozen : of a limited scheme, the predictions with its weights standing still at their extremes
+    lines : whether it is of delay lines, whose steps are followed themselves: there are no bounds
     longer : of a limited scheme with Euler, the measured step for ten times as many steps
     """
 
@@ -40,6 +41,7 @@ class StabilityRow:
     greatest_real: float = np.nan
     frozen: dict[str, float] = field(default_factory=dict)
     longer: float = np.nan
+    lines: bool = False
     left_out: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 

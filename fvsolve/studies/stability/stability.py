@@ -24,15 +24,16 @@ from fvsolve.steppers.methods import AUTO
 from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
+from fvsolve.studies.lines import lines, settled
 from fvsolve.studies.many import Bench
-from fvsolve.studies.outcome import Progress, names, without_lines
+from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.points import Points, key_of
 from fvsolve.studies.sent import Sent
 from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
 from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
+from fvsolve.studies.stability.delayed_row import delayed_row
 from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD
-from fvsolve.studies.stability.measured import LONGEST as RUNNING
-from fvsolve.studies.stability.measured import Runs
+from fvsolve.studies.stability.measured import Runs, measure
 from fvsolve.studies.stability.misled import notes
 from fvsolve.studies.stability.row import StabilityRow, read
 from fvsolve.studies.stability.system import predicted, system
@@ -43,7 +44,6 @@ AUTOMATIC = (
 )
 VISIBLE = 1e-3  # of a small deviation: what limited schemes are tried with, above what WENO takes for round-off
 LONGER = 10  # times as many steps, for Euler with a limiter
-NEVER = (10.0, 100.0)  # steps over 1 / ||J|| that are run where none is predicted to fail
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,10 @@ def stability(
     if steps < 10 or not threshold > 1.0:
         raise FvsolveError(f"steps = {steps}, threshold = {threshold:g}: wanted at least 10 steps and growth above 1")
     case = load(case, dict(set or {}))
-    without_lines(case, "stability", "`check` says what grows at its stores; ")
+    case = load(case, settled(case))
+    if lines(case) and at is not None:
+        raise FvsolveError("stability of delay lines is about the start, for what is on its way later is not carried; "
+                           'leave out --at, or say numerics.line = "cells"')  # fmt: skip
     schemes = names(schemes) or [case.numerics.scheme]
     asked = names(methods) or [case.numerics.method]
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
@@ -215,6 +218,8 @@ class Maker:
     def row(self, name: str) -> StabilityRow:
         """The row of a method."""
         method = method_named(name)
+        if lines(self.case):
+            return delayed_row(self.case, self.scheme, method, self.steps, self.threshold)
         if has_limiter(self.at(self.scheme).model):
             return self.limited(method)
         side = self.side(self.scheme)
@@ -295,25 +300,3 @@ def place(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
         shares[part] = shares.get(part, 0.0) + float(root**2)
     part = max(shares, key=shares.get)
     return part, shares[part]
-
-
-def measure(runs: Runs, guess: float, size: float, left_out: dict[str, str], what: str = "measured") -> dict:
-    """The measured limit around a guess; where it is not found in time, why, in `left_out`."""
-    try:
-        return measured(runs, guess, size)
-    except TimeoutError:
-        left_out[what] = f"real runs of {runs.at.model.y_size} states take longer than {RUNNING:g} s"
-        return {}
-
-
-def measured(runs: Runs, guess: float, size: float) -> dict:
-    """The measured limit around a guess; where none is predicted, two long steps that are to be safe."""
-    if np.isfinite(guess) and guess > 0.0:
-        found = runs.limit(guess)
-        return {"measured": found.step, "measured_up_to": found.fails if np.isfinite(found.fails) else runs.tried}
-    if guess == 0.0 or size == 0.0:
-        return {}
-    for factor in NEVER:
-        if runs.fails(factor / size):
-            return {"measured": runs.below(factor / size).step, "measured_up_to": factor / size}
-    return {"measured": np.inf, "measured_up_to": NEVER[-1] / size}

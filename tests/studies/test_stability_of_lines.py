@@ -1,0 +1,68 @@
+"""Stability with delay lines: the linear system of steps is what the program does, and limits are where runs fail."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from model.test_delay_lines import short, vessel
+from truth.delays import main, turned
+
+import fvsolve
+from fvsolve import studies
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers.tableau import method_named
+from fvsolve.studies.linear.frozen import stopped
+from fvsolve.studies.stability.delayed import Delayed
+from fvsolve.studies.stability.delayed_row import DelayedLimits
+from fvsolve.studies.stability.delayed_runs import DelayedRuns, entries
+
+
+def system(case: dict, method: str, h: float) -> Delayed:
+    """Steps of h [s] of a case as a linear system."""
+    case["numerics"] |= {"method": method, "step": h}
+    model = fvsolve.build(fvsolve.load(case))
+    return Delayed(stopped(model, 0.0), method_named(method), h)
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4", "ssp-rk3", "trapezoid", "gauss-4"])
+@pytest.mark.parametrize("scene", ["vessel", "short", "rough"])
+def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
+    """With a chamber, with lines shorter than steps and a valve, with friction: 40 steps from what is on its way."""
+    rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"accuracy": 0.02})
+    case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay"), "rough": rough}[scene]
+    one = system(case, method, 0.01)
+    x, before = (part[..., :1] * 1e-6 for part in one.starts())  # of which all moves
+    runs = DelayedRuns.__new__(DelayedRuns)
+    runs.steps = 40
+    moved, still = (runs.begun(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0))
+    for run in (moved, still):
+        run.run(40.0)
+    _, _, x, before = one.carried(x, before, 40, np.inf)
+    found = entries(moved.slate.past, one) - entries(still.slate.past, one)
+    assert found == pytest.approx(before[..., 0], abs=1e-6 * np.abs(before).max())
+    assert moved.now[one.kept] - still.now[one.kept] == pytest.approx(x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0))
+
+
+@pytest.mark.parametrize("method", ["euler", "implicit-midpoint"])
+def test_runs_fail_at_the_step_that_is_predicted(method):
+    """A chamber of 0.15 m3 that a wave fills within 10 ms; the other way round the same."""
+    row = studies.stability(vessel("rk4", 0.01, volume=0.15), methods=[method], steps=200).rows[0]
+    assert row.lines and row.rate == 0.0 and row.where == "neck" and abs(row.difference) < 2e-3
+    other = studies.stability(turned(vessel("rk4", 0.01, volume=0.15)), methods=[method], steps=200).rows[0]
+    assert other.predicted == pytest.approx(row.predicted, rel=1e-6)
+
+
+def test_what_check_tells_to_grow_has_a_limit_below_the_step():
+    """Of the runs that tests/limits/test_lines.py holds to what `check` tells, with steps of 10 ms for 30 s."""
+    for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
+        made = DelayedLimits(
+            fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0
+        )
+        assert made.fails(0.01) == grows
+
+
+def test_where_no_store_is_no_step_fails():
+    row = studies.stability(main(2.0), methods=["rk4"], steps=50).rows[0]
+    assert np.isinf(row.predicted) and np.isinf(row.measured) and "slowest line" in row.notes[0]
+    with pytest.raises(FvsolveError, match="stability of delay lines is about the start"):
+        studies.stability(main(2.0), at=1.0)
