@@ -29,7 +29,7 @@ class DelayedRuns(Runs):
         self.end, self.first, self.far = end, limits.first, limits.far
         self.system, self.states, self.tried = limits.system, limits.own.y_size, 0.0
         self.steps, self.threshold = steps, threshold
-        self.looks = looked_at(self.steps, few=True)
+        self.looks = looked_at(self.steps)
         self.strides = np.diff([0, *self.looks]).astype(float)
         self.latest = time.monotonic() + LONGEST
 
