@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.run import model_of
-from fvsolve.studies.lines import averages, lines
+from fvsolve.studies.lines import averages
 
 
 def names(given: str | Sequence[str] | None) -> list[str] | None:
@@ -134,13 +134,6 @@ def _once(model, y, run) -> Outcome:
 
 
 Progress = Callable[[int, int, str], None]  # (points finished, points in all, what is next), for progress
-
-
-def without_lines(case, study: str, beside: str = "") -> None:
-    """Raises FvsolveError where pipes are delay lines, of whose past a study knows nothing yet; beside : a hint."""
-    if names := lines(case):
-        raise FvsolveError(f"{study} does not know delay lines yet; {listing(names)} would be: {beside}say "
-                           'numerics.line = "cells", and line of no pipe')  # fmt: skip
 
 
 def without_basins(case, study: str, riding: bool = False) -> None:

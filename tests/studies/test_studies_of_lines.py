@@ -56,6 +56,8 @@ def test_what_is_exact_at_any_step_is_said_to_be():
     assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
     with pytest.raises(FvsolveError, match="for want of friction"):
         studies.order(main(4.0), refine="space")
+    with pytest.raises(FvsolveError, match="functions along pipes want cells, and main would be"):
+        studies.order(main(4.0), source=lambda pipe, x, t: (0.0 * x, 0.0 * x))
 
 
 def test_lines_beside_cells_are_refined_with_them():

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from fvsolve.doors import CALL, COUNT, NAMES, TABLE, TEXT, door
-from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.rows import Order
 from fvsolve.studies.errands import Errands
-from fvsolve.studies.lines import settled
-from fvsolve.studies.outcome import Progress, names, without_basins, without_lines
+from fvsolve.studies.lines import lines, settled
+from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
@@ -88,5 +88,7 @@ def _order(case, settings: Mapping, rows: tuple, against, given, points, progres
     from fvsolve.studies.accuracy.manufactured import Manufactured
 
     without_basins(case, "order by functions of pipes")
-    without_lines(case, "order by functions of pipes")
+    if delayed := lines(case):
+        raise FvsolveError(f"functions along pipes want cells, and {listing(delayed)} would be delay lines: say "
+                           'numerics.line = "cells", and line of no pipe')  # fmt: skip
     return Manufactured(case, made, against, *given).study(points, progress)
