@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.limits.lines import lines_at, stores
+from fvsolve.limits.lines import LITTLE, lines_at, stores
 from fvsolve.schemes import LIMITED
 from fvsolve.studies.linear.frozen import stopped
 from fvsolve.studies.outcome import prepared
@@ -15,7 +15,8 @@ from fvsolve.studies.stability.delayed_runs import DelayedRuns
 from fvsolve.studies.stability.measured import too_long
 from fvsolve.studies.stability.row import StabilityRow
 
-SHORT, FAR = 32.0, 2.0  # steps that are looked at: from a part of the quickest line, to times the slowest one
+PARTS, FAR = 32.0, 2.0  # steps that are looked at: from a part of the slowest line, or from where stores let nothing
+SLOW = 0.1  # grow, nor rates of all else, to times the slowest line
 LINES = 4  # at stores, whose whole parts are looked at
 RISE, FINE = 1.6, 1e-3  # between them, and of the bracket around the limit
 MOST = 400  # states
@@ -32,8 +33,14 @@ class DelayedLimits:
         self.refused: dict[float, str] = {}
         self.own = self.model(None)
         rows = self.own.tables.delays
-        travel = rows["tau"] * rows["stretches"]
-        self.first, self.far = float(travel.min()) / SHORT, FAR * float(travel.max())
+        slowest = float((rows["tau"] * rows["stretches"]).max())
+        self.far, self.first = FAR * slowest, slowest / PARTS
+        rates = self.system(self.first).a
+        if rates.size:
+            self.first = min(self.first, SLOW / max(1e-300, float(np.linalg.norm(rates, 2))))
+        for _, i, rate in stores(self.own, 1.0):
+            travel = min(float(line["tau"] * line["stretches"]) for line in lines_at(self.own, i))
+            self.first = min(self.first, float(np.sqrt(2.0 * travel / (LITTLE * rate * steps))))
 
     def model(self, h: float | None):
         """The case at its start, lines cut for steps of h [s] or of its own, schedules held."""

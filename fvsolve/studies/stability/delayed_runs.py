@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.kernels.delay import history as at
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import slots
-from fvsolve.studies.stability.bracket import Limit, halved, limit
+from fvsolve.studies.stability.bracket import RISE, Limit, halved, limit
 from fvsolve.studies.stability.delayed import BAR, Delayed
 from fvsolve.studies.stability.growth import looked_at
 from fvsolve.studies.stability.measured import BELOW, LONGEST, Runs
@@ -49,10 +49,10 @@ class DelayedRuns(Runs):
     def limit(self, guess: float) -> Limit:
         """As of all runs, but close about the prediction: beside whole parts of delays steps hold again.
 
-        Where none is predicted all are looked for, from the quickest line's part on.
+        Where none is predicted they are looked for among all.
         """
         if not np.isfinite(guess):
-            return limit(self.fails, self.first, self.far, TWICE)
+            return limit(self.fails, self.first, self.far, RISE if np.isnan(guess) else TWICE)
         if any(self.fails(part * guess) for part in BELOW) or not self.fails(self.end):
             return super().limit(guess)
         return halved(self.fails, CLOSE * guess if self.safe(CLOSE * guess) else BELOW[-1] * guess, self.end)
