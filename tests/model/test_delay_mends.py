@@ -51,3 +51,15 @@ def test_a_column_at_a_junction(method):
     for h in (0.037, 0.017, 0.0041):
         found = ran(lake(HEAD), COLUMN_LINK | {"friction": {"model": "none"}}, method, h)
         assert abs((found["gap.flow"][-1] - found["gap.flow"][0]) / exact - 1.0) < 0.6 * h**2
+
+
+@pytest.mark.parametrize("h", [0.02, 0.057, 0.095])
+def test_a_store_that_fills_in_less_than_a_step_takes_no_more_than_there_is(h):
+    """A jump goes to and fro between a small chamber and a lake: it never holds more than the flow had that stopped."""
+    flow, long, volume = 0.03, 317.0, 0.15
+    nodes = {"lake": lake(600.0), "a": junction(step(0.0503, flow, 0.0)), "v": chamber(volume)}
+    links = {"up": pipe("lake", "a", long, BORE, 1200.0, 2), "neck": pipe("a", "v", 123.0, 0.1, 1200.0, 2)}
+    numerics = {"line": "delay", "method": "trapezoid", "step": h}
+    found = fvsolve.run(scene(nodes, links, 30.0, numerics, ["v.pressure"], 0.05))
+    risen = np.max(np.abs(found["v.pressure"] - found["v.pressure"][0]))
+    assert volume * risen**2 / (2.0 * WATER["bulk_modulus"]) < RHO * flow**2 * long / (2.0 * area(BORE))

@@ -5,9 +5,12 @@ miss is added, so that a jump is right to second order. A lake's supply is the m
 for what is given to stores.
 """
 
+from math import exp, expm1
+
 from fvsolve.jit import njit
 from fvsolve.kernels.delay.history import COUNT, MENDED, same_time, time_of
 from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
+from fvsolve.kernels.network import stiffness_of
 from fvsolve.kernels.records import FIXED, JUNCTION, PATCH, TANK
 
 NAN = float("nan")
@@ -15,7 +18,7 @@ NAN = float("nan")
 
 @njit(forceinline=True)
 def missed_by(past, tables, t, when):
-    """By how much the weights of the step that ends at t book what begins within it too briefly [s].
+    """How long what begins within the step that ends at t has been there, and how long its weights book it [s].
 
     Stages before it know nothing of it, those behind it that it was always there.
     """
@@ -24,7 +27,18 @@ def missed_by(past, tables, t, when):
     for i in range(many):
         if before + tables.floats[at + many + i] * h >= when - same_time(past):
             booked += tables.floats[at + i]
-    return (t - when) - h * booked
+    return t - when, h * booked
+
+
+@njit(forceinline=True)
+def brought(missed, rate):
+    """Time that is missed [s], of what gives way at a rate [1/s]: a store soon pushes back what comes.
+
+    Else a jump into one that fills in less than a step would be mended by more than it brings.
+    """
+    since, booked = missed
+    late = since - booked
+    return late if rate * abs(late) < 1e-12 else -exp(-rate * booked) * expm1(-rate * late) / rate
 
 
 @njit(forceinline=True)
@@ -38,11 +52,20 @@ def stores(tables, i):
 
 
 @njit(forceinline=True)
-def mend(past, tables, y, pipe, i, flow, missed):
+def quickness(tables, out, i, j):
+    """Rate at which store i takes the pressure of the waves at node j [1/s]."""
+    return stiffness_of(tables.nodes, tables.layout[0], out, i) * tables.nodes[j]["admittance"]
+
+
+@njit(forceinline=True)
+def mend(past, tables, y, out, pipe, i, flow, missed):
     """Give a store what a flow out of a line that began within the step has brought, and take it from the line."""
-    if stores(tables, i) and flow * missed != 0.0:
-        y[tables.nodes[i]["y"]] += flow * missed
-        y[pipe["y"]] -= flow * missed
+    if flow != 0.0 and stores(tables, i):
+        mass = flow * brought(
+            missed, stiffness_of(tables.nodes, tables.layout[0], out, i) * tables.nodes[i]["admittance"]
+        )
+        y[tables.nodes[i]["y"]] += mass
+        y[pipe["y"]] -= mass
         past[MENDED] = NAN
 
 
@@ -52,8 +75,12 @@ def mend_columns(past, tables, y, i, change, missed):
     columns = tables.columns
     for k in range(columns.size):
         side = (columns[k]["from_node"] == i) - (columns[k]["to_node"] == i)
-        if side != 0 and change * missed != 0.0:
-            y[columns[k]["y"]] += side * change * columns[k]["area"] / columns[k]["length"] * missed
+        if side != 0 and change != 0.0:
+            quick = columns[k]["area"] / columns[k]["length"]
+            admittance = tables.nodes[i]["admittance"]
+            y[columns[k]["y"]] += (
+                side * change * quick * brought(missed, quick / admittance if admittance > 0.0 else 0.0)
+            )
             past[MENDED] = NAN
 
 
@@ -62,16 +89,19 @@ def mend_behind(past, tables, y, out, missed):
     """The same where nodes were closed by valves: stores behind these, fed by the lines before them, and columns."""
     layout, spare, valves, nodes = tables.layout[0], tables.spare, tables.valves, tables.nodes
     pressure, given, fed = layout["pressure"], 0.0, 0.0
-    if missed == 0.0:
-        return
     if tables.columns.size > 0:
         for i in range(nodes.size):
             mend_columns(past, tables, y, i, out[pressure + i] - spare[pressure + i], missed)
     for k in range(valves.size):
-        flow = (out[layout["valve"] + k] - spare[layout["valve"] + k]) * missed
+        flow = out[layout["valve"] + k] - spare[layout["valve"] + k]
         for side in range(2):
-            i, gain = (valves[k]["to_node"], flow) if side == 1 else (valves[k]["from_node"], -flow)
+            i, j = valves[k]["from_node"], valves[k]["to_node"]
+            if side == 1:
+                i, j, flow = j, i, -flow
             if flow != 0.0 and stores(tables, i):
+                gain = -flow * brought(
+                    missed, stiffness_of(tables.nodes, tables.layout[0], out, i) * nodes[j]["admittance"]
+                )
                 y[nodes[i]["y"]] += gain
                 given += gain
                 past[MENDED] = NAN

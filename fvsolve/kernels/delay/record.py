@@ -79,14 +79,14 @@ def end_of(line, side):
 
 
 @njit
-def meet(past, places, tables, y, which, side, t, size, missed):
+def meet(past, places, tables, y, out, which, side, t, size, missed):
     """A jump of a line arrives at the plain node at one of its ends; missed : see `missed_by`."""
     line, pipe = tables.delays[which], tables.pipes[tables.delays[which]["pipe"]]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
     node = tables.nodes[i]
     if node["kind"] != JUNCTION:
         send(past, places, tables, end_of(line, side), side, t, -size, pipe)
-        mend(past, tables, y, pipe, i, 2.0 * size, missed)
+        mend(past, tables, y, out, pipe, i, 2.0 * size, missed)
         return
     change = 2.0 * size / node["admittance"]
     mend_columns(past, tables, y, i, change, missed)
@@ -99,14 +99,14 @@ def meet(past, places, tables, y, which, side, t, size, missed):
 
 
 @njit
-def enter(past, places, tables, y, which, q, wave, t, size, missed):
+def enter(past, places, tables, y, out, which, q, wave, t, size, missed):
     """A jump of a wave leaves stretch q of a line: into the next one, or to the node there."""
     line = tables.delays[which]
     onward = q + 1 if wave == 0 else q - 1
     if 0 <= onward < line["stretches"]:
         send(past, places, tables, line["stretch"] + onward, wave, t, size, tables.pipes[line["pipe"]])
     elif abs(size) > 0.0:
-        meet(past, places, tables, y, which, 1 if wave == 0 else 0, t, size, missed)
+        meet(past, places, tables, y, out, which, 1 if wave == 0 else 0, t, size, missed)
 
 
 @njit
@@ -123,7 +123,7 @@ def pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed
         for side in range(2):
             come = out[at + 1 + side] - spare[at + 1 + side]
             change = out[at + 3 * side] - spare[at + 3 * side]
-            mend(past, tables, y, pipe, pipe["to_node"] if side == 1 else pipe["from_node"], come - change, missed)
+            mend(past, tables, y, out, pipe, pipe["to_node"] if side == 1 else pipe["from_node"], come - change, missed)
             if abs(change) > enough(past, tables, pipe):
                 keep(past, places, end_of(line, side), side, when, change, pipe)
     mend_behind(past, tables, y, out, missed)
@@ -158,8 +158,8 @@ def passed(past, places, tables, which, q, wave, at, t, y, out, handle):
     plain = not (leaves and not is_plain(tables, far)) and not (returns and not is_plain(tables, near))
     share, missed = size * rubs(past, places, tables, line, pipe, q, t), missed_by(past, tables, t, when)
     if line["now"] == 0.0 and plain:
-        enter(past, places, tables, y, which, q, wave, when, size - share, missed)
-        enter(past, places, tables, y, which, q, 1 - wave, when, share, missed)
+        enter(past, places, tables, y, out, which, q, wave, when, size - share, missed)
+        enter(past, places, tables, y, out, which, q, 1 - wave, when, share, missed)
         return True
     pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed)
     if not (leaves and returns):  # within the line
