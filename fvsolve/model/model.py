@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
-from fvsolve.model.past import begin_past, without_past
+from fvsolve.model.past import without_past
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
 from fvsolve.shown import Shown
@@ -75,6 +75,8 @@ def flags_of(state: State, model: Model) -> np.ndarray | float:
 
 def given_numbers(name: str, given: Any) -> np.ndarray:
     """What is given as float64[...] that can be written, itself where it is that; FvsolveError if not real numbers."""
+    if type(given) is float:
+        return np.float64(given)
     try:
         found = np.asarray(given)
         if found.dtype.kind not in "fiu":
@@ -281,8 +283,7 @@ class Model(Shown):
             slate = self.slates.pop()  # which no other thread then has
         except IndexError:
             slate = Slate(self)
-        slate.armed[:] = armed
-        begin_past(slate.past, self.tables.delays)
+        slate.blank(armed)
         yield slate
         self.slates.append(slate)
 

@@ -90,9 +90,11 @@ def lower(schedule) -> np.ndarray:
 
 def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
     """Coefficients of scale * value + offset."""
-    values = pieces[:, 3:] * scale
-    power, kept = pieces[:, 1] == POWER, pieces[:, 1] != 0
+    values, kept = pieces[:, 3:] * scale, pieces[:, 1] != 0
     values[:, 0] += offset
+    if not kept.any():
+        return values
+    power = pieces[:, 1] == POWER
     values[power, 1] += offset
     values[kept, 2:] = pieces[kept, 5:]
     return values

@@ -182,8 +182,8 @@ class Run:
         return out
 
     def flush(self) -> None:
-        rows = self.loop.take_rows()
-        if len(rows):
+        if self.loop.flags[slots.ROWS]:
+            rows = self.loop.take_rows()
             self.sink.rows(rows[:, 0], rows[:, 1:])
             self.widen(rows)
 

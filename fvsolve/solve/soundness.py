@@ -27,7 +27,7 @@ class Soundness:
         model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
-        self.predicted = step_limits(model)
+        self.predicted = step_limits(model, slate=slate)
         self.halves = Halves(slate)
         self.unfelt = Unfelt(model)
         self.largest = MOST * drives(model)
