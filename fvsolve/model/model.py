@@ -77,6 +77,8 @@ def given_numbers(name: str, given: Any) -> np.ndarray:
     """What is given as float64[...] that can be written, itself where it is that; FvsolveError if not real numbers."""
     if type(given) is float:
         return np.float64(given)
+    if type(given) is np.ndarray and given.dtype == np.float64 and given.flags.carray and given.ndim:
+        return given
     try:
         found = np.asarray(given)
         if found.dtype.kind not in "fiu":
@@ -209,8 +211,8 @@ class Model(Shown):
         there = [many.clusters, many.columns, many.masses, many.bodies, many.lines, many.pins, many.bushings]
         there.append(many.rides)
         basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
-        patches = (self.tables.nodes["kind"] == rec.PATCH).all()
-        alone = bool(self.basins and patches) and not (self.pipes or valves or many.devices or any(there))
+        alone = bool(self.basins) and not (self.pipes or valves or many.devices or any(there))
+        alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = Cast(self.case.law.family, cells, *there, self.unsteady, many.devices, tuple(self.laws),
                     basins, carried, many.scalars, valves, many.delays, alone)  # fmt: skip

@@ -30,10 +30,14 @@ class Schedules:
 
     def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
         """Index of a schedule whose value is scale * value + offset."""
-        pieces = lower(schedule)
-        pieces[:, 3:] = scaled(pieces, scale, offset)
+        if schedule.kind == "constant":
+            pieces = [[-np.inf, 0.0, 0.0, schedule.first * scale + offset, *(0.0 * scale,) * 3]]
+        else:
+            table = lower(schedule)
+            table[:, 3:] = scaled(table, scale, offset)
+            pieces = table.tolist()
         self.records.append((len(self.rows), len(pieces)))
-        self.rows += pieces.tolist()
+        self.rows += pieces
         for time, jump in break_times(schedule):
             self.breaks[time] = self.breaks.get(time, False) or jump
         if schedule.kind == "harmonic":
