@@ -54,7 +54,7 @@ def moved(reader: Any) -> Case | None:
 
 
 def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dict[str, Any]:
-    """A part's table with the numbers over time of one before in place of what they were read from, where that stays."""
+    """A part's table with numbers over time as they were read before, where what they were read from stays."""
     said = vars(part)
     same = {key: found for key, value in given.items() if isinstance(found := said.get(key), Schedule)
             and isinstance(value, dict) and before.get(key) is value}  # fmt: skip

@@ -120,6 +120,26 @@ class Draft:
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 
+    def copied(self, case: Case) -> Draft:
+        """The same, packed, for a case of the same numbers but where it is changed: what a start writes is its own."""
+        made, tables = (
+            object.__new__(Draft),
+            {id(table): table.copy() for table in self.tables if table.flags.writeable},
+        )
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                value = tables.get(id(value), value)
+            elif isinstance(value, (list, dict)):
+                value = value.copy()
+            setattr(made, name, value)
+        made.case, made.hydraulics = case, Hydraulics(case)
+        made.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))
+        made.warnings = [*case.notes, *self.warnings[len(self.case.notes) :]]
+        for table, rows in self.links.items():
+            made.links[table] = [(name, case.links.get(name, link), lowering) for name, link, lowering in rows]
+        return made
+
     def fault(self, place: str, message: str) -> None:
         self.faults.append(Fault(place, message))
 

@@ -194,6 +194,13 @@ class Model(Shown):
         return bool(self.tables.pipes["terms"].any())
 
     @cached_property
+    def packed(self):
+        """Its tables before the start is known (`Draft`), of which models of other sizes are made."""
+        from fvsolve.model.build import packed
+
+        return packed(self.case)
+
+    @cached_property
     def places(self) -> tuple:
         """Where its tables lie, as handles say it."""
         from fvsolve.kernels.handle import places_of
