@@ -171,21 +171,20 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
     columns = [_columns(column, e, edges[e]) for e in rows]
     ends = [(at[i], e, sign, column.get(("flow", e), -1)) for e, edge in enumerate(edges)
             for i, sign in ((edge.i, -1.0), (edge.j, 1.0)) if i in at and not edge.shut]  # fmt: skip
-    to, of, signs, felt = (np.array(part) for part in zip(*ends, strict=True)) if ends else (np.zeros(0, int),) * 4
-    i = [k for k, row in enumerate(columns) for c in row if c >= 0]
-    j = [c for row in columns for c in row if c >= 0]
-    last = range(len(rows) + len(balances), len(rows) + len(balances) + len(anchors))
-    i = np.concatenate((i, to[felt >= 0], last)).astype(int)
-    j = np.concatenate((j, felt[felt >= 0], [column["node", anchor] for anchor in anchors])).astype(int)
-    constant = np.concatenate((signs[felt >= 0], np.ones(len(anchors))))
-    places = i * len(column) + j
+    to, of, signs = (np.array([end[k] for end in ends], kind) for k, kind in enumerate((int, int, float)))
+    last = enumerate(anchors, start=len(rows) + len(balances))
+    entries = [(k, c) for k, row in enumerate(columns) for c in row if c >= 0]
+    entries += [(k, felt) for k, _, _, felt in ends if felt >= 0] + [(k, column["node", anchor]) for k, anchor in last]
+    places = np.array([k * len(column) + c for k, c in entries], dtype=int)
+    constant = [sign for _, _, sign, felt in ends if felt >= 0] + [1.0] * len(anchors)
+    drawn = demand[balances] / f_scale
     for sweep in range(200):
         found, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
         for k, e in enumerate(rows):
             right[k] = _edge_row(found, columns[k], e, edges[e], result, scale)
-        right[len(rows) : len(rows) + len(balances)] = demand[balances] / f_scale
+        right[len(rows) : len(rows) + len(balances)] = drawn
         np.subtract.at(right, to, signs * result.flow[of] / f_scale)
-        change = _solve(places, np.concatenate((found, constant)), right, len(column), result)
+        change = _solve(places, np.array(found + constant), right, len(column), result)
         if not np.isfinite(change).all():  # what was found last is the best there is
             result.converged = False
             return

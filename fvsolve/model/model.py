@@ -174,11 +174,13 @@ class Model(Shown):
         """Number of cells of all pipes and basins."""
         return self.cells + sum(basin.n for basin in self.basins)
 
-    @property
+    @cached_property
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses in a second, for every pipe [1/s]."""
         pipes = self.tables.pipes
-        return pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
+        found = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
+        found.flags.writeable = False
+        return found
 
     @property
     def wave_rate(self) -> float:

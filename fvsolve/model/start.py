@@ -57,6 +57,7 @@ class Start:
         self.shut: set[int] = set()  # valves that a device holds shut
         self.modes: dict[int, str] = {}  # as what those stand that regulate
         self.loads: dict[int, float] = {}  # of shut chambers, pressures that hold bodies [Pa]
+        self.known: dict[int, float] = {}  # what schedules give
 
     @cached_property
     def out(self) -> np.ndarray:
@@ -83,7 +84,10 @@ class Start:
 
     def given(self, schedule: int) -> float:
         """What a schedule gives up to the start."""
-        return float(value_until(self.draft.tables.schedules, self.draft.tables.pieces, int(schedule), self.t, self.t))
+        if schedule not in self.known:
+            schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
+            self.known[schedule] = float(value_until(schedules, pieces, int(schedule), self.t, self.t))
+        return self.known[schedule]
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""

@@ -21,7 +21,7 @@ class ValveRows(Restriction, kind="valve"):
             draft.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
 
     def resize(self, draft, name, before, part, row) -> bool:
-        others = part.opening is not before.opening or part.characteristic != before.characteristic
+        others = part.opening != before.opening or part.characteristic != before.characteristic
         if others or row["hooks"] >= 0 or (part.laminar_reynolds is None) != (before.laminar_reynolds is None):
             return False
         softened = part.laminar_reynolds is None and row["transition"] > 0.0
