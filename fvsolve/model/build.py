@@ -52,9 +52,13 @@ def built(case: Case, like: Model | None = None) -> Model:
     if case.settles:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
         case, told = settled(case, drafted(steady))
-    draft = drafted(case, None if like is None else resized(like.packed, case))
+    taken = None if like is None else resized(like.packed, case)
+    draft = drafted(case, taken)
     draft.warnings += told
-    return model_of(draft)
+    found = model_of(draft)
+    if draft is taken and found.unsteady == like.unsteady:
+        found.__dict__["functions"] = like.functions
+    return found
 
 
 def drafted(case: Case, draft: Draft | None = None, unfit: Collection[str] = ()) -> Draft:

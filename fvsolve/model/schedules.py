@@ -27,6 +27,7 @@ class Schedules:
     rows: list[list[float]] = field(default_factory=list)
     breaks: dict[float, bool] = field(default_factory=dict)  # time -> whether a value jumps there
     spacing: float = np.inf  # greatest step that does not leap over samples [s]
+    given: dict[tuple[int, float], float] = field(default_factory=dict)  # (index, time) -> values, once all are added
 
     def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
         """Index of a schedule whose value is scale * value + offset."""

@@ -57,7 +57,6 @@ class Start:
         self.shut: set[int] = set()  # valves that a device holds shut
         self.modes: dict[int, str] = {}  # as what those stand that regulate
         self.loads: dict[int, float] = {}  # of shut chambers, pressures that hold bodies [Pa]
-        self.known: dict[int, float] = {}  # what schedules give
 
     @cached_property
     def out(self) -> np.ndarray:
@@ -84,10 +83,11 @@ class Start:
 
     def given(self, schedule: int) -> float:
         """What a schedule gives up to the start."""
-        if schedule not in self.known:
+        known, key = self.draft.schedules.given, (int(schedule), self.t)
+        if key not in known:
             schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
-            self.known[schedule] = float(value_until(schedules, pieces, int(schedule), self.t, self.t))
-        return self.known[schedule]
+            known[key] = float(value_until(schedules, pieces, key[0], self.t, self.t))
+        return known[key]
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
