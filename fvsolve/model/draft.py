@@ -27,6 +27,11 @@ def rows(record: np.dtype) -> Any:
     return field(default_factory=lambda: np.zeros(0, record))
 
 
+def twin(table: np.ndarray) -> np.ndarray:
+    """A copy, by bytes: numpy would copy records field by field."""
+    return np.ndarray(table.shape, table.dtype, bytearray(table.tobytes()))
+
+
 @dataclass(slots=True, eq=False)
 class Draft:
     """Tables, names and states of a model on the way; nothing else may be hung on it."""
@@ -122,10 +127,8 @@ class Draft:
 
     def copied(self, case: Case) -> Draft:
         """The same, packed, for a case of the same numbers but where it is changed: what a start writes is its own."""
-        made, tables = (
-            object.__new__(Draft),
-            {id(table): table.copy() for table in self.tables if table.flags.writeable},
-        )
+        made = object.__new__(Draft)
+        tables = {id(one): twin(one) for one in self.tables if one.flags.writeable}
         for name in self.__slots__:
             value = getattr(self, name)
             if isinstance(value, np.ndarray):
