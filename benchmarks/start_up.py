@@ -3,7 +3,8 @@
     python benchmarks/start_up.py [--times 5] [--beside CHECKOUT] [CASE]
 
 Cold is a new cache folder: kernels are compiled and CoolProp is asked. With a store is the first run from a copy of
-what `fvsolve warm` leaves, without numba's own cache. Warm is every run after that. `--beside` takes turns with another
+what `fvsolve warm` leaves, code and fluid properties, without numba's own cache; `without fluids` of its code alone, so
+that CoolProp is asked. Warm is every run after that. `--beside` takes turns with another
 checkout, of an earlier version, and prints ratios. The answer is there when the terminal says how the run ended, the
 pictures when the process has.
 """
@@ -67,10 +68,10 @@ def measure(case: Path, times: int, packages: dict[str, Path]) -> dict[tuple[str
             for version in packages:
                 go(version, "cold", top / f"{version}-{i}")
         for i in range(max(1, times // 3)):
-            shutil.copytree(
-                top / "this-0" / "code", top / f"store-{i}" / "code", ignore=shutil.ignore_patterns("*.nb?")
-            )
-            go("this", "store", top / f"store-{i}")
+            for start, part in (("store", ""), ("store without fluids", "code")):
+                copied = top / f"{start}-{i}"
+                shutil.copytree(top / "this-0" / part, copied / part, ignore=shutil.ignore_patterns("*.nb?"))
+                go("this", start, copied)
         for _ in range(times):
             for version in packages:
                 go(version, "warm", top / f"{version}-0")

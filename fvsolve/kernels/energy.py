@@ -9,12 +9,13 @@ are changes since the profile, a cross term and a square: no small difference of
 Rows of `power` [W], table by table: NODE supply, rate of storage; PIPE in, friction, jets, rate;
 VALVE loss; COLUMN in, friction, rate; MASS rate; BRACE what it takes up (a spring, a damper) or gives (a force); STOP
 rate, loss; PISTON leak, friction, what the linear law makes where a volume moves. Rows of `stored` [J]: node; pipe
-kinetic, elastic and height; column; mass; brace; stop.
+kinetic, elastic and height (a delay line: forward, backward wave); column; mass; brace; stop.
 """
 
 import numpy as np
 
 from fvsolve.jit import njit
+from fvsolve.kernels.delay.energy import PLACES, SHARES, line_energy, line_power
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.masses import contact, excess_of, motion, piston_travel, stop_travel, travel_of
@@ -25,8 +26,6 @@ from fvsolve.kernels.tanks import tank_level
 
 NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 4, 1, 3, 1, 1, 2, 3  # rows of `power` a part
 WIDEST = 5
-PLACES = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)  # Gauss points of a cell, in cell widths from its centre
-SHARES = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
 def point_weights():
@@ -140,10 +139,13 @@ def power_linear(t, y, dydt, out, handle, power):
         into = potential(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
         into -= potential(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
         power[at] = into * per
-        pipe_power(
-            st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n], dydt[o + n : o + 2 * n],
-            power[at : at + PIPE],
-        )  # fmt: skip
+        if pipe["delay"] >= 0:
+            line_power(t, out, tables, pipe["delay"], power[at : at + PIPE])
+        else:
+            pipe_power(
+                st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n], dydt[o + n : o + 2 * n],
+                power[at : at + PIPE],
+            )  # fmt: skip
         at += PIPE
     for k in range(valves.size):
         drop = potential(tables, out, valves[k]["from_node"]) - potential(tables, out, valves[k]["to_node"])
@@ -257,7 +259,10 @@ def stored_linear(t, y, dydt, out, handle, stored):
         pipe = pipes[k]
         n, o, first = pipe["cells"], pipe["y"], nodes[pipe["from_node"]]
         start = (first["pressure"] - st["ambient"]) + height_pressure(st, first)
-        pipe_energy(st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2])
+        if pipe["delay"] >= 0:
+            line_energy(t, out, tables, pipe["delay"], stored[at : at + 2])
+        else:
+            pipe_energy(st, pipe, start, y[o : o + n], y[o + n : o + 2 * n], stored[at : at + 2])
         at += 2
     for k in range(columns.size):
         column = columns[k]

@@ -73,6 +73,21 @@ def kept_entries(past: np.ndarray) -> np.ndarray:
     return np.arange(max(at.ZEROS, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
 
 
+def times_of_jumps(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -> np.ndarray:
+    """When jumps reach the ends or the middles of stretches, after `begin` and before `end` [s], in order."""
+    places, queue = at.places_of(past), int(past[at.QUEUE])
+    heads = past[places[1] : places[2]].reshape(-1, at.HEADS)
+    line_of, found = np.repeat(np.arange(len(delays)), delays["stretches"]), []
+    for head in np.flatnonzero(heads[:, at.MANY]):
+        line, first = delays[line_of[head // 2]], places[2] + 2 * queue * head
+        order = (int(heads[head, at.FIRST]) + np.arange(int(heads[head, at.MANY]))) % queue
+        sent = past[first + order]
+        found += [sent + line["hold"], sent + (line["hold"] if line["now"] > 0.0 else 0.5 * line["hold"])]
+    times, apart = np.sort(np.concatenate([[], *found])), at.same_time(past)
+    times = times[(times > begin + apart) & (times < end - apart)]
+    return times[np.diff(times, prepend=-np.inf) > apart]
+
+
 def room_left(past: np.ndarray, delays: np.ndarray) -> int:
     """Steps that can be taken before an entry is lost that is still to be read."""
     count, rooms = int(past[at.COUNT]), int(past[at.WIDER]) * delays["room"]

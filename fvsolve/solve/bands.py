@@ -142,8 +142,6 @@ def alone(model: Model) -> str:
     method = model.case.numerics.method
     if method == automatic.AUTO or not method_named(automatic.first_method(method)).explicit:
         return f"{method} solves for all states at once; explicit methods can be shared out"
-    if len(model.tables.delays):
-        return "it has delay lines, whose past one thread writes"
     if not model.basins:
         return "there is no basin; what is shared out is rows of basins"
     return "" if not all(basin.whole for basin in model.basins) else said_whole(model)

@@ -132,7 +132,7 @@ class Ranks:
 
     def serve(self, functions: tuple, where: int) -> None:
         """Follow rank 0 until it has no more to ask."""
-        stepper, written = self.loop.stepper, self.loop.slate.written
+        stepper = self.loop.stepper
         while True:
             asked, given = self.comm.bcast(None)
             if callable(asked):  # by whom rank 0 writes to
@@ -144,9 +144,10 @@ class Ranks:
                 self.gather("y", given)
                 continue
             small, others, whole, states = given
-            for to, arrays in ((stepper, small), (written, others)):
-                for name, array in arrays.items():
-                    getattr(to, name)[...] = array
+            for name, array in small.items():
+                getattr(stepper, name)[...] = array
+            for name, array in others.items():
+                self.member.take(name, array)
             for (begin, stop), values in zip(whole, states, strict=True):
                 stepper.y[stepper.flags[slots.NOW], begin:stop] = values
             before = time.thread_time()

@@ -30,7 +30,7 @@ from fvsolve.steppers.signatures import JOIN, compiled_as
 from fvsolve.steppers.stepper import Stepper
 
 SMALL = ("memory", "orders", "flags", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "supply")
-WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes")
+WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
 
 
 def yielding() -> int:
@@ -59,15 +59,27 @@ class Member:
         own[joint.ALIKE], own[joint.STATES], own[joint.FLOWS] = len(cut.alike()), len(states), len(flows)
         own[joint.HEAD :] = np.concatenate([states, flows]).ravel()
         self.stepper.shape = formed(cut, k)
-        self.written = self.slate.written._replace(bands=cut.bands(k), joint=own, sums=self.stepper.shape)
-        self.tables = (*self.slate.tables, *self.written, team.functions.calls, team.functions.hooks)
-        self.handle = make_handle(self.tables)
+        self.mine = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.shape}
+        self.called = team.functions.calls, team.functions.hooks
+        self.open()
         at, by = loop.stepper.within
         mine = np.zeros(loop.model.y_size, dtype=bool)
         for begin, stop, *_ in self.stepper.spans.tolist():
             mine[begin:stop] = True
         kept = mine[at[::3]]
         self.within = np.ascontiguousarray(at.reshape(-1, 3)[kept]).ravel(), by[kept]
+
+    def open(self) -> None:
+        """What is written here, and the handle that opens it: anew where a past of delay lines has more room."""
+        self.written = self.slate.written._replace(**self.mine)
+        self.tables = (*self.slate.tables, *self.written, *self.called)
+        self.handle = make_handle(self.tables)
+
+    def take(self, name: str, values: np.ndarray) -> None:
+        """Take over one of `WRITTEN`."""
+        if name == "past" and values.size != self.slate.past.size:
+            self.slate.past = values.copy()
+        getattr(self.slate.written, name)[...] = values
 
     def follow(self, states: list[slice]) -> None:
         """Take over what Python may have changed in the arrays of the loop, and these states."""
@@ -76,7 +88,7 @@ class Member:
         for name in SMALL:
             getattr(self.stepper, name)[...] = getattr(self.loop.stepper, name)
         for name in WRITTEN:
-            getattr(self.slate.written, name)[...] = getattr(self.loop.slate.written, name)
+            self.take(name, getattr(self.loop.slate.written, name))
         self.stepper.times, now = self.loop.stepper.times, self.loop.flags[slots.NOW]
         for one in states:
             self.stepper.y[now, one] = self.loop.stepper.y[now, one]
@@ -84,6 +96,8 @@ class Member:
     def march(self, functions: tuple, where: int) -> int:
         """Go on until there is something to do, and bring what the loop has not."""
         stepper = self.stepper
+        if self.slate.past is not self.written.past:
+            self.open()
         within, stepper.within = stepper.within, self.within
         code = stepper.call(*functions, self.handle, where, self.slate.armed)
         stepper.within = within

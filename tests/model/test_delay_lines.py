@@ -362,7 +362,7 @@ def test_what_knows_no_lines_says_so():
     for call in (lambda: model.rhs(0.0, model.start), lambda: model.jacobian(0.0, model.start)):
         with pytest.raises(FvsolveError, match="delay lines"):
             call()
-    for study in (studies.stability, studies.energy, studies.order, studies.chart):
+    for study in (studies.stability, studies.order, studies.chart):
         with pytest.raises(FvsolveError, match="does not know delay lines yet; main would be"):
             study(case)
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.parts.outlet.law import FREE, LEAST_DROP, emitter_flow, emitter_slope
+from fvsolve.parts.outlet.law import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step
 from fvsolve.studies.energy.energy import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -76,6 +76,41 @@ def test_its_slope_is_bounded_without_a_jump_and_that_of_its_flow(n):
     assert slope == pytest.approx(rise, rel=1e-4, abs=1e-3 * slope.max())
     assert (slope >= 0.0).all() and slope[drops <= 0.0].max() == 0.0
     assert np.abs(np.diff(slope[:1001])).max() < 0.02 * slope.max()
+
+
+@pytest.mark.parametrize("n", [0.3, 0.5, 1.0, 1.18, 2.0, 3.0])
+def test_newton_finds_its_balance_with_a_line_from_anywhere(n):
+    """c - Y p = M(p) from every side of the bends, made for a known root; and the drop that it tells gives its flow."""
+    law, rng = np.array([n, 0.0, 1e5, 1e300]), np.random.default_rng(0)
+    for _ in range(300):
+        g, y, root = 10.0 ** rng.uniform(-9, -2), 10.0 ** rng.uniform(-7, -2), rng.choice([-3.0, 0.5, 7.0, 12.0, 4e4])
+        c = y * root + emitter_flow(law, 0, g, root, FREE)
+        p, m, moved = rng.choice([-500.0, 3.0, 300.0, 1e6]), rng.choice([0.0, 1e-4, 1.0]), np.inf
+        for _ in range(60):
+            a, s = emitter_step(law, 0, g, m, p, FREE)
+            dp = (c - y * p - m - a) / (y + s)
+            p, m, moved = p + dp, m + a + s * dp, abs(dp)
+            if moved <= 1e-13 * (1e5 + abs(p)):
+                break
+        assert p == pytest.approx(root, rel=1e-9, abs=1e-7)
+        if root > 0.0:
+            assert emitter_drop(law, 0, g, emitter_flow(law, 0, g, root, FREE), FREE) == pytest.approx(root, rel=1e-9)
+
+
+def test_a_line_sucks_at_a_leak_and_the_run_goes_on():
+    """A sudden closure takes the pressure below ambient and back; the hole takes what its law says, or nothing."""
+    shut = {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"}
+    nodes = {"lake": reservoir(6e5), "gate": junction(), "low": reservoir(AMBIENT)}
+    links = {"line": pipe("lake", "gate", 600.0, 0.1, 1000.0, 60), "hole": leak("gate", 6e-6)}
+    for share in (1.0, 1.5, 2.0):
+        links["shut"] = valve("gate", "low", 6e-4 * share, shut)
+        result = fvsolve.run(scene(nodes, links, 6.0, {}, ["hole.flow", "gate.pressure"]))
+        drop = result["gate.pressure"] - AMBIENT
+        wide, asked = np.abs(drop) > LEAST_DROP, 6e-6 * np.sqrt(np.maximum(drop, 0.0))
+        assert result.reason == "finished"
+        assert np.any(drop < 0.0)
+        assert result["hole.flow"][wide] == pytest.approx(asked[wide], rel=1e-6, abs=1e-12)
+        assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
 def test_two_leaks_on_one_junction_share_what_a_valve_brings():

@@ -30,10 +30,10 @@ cases, out, options = json.loads(sys.argv[1]), sys.argv[2], json.loads(sys.argv[
 for name, case in cases.items():
     fvsolve.run(case, out=f"{out}/{name}", **options)
 """
-NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "a liquid", "a dye in water")
+NAMES = ("muscl, ssp-rk2", "a tolerance", "a pipe", "delay lines", "a liquid", "a dye in water")
 
 
-def ranks(many: int, *command, timeout=60, **environment) -> subprocess.CompletedProcess:
+def ranks(many: int, *command, timeout=150, **environment) -> subprocess.CompletedProcess:
     command = [str(MPIEXEC), "-n", str(many), *map(str, command)]
     environment = os.environ | environment
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)

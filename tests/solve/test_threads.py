@@ -69,6 +69,18 @@ def carried(scheme="muscl", diffusivity=0.0):
     return scene({"sheet": sheet}, {}, 0.5, numerics, ["sheet.dye@0.3,0.5"], every=0.1, scalars={"dye": dye})
 
 
+def lined(**numerics):
+    """Delay lines between a pool, a chamber and a demand that stops: jumps reach all of them within steps."""
+    case = water(PIPE | {"line": "delay", "to": "air"}, end=0.6, probes=["pool.near.head", "air.pressure"], **numerics)
+    del case["nodes"]["river"]
+    case["nodes"] |= {
+        "air": {"type": "chamber", "volume": 50.0},
+        "gate": {"type": "junction", "demand": {"time": [0.0, 0.0503], "value": [0.02, 0.0], "kind": "step"}},
+    }
+    case["links"]["far"] = PIPE | {"from": "air", "to": "gate", "length": 7.0, "line": "delay"}
+    return case
+
+
 class Kept(MemorySink):
     """What a run tells, and its state at the end."""
 
@@ -104,6 +116,8 @@ SCENES = {
     "a tolerance": water(rtol=1e-3, method="bogacki-shampine", probes=()),
     "a tolerance, first same as last": water(rtol=1e-4, method="dormand-prince"),
     "a pipe": water(PIPE, end=0.2, probes=["pool.near.head", "pool.depth@1.1,1.3"]),
+    "delay lines": lined(),
+    "delay lines, given steps": lined(step=2e-3, method="rk4"),
     "dense output of its own": water(method="rk4", end=0.3),
     "a liquid": liquid(),
     "a liquid between walls": liquid(boundary="wall"),
@@ -251,7 +265,6 @@ ALONE = {
     "an implicit method": (water(method="tr-bdf2"), "tr-bdf2 solves for all states at once"),
     "no basin": (NETWORK, "there is no basin"),
     "fifth order of a dye": (carried("weno5"), "sheet: weno5 carries scalars"),
-    "a delay line": (water(PIPE | {"line": "delay"}, probes=["pool.near.head"]), "it has delay lines"),
     "a dye that decays": (dyed(decay=0.1), "pool: dye decays"),
 }  # fmt: skip
 

@@ -36,10 +36,10 @@ from fvsolve.kernels.delay.history import (
     time_of,
 )
 from fvsolve.kernels.delay.lines import arrive, arrive_all, drag_and_slope, rubbed
+from fvsolve.kernels.delay.mend import mend, mend_behind, mend_columns, missed_by
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.limits import BOTTOM, EVENTS, RIM
 from fvsolve.kernels.observer import note
-from fvsolve.kernels.records import ALONE, AMENDED, FIXED, JUNCTION, PATCH, STATUS, TANK
+from fvsolve.kernels.records import ALONE, AMENDED, JUNCTION, STATUS
 
 INFINITE, NAN = 1e300, float("nan")
 NOISE = 1e-13  # of half a bar's wave: a jump that is rounding
@@ -78,39 +78,6 @@ def end_of(line, side):
     return line["stretch"] + (line["stretches"] - 1 if side == 1 else 0)
 
 
-@njit(forceinline=True)
-def missed_by(past, tables, t, when):
-    """By how much the weights of the step that ends at t book what begins within it too briefly [s].
-
-    Stages before it know nothing of it, those behind it that it was always there.
-    """
-    before, settings = time_of(past, int(past[COUNT]) - 1), tables.settings[0]
-    h, booked, at, many = t - before, 0.0, settings["weights"], settings["stages"]
-    for i in range(many):
-        if before + tables.floats[at + many + i] * h >= when - same_time(past):
-            booked += tables.floats[at + i]
-    return (t - when) - h * booked
-
-
-@njit(forceinline=True)
-def stores(tables, i):
-    """Whether node i stores what flows into it, now."""
-    node = tables.nodes[i]
-    if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
-        return False
-    k = EVENTS * node["row"]
-    return node["kind"] != TANK or (tables.armed[k + BOTTOM] <= 0.0 and tables.armed[k + RIM] <= 0.0)
-
-
-@njit(forceinline=True)
-def mend(past, tables, y, pipe, i, flow, missed):
-    """Give a store what a flow out of a line that began within the step has brought, and take it from the line."""
-    if stores(tables, i) and flow * missed != 0.0:
-        y[tables.nodes[i]["y"]] += flow * missed
-        y[pipe["y"]] -= flow * missed
-        past[MENDED] = NAN
-
-
 @njit
 def meet(past, places, tables, y, which, side, t, size, missed):
     """A jump of a line arrives at the plain node at one of its ends; missed : see `missed_by`."""
@@ -122,6 +89,7 @@ def meet(past, places, tables, y, which, side, t, size, missed):
         mend(past, tables, y, pipe, i, 2.0 * size, missed)
         return
     change = 2.0 * size / node["admittance"]
+    mend_columns(past, tables, y, i, change, missed)
     for k in range(node["line_count"]):
         end = tables.integers[node["lines"] + k]
         other, right = tables.delays[end // 2], end % 2
@@ -158,6 +126,7 @@ def pass_by_closing(past, places, tables, t, y, out, handle, place, when, missed
             mend(past, tables, y, pipe, pipe["to_node"] if side == 1 else pipe["from_node"], come - change, missed)
             if abs(change) > enough(past, tables, pipe):
                 keep(past, places, end_of(line, side), side, when, change, pipe)
+    mend_behind(past, tables, y, out, missed)
 
 
 @njit

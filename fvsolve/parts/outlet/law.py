@@ -69,13 +69,33 @@ def emitter_slope(floats, at, g, drop, rule):
 
 
 @njit
+def cubic_root(n, share):
+    """s in [0, 1] with s^2 ((3 - n) + (n - 2) s) = share, by Newton between bounds."""
+    low, high, s = 0.0, 1.0, sqrt(share)
+    for _ in range(60):
+        miss = s * s * ((3.0 - n) + (n - 2.0) * s) - share
+        if miss > 0.0:
+            high = s
+        else:
+            low = s
+        slope = s * (2.0 * (3.0 - n) + 3.0 * (n - 2.0) * s)
+        new = s - miss / slope if slope > 0.0 else low
+        new = new if low < new < high else 0.5 * (low + high)
+        if abs(new - s) <= 1e-12 * s:
+            break
+        s = new
+    return s
+
+
+@njit
 def emitter_drop(floats, at, g, flow, rule):
-    """Drop [Pa] at which it carries a flow [kg/s] by the power alone; that from which on it is none for none."""
+    """Drop [Pa] at which it carries a flow [kg/s]; that from which on it is none for none."""
     n, span = floats[at], floats[at + 2]
     if flow <= 0.0 or g <= 0.0:
         return floats[at + 1]
-    most = NO_END if rule == PART else floats[at + 3]
-    above = span * min(most, flow / sqrt(g * span)) ** (1.0 / n)
+    most, least = NO_END if rule == PART else floats[at + 3], (LEAST_DROP / span) ** n
+    share = min(most, flow / sqrt(g * span))
+    above = LEAST_DROP * cubic_root(n, share / least) if share < least else span * share ** (1.0 / n)
     return floats[at + 1] + (0.5 * above if rule == FULL else above)
 
 
@@ -83,15 +103,16 @@ def emitter_drop(floats, at, g, flow, rule):
 def emitter_step(floats, at, g, m, drop, rule):
     """a, s with dM = a + s d(drop) for the next Newton step of an emitter that carries m [kg/s] at a drop [Pa].
 
-    s is the chord between what it carries and what the drop asks for: for n = 1/2 Newton's own slope in M^2.
+    s is the chord between what it carries and what the drop asks for: for n = 1/2 Newton's own slope in M^2. As the
+    flow grows with the drop, and what is left of it for the outlet falls, the root lies between the two: every chord is
+    within that of the iterate before, and Newton cannot go round in circles at a bend.
     """
     target, asked = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
     if rule == SHUT:
         return -m, 0.0
-    near = abs(drop - asked) <= 1e-6 * abs(drop - floats[at + 1])
-    if near or (drop - floats[at + 1] < LEAST_DROP and asked - floats[at + 1] < LEAST_DROP):
+    if abs(drop - asked) <= 1e-6 * abs(drop - floats[at + 1]):
         return target - m, emitter_slope(floats, at, g, drop, rule)
-    return target - m, max(0.0, (target - m) / (drop - asked))
+    return target - m, max(0.0, (target - max(m, 0.0)) / (drop - asked))
 
 
 @njit

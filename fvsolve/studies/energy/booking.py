@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fvsolve.kernels.delay.history import LIVE, same_time
 from fvsolve.model.energy_ledger import Accounts
+from fvsolve.model.past import times_of_jumps
 from fvsolve.solve.loop import Loop
 from fvsolve.solve.solve import Run
 from fvsolve.steppers import automatic, slots
@@ -41,7 +43,7 @@ class Booked(Loop):
             if self.memory[slots.STEPS] > steps and code in SOUND:
                 after = armed.copy()
                 armed[:] = rules  # those that the step was taken under
-                self.add(self.released(t, y, self.booked(t, y, *first)))
+                self.add(self.released(t, y, self.booked(t, y, *first)) + self.jumped(t, y))
                 armed[:] = after
                 self.on_step()
         return code
@@ -50,11 +52,16 @@ class Booked(Loop):
         """Power of every line of the ledger at a state [W]."""
         return self.accounts.power_at(t, y, self.dydt, self.beside)
 
+    def tableau(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coefficients, weights and times of the stages of a step."""
+        s = self.stepper.k.shape[0]
+        a, (b, c) = (part.reshape(-1, s) for part in np.split(self.stepper.coefficients[: s * s + 2 * s], [s * s]))
+        return a, b, c
+
     def booked(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """What the step from (t, y), with slope and supplies there, adds to every line and leaves to Newton [J]."""
         stepper, h = self.stepper, float(self.memory[slots.LAST])
-        s, total = stepper.k.shape[0], np.zeros_like(self.total)
-        a, (b, c) = (part.reshape(-1, s) for part in np.split(stepper.coefficients[: s * s + 2 * s], [s * s]))
+        (a, b, c), total = self.tableau(), np.zeros_like(self.total)
         k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.supply[1:]])
         if stepper.method.kind == "linear":
             total[:-1] = b @ self.linearly_implicit(t, y, h, a, c, k)
@@ -62,6 +69,25 @@ class Booked(Loop):
         for i in np.flatnonzero(b):
             total += b[i] * self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
         return h * total
+
+    def jumped(self, t: float, y: np.ndarray) -> np.ndarray:
+        """What the weights of the step from (t, y) miss of what jumps in delay lines change within it [J].
+
+        Stages before it know nothing of it, those behind it that it was always there.
+        """
+        past, total, h = self.slate.past, np.zeros_like(self.total), self.t - t
+        if not past.size or past[LIVE] == 0.0:
+            return total
+        (_, b, c), apart = self.tableau(), same_time(past)
+        if self.stepper.method.kind == "linear":
+            b = self.weights_beside()
+        for when in times_of_jumps(past, self.model.tables.delays, t, self.t):
+            before, behind = (
+                self.power(at, y + (at - t) / h * (self.now - y)) for at in (when - 2.0 * apart, when + 2.0 * apart)
+            )
+            booked = h * float(b[t + c * h >= when - apart].sum())
+            total[:-1] += (behind - before) * ((self.t - when) - booked)
+        return total
 
     def stage(self, t: float, y: np.ndarray, slope: np.ndarray, supply: np.ndarray) -> np.ndarray:
         """Power of every line at a stage, and what Newton leaves there [W].
@@ -79,14 +105,23 @@ class Booked(Loop):
             power[lines] += change[lines]
         return np.append(power, change[self.supplied].sum() - change[self.rates].sum())
 
+    def beyond(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Of a Rosenbrock method what its tableau has beside coefficients, weights and times: C, d, gamma."""
+        s = self.stepper.k.shape[0]
+        beyond = self.stepper.coefficients[s * s + 3 * s :]
+        return beyond[: s * s].reshape(s, s), beyond[s * s : s * s + s], float(beyond[s * s + s])
+
+    def weights_beside(self) -> np.ndarray:
+        """Weights of the powers at a Rosenbrock step's stages in what `linearly_implicit` adds up."""
+        (_, b, _), (big_c, _, gamma) = self.tableau(), self.beyond()
+        return np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
+
     def linearly_implicit(self, t: float, y: np.ndarray, h: float, a, c, k) -> np.ndarray:
         """Stages of the ledger of a Rosenbrock step, float64[s, lines]: one more equation z' = P(t, y) beside y.
 
         w_i = g (P(U_i) + P_y h k_i + d_i h P_t + sum of C_ij w_j), see `steppers/ros.py`; P_y and P_t by differences.
         """
-        s = len(c)
-        beyond = self.stepper.coefficients[s * s + 3 * s :]
-        big_c, late, gamma = beyond[: s * s].reshape(s, s), beyond[s * s : s * s + s], beyond[s * s + s]
+        s, (big_c, late, gamma) = len(c), self.beyond()
         per, eps, slope = 1e-3 * h, 1e-3, 0.0
         if t + per > t:  # in a step of so few roundings it counts for nothing
             slope = (4.0 * self.power(t + per, y) - 3.0 * self.power(t, y) - self.power(t + 2.0 * per, y)) / (2.0 * per)

@@ -13,7 +13,7 @@ from fvsolve.model.energy_ledger import Account
 from fvsolve.model.energy_start import available, datum_of
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.booking import EnergyRun
-from fvsolve.studies.outcome import RowSink, prepared, without_lines
+from fvsolve.studies.outcome import RowSink, prepared
 
 ROUNDING = 1e-12  # share of what passed below which a remainder is rounding
 SHORT = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds that a line need not name
@@ -153,7 +153,6 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """
     model = prepared(case, set) if not hasattr(case, "tables") else case
     check_port(model.case, port)
-    without_lines(model.case, "energy")
     settings = model.tables.settings.copy()
     settings["datum"] = datum_of(model, port)
     model = replace(model, tables=model.tables._replace(settings=settings))

@@ -1,0 +1,126 @@
+"""What delay lines store and what takes it, by what was sent into them. Knows their history; changes nothing.
+
+Along a stretch stands what was sent into it at ages u of 0 .. tau, the forward wave at u c from its beginning, the
+backward one at u c from its end, behind its middle less (backward: plus) the delta of the meeting there. In units of
+1 / (rho A) per length it stores R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the profile of flow M0 and q0 = Y P0, which
+falls by drag0. So what flows in at the ends is stored, or taken: sum of l (drag(M) - drag0) M of the middles and drag0
+times the integral of M. That is friction, sum of l drag(M) M, and what the midpoint rule makes of a profile that falls.
+A short line stores the share 1 - beta of what was sent in a step h, and takes beta (1 - beta) c (s - s_h)^2 of either
+wave.
+"""
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.delay.along import sent
+from fvsolve.kernels.delay.history import (
+    COUNT,
+    FIRST,
+    MANY,
+    QUEUE,
+    ZEROS,
+    between,
+    clock_of,
+    jumps_at,
+    places_of,
+    queue_at,
+    read_both,
+    same_time,
+    time_of,
+)
+from fvsolve.kernels.delay.lines import rubbed
+from fvsolve.kernels.friction import drag
+
+PLACES = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)  # Gauss points of a cell, or of a time, in widths from its centre
+SHARES = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+@njit
+def waves_sent(t, out, tables, which, q, at):
+    """Both waves that were sent into stretch q of a line at a time `at` <= t [kg/s]."""
+    past, newest = tables.past, int(tables.past[COUNT]) - 1
+    if newest >= 0 and (at <= time_of(past, newest) or t <= time_of(past, newest)):
+        return read_both(past, places_of(past), clock_of(past, newest), tables.delays[which], q, at)
+    return sent(t, out, tables, which, q, 0, at), sent(t, out, tables, which, q, 1, at)
+
+
+@njit
+def time_before(past, places, line, q, t, least):
+    """The latest time before t, not before `least`, at which waves into stretch q may have taken another course."""
+    found, queue, before = least, int(past[QUEUE]), t - same_time(past)
+    k, x = between(past, int(past[COUNT]) - 1, before)
+    k += x == 1.0
+    if k >= ZEROS and time_of(past, k) < before:
+        found = max(found, time_of(past, k))
+    for wave in range(2):
+        at = jumps_at(places, line["stretch"] + q, wave)
+        times = queue_at(places, queue, at)
+        for i in range(int(past[at + MANY])):
+            when = past[times + (int(past[at + FIRST]) + i) % queue]
+            if when < before:
+                found = max(found, when)
+    return found
+
+
+@njit
+def stretch_integrals(t, out, tables, which, q):
+    """Integrals over stretch q: of R - L [kg m/s], and of what either wave stores, times rho A."""
+    past, line, st = tables.past, tables.delays[which], tables.settings[0]
+    pipe, places, hold, share = tables.pipes[line["pipe"]], places_of(past), line["hold"], 1.0 - line["now"]
+    first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]
+    height = st["rho"] * st["gravity"] * (first["elevation"] - st["datum"])
+    fall = pipe["drag"] * line["tau"]  # of q0 along a stretch
+    top = pipe["admittance"] * ((first["pressure"] - st["ambient"]) + height) - fall * q
+    net, ahead, back = 0.0, 0.0, 0.0
+    end, oldest, middle = t, t - hold + same_time(past), t - 0.5 * hold
+    while end > oldest:
+        begin = time_before(past, places, line, q, end, middle if end > middle + same_time(past) else t - hold)
+        for g in range(3):
+            at = end + (PLACES[g] - 0.5) * (end - begin)
+            r, l = waves_sent(t, out, tables, which, q, at)
+            x, w = (t - at) / hold, SHARES[g] * (end - begin) * (pipe["speed"] * share)
+            if share == 1.0 and at < middle:
+                delta = rubbed(pipe, line, r, l)
+                r, l = r - delta, l + delta
+            net += w * share * (r - l)
+            ahead += w * r * (r + (top - fall * x) + flow)
+            back += w * l * (l + (top - fall * (1.0 - x)) - flow)
+        end = begin
+    return net, ahead, back
+
+
+@njit
+def line_energy(t, out, tables, which, rows):
+    """Change of what a line stores since the profile [J]: in the forward wave, in the backward one."""
+    line, rows[0], rows[1] = tables.delays[which], 0.0, 0.0
+    per = 1.0 / (tables.settings[0]["rho"] * tables.pipes[line["pipe"]]["area"])
+    for q in range(line["stretches"]):
+        _, ahead, back = stretch_integrals(t, out, tables, which, q)
+        rows[0] += per * ahead
+        rows[1] += per * back
+
+
+@njit
+def line_power(t, out, tables, which, rows):
+    """Friction, and the rate of what is stored [W], of one line into whose ends rows[0] flows."""
+    line = tables.delays[which]
+    pipe, beta, at = tables.pipes[line["pipe"]], line["now"], tables.layout[0]["ends"] + 4 * line["pipe"]
+    per, length = 1.0 / (tables.settings[0]["rho"] * pipe["area"]), pipe["speed"] * line["tau"]
+    friction, taken = 0.0, 0.0
+    for q in range(line["stretches"]):
+        r, l = waves_sent(t, out, tables, which, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"]))
+        delta = rubbed(pipe, line, r, l)
+        flow = pipe["flow"] + (r - l - delta)
+        pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+        friction += length * flow * pull
+        taken += length * (pull - pipe["drag"]) * flow
+        mean = 0.0
+        if pipe["drag"] != 0.0:
+            mean = stretch_integrals(t, out, tables, which, q)[0] / length
+        if beta > 0.0:
+            ahead, back = out[at] - r, out[at + 3] - l
+            mean += beta * (out[at] - out[at + 3]) - delta
+            taken += beta * (1.0 - beta) * pipe["speed"] * (ahead * ahead + back * back)
+            taken += length * (pull - pipe["drag"]) * beta * (ahead - back)
+        taken += length * pipe["drag"] * (pipe["flow"] + mean)
+    rows[1], rows[2], rows[3] = per * friction, 0.0, rows[0] - per * taken

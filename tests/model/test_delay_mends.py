@@ -1,0 +1,53 @@
+"""A jump that arrives within a step at a junction with a valve or a rigid column: second order, beside its equation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, chamber, junction, lake, pipe, scene, step, valve
+
+import fvsolve
+
+LENGTH, BORE, SPEED, FLOW, HEAD = 300.0, 0.3, 1000.0, 0.05, 50.0
+AFTER = 0.55  # since the jump has come to the junction, and nothing else has [s]
+Y, JUMP = area(BORE) / SPEED, RHO * SPEED * FLOW / area(BORE)  # of the waves; Joukowsky's
+NARROW, VOLUME = 4e-3, 30.0  # of the valve [m2], of the chamber behind it [m3]
+COLUMN = 40.0 / area(0.2)  # its length over its area [1/m]
+COLUMN_LINK = {"type": "rigid-column", "from": "j", "to": "behind", "length": 40.0, "diameter": 0.2}
+
+
+def ran(behind: dict, gap: dict, method: str, h: float) -> fvsolve.Result:
+    """A demand stops at a dead end 0.3 s from a junction, which has a lake 0.6 s away and something behind a gap."""
+    nodes = {"lake": lake(HEAD), "j": junction(), "gate": junction(step(0.1, FLOW, 0.0)), "behind": behind}
+    links = {"far": pipe("lake", "j", 2 * LENGTH, BORE, SPEED, 4), "near": pipe("j", "gate", LENGTH, BORE, SPEED, 4)}
+    numerics, end = {"line": "delay", "method": method, "step": h}, 0.1 + LENGTH / SPEED + AFTER
+    found = fvsolve.run(scene(nodes, {**links, "gap": gap}, end, numerics, ["behind.pressure", "gap.flow"], end))
+    assert found.reason == "finished"
+    assert abs(found.ledger["mass"]["relative"]) < 1e-14
+    return found
+
+
+@pytest.mark.parametrize("method", ["rk4", "trapezoid"])
+def test_a_chamber_behind_a_valve(method):
+    """V rho / beta dp/dt = M, M^2 = 2 rho (Cd A)^2 (jump - M / 2Y - p)."""
+    k = 2.0 * RHO * NARROW**2
+
+    def rate(t, p):
+        half = k / (4.0 * Y)
+        flow = np.sqrt(half**2 + k * max(JUMP - p[0], 0.0)) - half
+        return [WATER["bulk_modulus"] / (RHO * VOLUME) * flow]
+
+    exact = AMBIENT + RHO * GRAVITY * HEAD + solve_ivp(rate, (0.0, AFTER), [0.0], rtol=1e-11, atol=1e-3).y[0, -1]
+    for h in (0.037, 0.017, 0.0041):
+        found = ran(chamber(VOLUME), valve("j", "behind", NARROW), method, h)
+        assert abs(found["behind.pressure"][-1] / exact - 1.0) < 0.6 * h**2
+
+
+@pytest.mark.parametrize("method", ["rk4", "trapezoid"])
+def test_a_column_at_a_junction(method):
+    """L / A dM/dt = jump - M / 2Y: M = 2 Y jump (1 - exp(-t / T)), T = 2 Y L / A."""
+    exact = 2.0 * Y * JUMP * (1.0 - np.exp(-AFTER / (2.0 * Y * COLUMN))) / RHO
+    for h in (0.037, 0.017, 0.0041):
+        found = ran(lake(HEAD), COLUMN_LINK | {"friction": {"model": "none"}}, method, h)
+        assert abs((found["gap.flow"][-1] - found["gap.flow"][0]) / exact - 1.0) < 0.6 * h**2
