@@ -52,7 +52,9 @@ def built(case: Case, like: Model | None = None) -> Model:
     if case.settles:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
         case, told = settled(case, drafted(steady))
-    taken = None if like is None else resized(like.packed, case)
+    if like is not None and not like.packed:
+        like.packed.append(packed(like.case))
+    taken = None if like is None else resized(like.packed[0], case)
     draft = drafted(case, taken)
     draft.warnings += told
     found = model_of(draft)

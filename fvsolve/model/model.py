@@ -140,6 +140,7 @@ class Model(Shown):
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
     basins: list[BasinRows]  # as their table has them
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
+    packed: list = field(default_factory=list, init=False)  # its draft before the start, where others are made of it
 
     picture = "fvsolve.draw.objects:model_figure"
 
@@ -194,13 +195,6 @@ class Model(Shown):
     def unsteady(self) -> bool:
         """Whether the friction of a pipe remembers the past of its flow."""
         return bool(self.tables.pipes["terms"].any())
-
-    @cached_property
-    def packed(self):
-        """Its tables before the start is known (`Draft`), of which models of other sizes are made."""
-        from fvsolve.model.build import packed
-
-        return packed(self.case)
 
     @cached_property
     def places(self) -> tuple:
