@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
-from fvsolve.kernels.delay.history import four, six
+from fvsolve.kernels.delay.history import four, six, three
 from fvsolve.kernels.delay.lines import drag_and_slope
 from fvsolve.limits.lumped import GROWS, times
 from fvsolve.steppers.tableau import Method
@@ -78,7 +78,7 @@ def read(steps: float) -> np.ndarray:
     """What is read of waves that turn by ANGLES a step, so many steps after they were sent."""
     whole = int(np.ceil(steps - 1e-9))
     x = max(0.0, whole - steps)
-    weights = six(x) if whole >= 3 else four(x) if whole >= 2 else (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+    weights = six(x) if whole >= 3 else four(x) if whole >= 2 else three(x)
     if x < 1e-9:
         weights = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     places = np.arange(-2, 4) - whole

@@ -177,7 +177,7 @@ def by_interpolation(tau: float, step: float, scale: float) -> float:
         return 0.0
     if tau >= 3.0 * step:
         return 0.5 * 0.0049 * bend**6
-    return 0.5 * (0.0234 * bend**4 if tau >= 2.0 * step else 0.125 * bend**2)
+    return 0.5 * (0.0234 * bend**4 if tau >= 2.0 * step else 0.0642 * bend**3)
 
 
 def time_scale(draft) -> float:

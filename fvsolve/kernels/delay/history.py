@@ -2,7 +2,8 @@
 
 A wave is a smooth part u, kept at accepted times, and jumps, each with its time: w(t) = u(t) + sum of jumps up to t.
 So nothing is interpolated across a jump. u is read by Lagrange's polynomial through up to six entries around, as many
-before as behind, so that no wave is magnified; entries that a step has not yet accepted are never read.
+before as behind (in the newest interval one more before), so that no wave is magnified; entries that a step has not yet
+accepted are never read.
 
 past = [head, times of entries, what arrives at the ends of stretches at a time, of each stretch heads of the jumps of
 both waves: sum of those that have arrived, which is the first, how many there are, how many of them have arrived in the
@@ -95,6 +96,12 @@ def four(x):
     return 0.0, x * d * e / -6.0, b * d * e / 2.0, b * x * e / -2.0, b * x * d / 6.0, 0.0
 
 
+@njit(forceinline=True)
+def three(x):
+    """Weights of entries -1 .. 1 at x in [0, 1), as those of six: in the newest interval, which has none behind it."""
+    return 0.0, 0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0), 0.0, 0.0
+
+
 @njit
 def between(past, newest, t):
     """(entry k, share of the way to the next) where t lies; before the first entry that of the profile."""
@@ -162,7 +169,7 @@ def stencil(past, clock, t):
         return k, four(x)
     if k + 2 <= newest:
         return uneven(past, newest, t)
-    return k, (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+    return k, three(x) if whole - 1 >= -even else (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
 
 
 @njit(forceinline=True)
