@@ -1,6 +1,6 @@
-"""Scenarios per second and core: fresh runs, models varied in place, rows of sweeps, and what Dask costs beside them.
+"""Scenarios per second and core: fresh runs, models varied in place, rows of sweeps, what Dask costs; and their errors.
 
-python benchmarks/many_runs.py            valve-closure, 20 cells, 10 s; CPU time, the mean of the quicker half
+python benchmarks/many_runs.py            valve-closure, 10 s, told at 20 places; CPU time, the mean of the quicker half
 python benchmarks/many_runs.py --dask     the same rows on one process of a LocalCluster
 """
 
@@ -9,13 +9,17 @@ from __future__ import annotations
 import sys
 import time
 
+import numpy as np
+
 from fvsolve import build, load, run, vary
 from fvsolve.studies.many import many
 from fvsolve.studies.row import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
-DELAY = {"numerics.line": "delay", "numerics.step": 0.01, "numerics.method": "rk4", "output.fields": 0}
+LINE = {"links.main.cells": 20, "numerics.line": "delay", "numerics.method": "euler", "output.fields": 0}
+DELAYS = (0.01, 0.05)  # steps of delay lines [s]: of the second errors are those of 20 cells
+FINE, PROBE = CELLS | {"links.main.cells": 2000}, "gate.pressure"
 TIMES, RUNS = 200, 2000
 
 
@@ -41,12 +45,20 @@ def told(name: str, seconds: float, goal: float | None = None) -> None:
     print(f"{name:44} {1e3 * seconds:8.2f} ms {1.0 / seconds:8.0f} a second and core{wanted}", flush=True)
 
 
-def by(base: dict, name: str, goal: float | None) -> None:
+def errors(result, fine) -> tuple[float, float]:
+    """(rms over all rows, of the greatest), in units of the jump of a fine run."""
+    times, found = fine.t, np.interp(fine.t, result.t, result.si(PROBE)) - fine.si(PROBE)
+    jump, peak = np.ptp(fine.si(PROBE)[times < 1.5]), result.si(PROBE).max() - fine.si(PROBE).max()
+    return float(np.sqrt(np.mean(found**2)) / jump), float(abs(peak) / jump)
+
+
+def by(base: dict, name: str, goal: float | None, fine) -> None:
     """Ways to the same numbers."""
     model, rows = build(load(CASE, base)), RowMaker(CASE, base)
-    result = run(model)
+    result = min((run(model) for _ in range(20)), key=lambda one: one.summary["seconds"])
     steps, seconds = result.summary["steps"], result.summary["seconds"]
-    print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them")
+    off = " and ".join(f"{one:.1e}" for one in errors(result, fine))
+    print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them; error of the jump, rms and of the peak: {off}")
     told("  fresh: run(case, set)", cost(lambda values: run(CASE, base | values)))
     told("  in place: run(vary(model, set))", cost(lambda values: run(vary(model, values))))
     told("  of it vary(model, set)", cost(lambda values: vary(model, values)))
@@ -81,8 +93,10 @@ def main() -> None:
     """All, or Dask alone."""
     if "--dask" in sys.argv:
         return dask()
-    by(CELLS, "20 cells, upwind5 and rk4", GOAL)
-    by(DELAY, "delay line, steps of 10 ms", 2 * GOAL)
+    fine = run(build(load(CASE, FINE)))
+    by(CELLS, "20 cells, upwind5 and rk4", GOAL, fine)
+    for step in DELAYS:
+        by(LINE | {"numerics.step": step}, f"delay line, steps of {1e3 * step:.0f} ms", 2 * GOAL, fine)
 
 
 if __name__ == "__main__":

@@ -57,7 +57,9 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
     quiet = _quiet(held, demand, edges)
     edges = [replace(edge, row=None, flow=0.0, drop=_no_drop) if e in quiet else edge for e, edge in enumerate(edges)]
     parts, free_sets = _components(held, edges)
-    potential = np.where(np.isnan(held), np.nanmean(held) if np.any(~np.isnan(held)) else 0.0, held)
+    missing = np.isnan(held)
+    given = held.size - np.count_nonzero(missing)
+    potential = np.where(missing, np.where(missing, 0.0, held).sum() / given if given else 0.0, held)
     flow = np.array([edge.flow for edge in edges])
     dropped, kept = _references(held, demand, edges, parts, free_sets)
     floating = {i for group in free_sets if group not in kept.values() for i in group}
@@ -88,11 +90,11 @@ def _quiet(held, demand, edges) -> set[int]:
     fed = {i for edge in edges if edge.row is None and edge.flow != 0.0 for i in (edge.i, edge.j)}
     quiet = set()
     for group in _components(held, edges)[0]:
-        given = np.array([held[i] for i in group if not np.isnan(held[i])])
+        given = [held[i] for i in group if held[i] == held[i]]
         driven = any(edge.i in group and (edge.drives or edge.holds is not None) for edge in edges)
-        if driven or given.size == 0 or any(demand[i] != 0.0 or (i in fed and np.isnan(held[i])) for i in group):
+        if driven or not given or any(demand[i] != 0.0 or (i in fed and held[i] != held[i]) for i in group):
             continue
-        if np.ptp(given) <= SMALL_DROP * (1e5 + np.max(np.abs(given))):
+        if max(given) - min(given) <= SMALL_DROP * (1e5 + max(map(abs, given))):
             quiet |= {e for e, edge in enumerate(edges) if edge.row is not None and not edge.shut and edge.i in group}
     return quiet
 
@@ -169,26 +171,26 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
     columns = [_columns(column, e, edges[e]) for e in rows]
     ends = [(at[i], e, sign, column.get(("flow", e), -1)) for e, edge in enumerate(edges)
             for i, sign in ((edge.i, -1.0), (edge.j, 1.0)) if i in at and not edge.shut]  # fmt: skip
-    to, of, signs, felt = (np.array(part) for part in zip(*ends, strict=True)) if ends else (np.zeros(0, int),) * 4
-    i = [k for k, row in enumerate(columns) for c in row if c >= 0]
-    j = [c for row in columns for c in row if c >= 0]
-    last = range(len(rows) + len(balances), len(rows) + len(balances) + len(anchors))
-    i = np.concatenate((i, to[felt >= 0], last)).astype(int)
-    j = np.concatenate((j, felt[felt >= 0], [column["node", anchor] for anchor in anchors])).astype(int)
-    constant = np.concatenate((signs[felt >= 0], np.ones(len(anchors))))
+    to, of, signs = (np.array([end[k] for end in ends], kind) for k, kind in enumerate((int, int, float)))
+    last = enumerate(anchors, start=len(rows) + len(balances))
+    entries = [(k, c) for k, row in enumerate(columns) for c in row if c >= 0]
+    entries += [(k, felt) for k, _, _, felt in ends if felt >= 0] + [(k, column["node", anchor]) for k, anchor in last]
+    places = np.array([k * len(column) + c for k, c in entries], dtype=int)
+    constant = [sign for _, _, sign, felt in ends if felt >= 0] + [1.0] * len(anchors)
+    drawn = demand[balances] / f_scale
     for sweep in range(200):
         found, right = [], np.zeros(len(rows) + len(balances) + len(anchors))
         for k, e in enumerate(rows):
             right[k] = _edge_row(found, columns[k], e, edges[e], result, scale)
-        right[len(rows) : len(rows) + len(balances)] = demand[balances] / f_scale
+        right[len(rows) : len(rows) + len(balances)] = drawn
         np.subtract.at(right, to, signs * result.flow[of] / f_scale)
-        change = _solve(i, j, np.concatenate((found, constant)), right, len(column), result)
+        change = _solve(places, np.array(found + constant), right, len(column), result)
         if not np.isfinite(change).all():  # what was found last is the best there is
             result.converged = False
             return
         result.flow[active] += change[: len(active)] * f_scale
         result.potential[nodes] += change[len(active) :] * p_scale
-        before, most = most, np.abs(change).max(initial=0.0)
+        before, most = most, float(np.abs(change).max())
         if most <= 1e-15 * (1.0 + np.abs(result.flow).max(initial=0.0) / f_scale) or (sweep > 20 and most < 1e-12):
             return
         if before <= 2.0 * most < ROUNDING:  # no closer: what is left is rounding
@@ -229,16 +231,18 @@ def _edge_row(found, columns, e, edge, result, scale) -> float:
     return gamma / scale[0]
 
 
-def _solve(i, j, values, right, size, result):
-    """Least-norm solution of the Newton system; remembers whether it had to choose."""
+def _solve(places, values, right, size, result):
+    """Least-norm solution of the Newton system, of values at row times size plus column; remembers if it had to choose.
+
+    NaN where a number of the system is not finite.
+    """
     if not (np.isfinite(values).all() and np.isfinite(right).all()):
         return np.full(size, np.nan)
     if max(len(right), size) > DENSE:
-        found, chosen = _solve_sparse(values, i, j, right, size)
+        found, chosen = _solve_sparse(values, places // size, places % size, right, size)
         result.split = result.split or chosen
         return found
-    matrix = np.zeros((len(right), size))
-    np.add.at(matrix, (i, j), values)
+    matrix = np.bincount(places, values, len(right) * size).reshape(len(right), size)
     if len(right) == size:
         try:
             found = np.linalg.solve(matrix, right)

@@ -97,18 +97,28 @@ def parts(
             for keys, text in _vacuum((group, name, key), pressures, fluid, raw):
                 yield (ROOT, *keys), text
 
-    named = nodes if raw is None else _dict(raw.table.get("nodes"))
-    yield from bodies.misfits(nodes, named)
-    yield from riding_networks.misfits(nodes, links, basins.riding_places(nodes, meshes), named)
-    yield from bodies.one_place(nodes, links, poses)
-    yield from bodies.open_pins(nodes, links, poses)
-    yield from sloshing.misfits(nodes, lumped, poses)
-    yield from sloshing.weightless(nodes, gravity)
+    if meshes or lumped or gravity == 0.0 or any(map(in_space, (*nodes.values(), *links.values()))):
+        named = nodes if raw is None else _dict(raw.table.get("nodes"))
+        yield from bodies.misfits(nodes, named)
+        yield from riding_networks.misfits(nodes, links, basins.riding_places(nodes, meshes), named)
+        yield from bodies.one_place(nodes, links, poses)
+        yield from bodies.open_pins(nodes, links, poses)
+        yield from sloshing.misfits(nodes, lumped, poses)
+        yield from sloshing.weightless(nodes, gravity)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():
             for keys, text in part.faults(name, around):
                 yield keys[1:] if keys[:1] == (ROOT,) else (group, name, *keys), text
+
+
+RIDES = ("on", "at", "attitude")  # keys of places on bodies
+
+
+def in_space(part: Any) -> bool:
+    """Whether a part has a place in space, or rides: of a case without any there is nothing to be wrong in space."""
+    said = vars(part)
+    return "points" in said or bool(said.get("route")) or any(said.get(key) is not None for key in RIDES)
 
 
 def numerics(numerics: Numerics, has_cells: bool) -> Found:

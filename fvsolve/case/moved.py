@@ -9,7 +9,7 @@ from typing import Any
 from fvsolve.case import check
 from fvsolve.case.case import Case
 from fvsolve.parts import KINDS, Basin
-from fvsolve.parts.schedule import Scheduled
+from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Quantity
 
 GROUPS = ("nodes", "links")
@@ -35,7 +35,7 @@ def moved(reader: Any) -> Case | None:
                 return None
             if known[0] is not given:
                 try:
-                    known = given, reader.part(type(known[1]), given)
+                    known = given, reader.part(type(known[1]), read_before(given, *known))
                 except ValueError:
                     return None
                 reader.read[group, name] = known
@@ -51,6 +51,14 @@ def moved(reader: Any) -> Case | None:
         return None
     made = replace(before, nodes=nodes, links=links, raw=raw.table, read=reader.read)
     return made if before.exact is None else reader.exact(made)
+
+
+def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dict[str, Any]:
+    """A part's table with numbers over time as they were read before, where what they were read from stays."""
+    said = vars(part)
+    same = {key: found for key, value in given.items() if isinstance(found := said.get(key), Schedule)
+            and isinstance(value, dict) and before.get(key) is value}  # fmt: skip
+    return {**given, **same}
 
 
 def whole(case: Case) -> bool:

@@ -38,7 +38,7 @@ def given(model) -> tuple[float, float]:
     pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
     for node in model.case.nodes.values():
         for key, kind in DRIVES.items():
-            values = getattr(getattr(node, key, None), "value", None)
+            values = getattr(vars(node).get(key), "value", None)
             if not isinstance(values, np.ndarray) or not values.size:
                 continue
             if kind == "flow":

@@ -58,10 +58,11 @@ def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
 
 def stores(model, h: float):
     """(name, number, h k Y) of nodes that store and that delay lines touch."""
-    nodes, out = model.tables.nodes, model.evaluate(model.case.numerics.start, model.start)[1]
+    nodes, out = model.tables.nodes, None
     for i, (name, node) in enumerate(zip(model.case.places, nodes, strict=True)):
         if node["line_count"] == 0 or node["kind"] in (rec.FIXED, rec.JUNCTION, rec.PATCH):
             continue
+        out = model.evaluate(model.case.numerics.start, model.start)[1] if out is None else out
         moving = node["kind"] >= rec.MOVING or (node["kind"] == rec.CHAMBER and node["row"] >= 0)
         stiffness = out[model.layout["stiffness"] + node["row"]] if moving else node["stiffness"]
         yield f"nodes.{name}", i, float(h * stiffness * node["admittance"])

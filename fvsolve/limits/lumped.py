@@ -79,7 +79,8 @@ def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float
 def beyond(r, s: np.ndarray, h: float) -> np.ndarray:
     """By how much more a step multiplies each mode than its own growth does, less one."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.nan_to_num(np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0)), nan=np.inf) - 1.0
+        found = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
+        return (found if np.isfinite(found).all() else np.nan_to_num(found, nan=np.inf)) - 1.0
 
 
 def times(excess: float, steps: float) -> float:

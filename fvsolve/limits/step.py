@@ -21,6 +21,7 @@ from fvsolve.limits.lumped import GROWS, Mode, lumped_modes, times
 from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.swings import swings
 from fvsolve.limits.symbol import weights_of
+from fvsolve.model.slate import Slate
 from fvsolve.schemes import ROOM, SCHEMES
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
@@ -45,12 +46,14 @@ class Room(NamedTuple):
     grows: float = math.inf  # times in the run, where that is what makes it wrong
 
 
-def step_limits(model, rates: dict[str, float] | None = None, astray: float | None = None) -> list[Notice]:
+def step_limits(
+    model, rates: dict[str, float] | None = None, astray: float | None = None, slate: Slate | None = None
+) -> list[Notice]:
     """A notice for the pipe, for every basin, and for what is no wave, whose step is beyond its limit.
 
     rates : of basins by name, the greatest in a run so far [1/s]; those of the start by default. astray : share of
-    its range by which steps of a run went astray where they did most (`solve.halves`); None before a run. Nothing
-    under error control.
+    its range by which steps of a run went astray where they did most (`solve.halves`); None before a run; slate : one
+    to look on, which is blank again. Nothing under error control.
     """
     numerics = model.case.numerics
     method = method_named(automatic.first_method(numerics.method))
@@ -61,7 +64,7 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
         return lines
     try:
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
-        h = first_step(model)
+        h = first_step(model, slate)
         modes = lumped_modes(model, method.name, h) if h > 0.0 else []
         growing = swings(model, method.name, h, span(model)) if h > 0.0 else []
     except FvsolveError:  # a method whose stability function is not to be had
@@ -72,12 +75,16 @@ def step_limits(model, rates: dict[str, float] | None = None, astray: float | No
     return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
 
 
-def first_step(model) -> float:
+def first_step(model, slate: Slate | None = None) -> float:
     """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
     numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step
-    rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
+    if slate is None or model.basins:  # which keep more on a slate than flags
+        rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
+    else:
+        rate = float(slate.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
+        slate.blank()
     return numerics.courant / rate if rate > 0.0 else 0.0
 
 

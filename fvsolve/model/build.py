@@ -26,6 +26,7 @@ from fvsolve.model.past import past_size
 from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
 from fvsolve.model.ranges import flow_notices
+from fvsolve.model.resized import resized
 from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
@@ -42,17 +43,39 @@ def build(case) -> Model:
     """
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; wanted what load() gives")
+    return built(case)
+
+
+def built(case: Case, like: Model | None = None) -> Model:
+    """The same; like : a model of a case that differs in few numbers, of which what they leave is taken."""
     told = []
     if case.settles:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
         case, told = settled(case, drafted(steady))
-    draft = drafted(case)
+    if like is not None and not like.packed:
+        like.packed.append(packed(like.case))
+    taken = None if like is None else resized(like.packed[0], case)
+    draft = drafted(case, taken)
     draft.warnings += told
-    return model_of(draft)
+    found = model_of(draft)
+    if draft is taken and found.unsteady == like.unsteady:
+        found.__dict__["functions"] = like.functions
+    return found
 
 
-def drafted(case: Case, unfit: Collection[str] = ()) -> Draft:
-    """The tables of a case and its profile; unfit : pipes that are no delay lines, see `model.delay`."""
+def drafted(case: Case, draft: Draft | None = None, unfit: Collection[str] = ()) -> Draft:
+    """The tables of a case, packed before if given, and its profile; unfit : no delay lines, see `model.delay`."""
+    draft = draft or packed(case, unfit)
+    draft.check()
+    draft.steady = start_profile(draft)
+    settle_scalars(draft)
+    worse = cut_lines(draft)
+    draft.check()
+    return drafted(case, None, {*unfit, *worse}) if worse else draft
+
+
+def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
+    """The tables of a case as they are before its start is known."""
     draft = Draft(case)
     draft.followed = followed(case, unfit)
     fill_places(draft)
@@ -62,11 +85,7 @@ def drafted(case: Case, unfit: Collection[str] = ()) -> Draft:
     lower_scalars(draft)
     draft.check()
     pack(draft, np.zeros(profile_size(draft)))
-    draft.steady = start_profile(draft)
-    settle_scalars(draft)
-    worse = cut_lines(draft)
-    draft.check()
-    return drafted(case, {*unfit, *worse}) if worse else draft
+    return draft
 
 
 def fill_places(draft: Draft) -> None:

@@ -158,8 +158,13 @@ def soften(draft, ks) -> None:
         if row["transition"] == 0.0 and row["hooks"] < 0:
             link = draft.case.conduits[draft.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            row["transition"] = draft.hydraulics.transition_flow(draft.valve_names[k], link, 10.0, draft.fault)
+            soften_root(draft, draft.valve_names[k], link, row)
             row["unseen"] = max(1.0 if neck else 0.0, unseen)
+
+
+def soften_root(draft, name: str, link, row) -> None:
+    """Let a restriction be laminar below Reynolds 10."""
+    row["transition"] = draft.hydraulics.transition_flow(name, link, 10.0, draft.fault)
 
 
 def unseen_drop(draft, ks) -> float:

@@ -130,7 +130,7 @@ def cut_lines(draft) -> list[str]:
     found = draft.steady["lines"] = {}
     for name, chosen in draft.followed.items():
         found[name] = {"line": chosen.line, "line_bound": None, "line_why": chosen.why}
-    scale = time_scale(draft)
+    scale = time_scale(draft) if len(draft.delay_table) else 0.0
     for row in draft.delay_table:
         name = draft.pipe_names[row["pipe"]]
         pipe, chosen = draft.pipe_table[row["pipe"]], draft.followed[name]

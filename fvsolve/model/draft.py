@@ -27,6 +27,11 @@ def rows(record: np.dtype) -> Any:
     return field(default_factory=lambda: np.zeros(0, record))
 
 
+def twin(table: np.ndarray) -> np.ndarray:
+    """A copy, by bytes: numpy would copy records field by field."""
+    return np.ndarray(table.shape, table.dtype, bytearray(table.tobytes()))
+
+
 @dataclass(slots=True, eq=False)
 class Draft:
     """Tables, names and states of a model on the way; nothing else may be hung on it."""
@@ -119,6 +124,24 @@ class Draft:
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
+
+    def copied(self, case: Case) -> Draft:
+        """The same, packed, for a case of the same numbers but where it is changed: what a start writes is its own."""
+        made = object.__new__(Draft)
+        tables = {id(one): twin(one) for one in self.tables if one.flags.writeable}
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                value = tables.get(id(value), value)
+            elif isinstance(value, (list, dict)):
+                value = value.copy()
+            setattr(made, name, value)
+        made.case, made.hydraulics = case, Hydraulics(case)
+        made.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))
+        made.warnings = [*case.notes, *self.warnings[len(self.case.notes) :]]
+        for table, rows in self.links.items():
+            made.links[table] = [(name, case.links.get(name, link), lowering) for name, link, lowering in rows]
+        return made
 
     def fault(self, place: str, message: str) -> None:
         self.faults.append(Fault(place, message))

@@ -54,6 +54,10 @@ class Lowering:
         """Its numbers, in the order in which its law reads them from the place that its row names as `data`."""
         return []
 
+    def resize(self, draft, name: str, before: Any, part: Any, row) -> bool:
+        """Make its row, once packed, that of a part in place of that before; whether it can."""
+        return False
+
     def inputs(self, model, name: str, part: Any) -> dict[str, Input]:
         """Key -> what of it can be held at a value."""
         return {}

@@ -13,7 +13,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
-from fvsolve.model.past import begin_past, without_past
+from fvsolve.model.past import without_past
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
 from fvsolve.shown import Shown
@@ -75,6 +75,10 @@ def flags_of(state: State, model: Model) -> np.ndarray | float:
 
 def given_numbers(name: str, given: Any) -> np.ndarray:
     """What is given as float64[...] that can be written, itself where it is that; FvsolveError if not real numbers."""
+    if type(given) is float:
+        return np.float64(given)
+    if type(given) is np.ndarray and given.dtype == np.float64 and given.flags.carray and given.ndim:
+        return given
     try:
         found = np.asarray(given)
         if found.dtype.kind not in "fiu":
@@ -136,6 +140,7 @@ class Model(Shown):
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
     basins: list[BasinRows]  # as their table has them
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
+    packed: list = field(default_factory=list, init=False)  # its draft before the start, where others are made of it
 
     picture = "fvsolve.draw.objects:model_figure"
 
@@ -170,11 +175,13 @@ class Model(Shown):
         """Number of cells of all pipes and basins."""
         return self.cells + sum(basin.n for basin in self.basins)
 
-    @property
+    @cached_property
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses in a second, for every pipe [1/s]."""
         pipes = self.tables.pipes
-        return pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
+        found = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
+        found.flags.writeable = False
+        return found
 
     @property
     def wave_rate(self) -> float:
@@ -207,8 +214,8 @@ class Model(Shown):
         there = [many.clusters, many.columns, many.masses, many.bodies, many.lines, many.pins, many.bushings]
         there.append(many.rides)
         basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
-        patches = (self.tables.nodes["kind"] == rec.PATCH).all()
-        alone = bool(self.basins and patches) and not (self.pipes or valves or many.devices or any(there))
+        alone = bool(self.basins) and not (self.pipes or valves or many.devices or any(there))
+        alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = Cast(self.case.law.family, cells, *there, self.unsteady, many.devices, tuple(self.laws),
                     basins, carried, many.scalars, valves, many.delays, alone)  # fmt: skip
@@ -281,8 +288,7 @@ class Model(Shown):
             slate = self.slates.pop()  # which no other thread then has
         except IndexError:
             slate = Slate(self)
-        slate.armed[:] = armed
-        begin_past(slate.past, self.tables.delays)
+        slate.blank(armed)
         yield slate
         self.slates.append(slate)
 

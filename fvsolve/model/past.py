@@ -18,6 +18,8 @@ LEAST_ROOM = 16  # steps
 
 def rings_of(delays: np.ndarray, longest: float) -> None:
     """Give each stretch a ring that holds its delay in steps of this length [s] and some more, a power of two."""
+    if not len(delays):
+        return
     many = int(delays["stretches"].sum())
     spare = min(MOST_SPARE, max(LEAST_SPARE, ENTRIES // max(1, many)))
     wanted = OLDER * delays["hold"] / longest + BESIDE + spare

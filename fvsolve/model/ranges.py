@@ -17,7 +17,8 @@ SHORT = 0.1  # of the longest travel time: pipes that may have fewer
 
 def flow_notices(draft: Any) -> list[Notice]:
     """Notices of velocity, of laminar water, of cells; one each for all pipes, at the worst of them."""
-    return [*_quick(draft), *_laminar(draft), *(_coarse(draft) if draft.pipe_names else ())]
+    moving = _moving(draft)
+    return [*_quick(draft, *moving), *_laminar(draft, *moving), *(_coarse(draft) if draft.pipe_names else ())]
 
 
 def _moving(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
@@ -28,8 +29,7 @@ def _moving(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
     return [row[0] for row in rows], *np.array([row[1:] for row in rows]).reshape(-1, 2).T
 
 
-def _quick(draft: Any) -> list[Notice]:
-    names, flow, area = _moving(draft)
+def _quick(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> list[Notice]:
     speed = np.abs(flow) / (draft.fluid.density * area)
     if not (speed > QUICKEST).any():
         return []
@@ -39,9 +39,9 @@ def _quick(draft: Any) -> list[Notice]:
     return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), QUICKEST)]
 
 
-def _laminar(draft: Any) -> list[Notice]:
+def _laminar(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> list[Notice]:
     """Where the quickest flow of water in wide pipes is laminar: a flow or a viscosity in other units."""
-    (names, flow, area), fluid = _moving(draft), draft.fluid
+    fluid = draft.fluid
     if not names or not fluid.viscosity or not WATERY[0] <= fluid.density <= WATERY[1]:
         return []
     bore = np.sqrt(4.0 / np.pi * area)

@@ -98,8 +98,10 @@ def start_amounts(draft, found: np.ndarray) -> None:
 
 def amounts(model) -> np.ndarray:
     """Places of all amounts in the state."""
+    if not len(model.tables.scalars):
+        return np.zeros(0, dtype=int)
     count = model.cells + int(np.isin(model.tables.nodes["kind"], STORES).sum())
-    return np.concatenate([np.zeros(0, dtype=int), *(row["y"] + np.arange(count) for row in model.tables.scalars)])
+    return np.concatenate([row["y"] + np.arange(count) for row in model.tables.scalars])
 
 
 def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:

@@ -27,13 +27,18 @@ class Schedules:
     rows: list[list[float]] = field(default_factory=list)
     breaks: dict[float, bool] = field(default_factory=dict)  # time -> whether a value jumps there
     spacing: float = np.inf  # greatest step that does not leap over samples [s]
+    given: dict[tuple[int, float], float] = field(default_factory=dict)  # (index, time) -> values, once all are added
 
     def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
         """Index of a schedule whose value is scale * value + offset."""
-        pieces = lower(schedule)
-        pieces[:, 3:] = scaled(pieces, scale, offset)
+        if schedule.kind == "constant":
+            pieces = [[-np.inf, 0.0, 0.0, schedule.first * scale + offset, *(0.0 * scale,) * 3]]
+        else:
+            table = lower(schedule)
+            table[:, 3:] = scaled(table, scale, offset)
+            pieces = table.tolist()
         self.records.append((len(self.rows), len(pieces)))
-        self.rows += pieces.tolist()
+        self.rows += pieces
         for time, jump in break_times(schedule):
             self.breaks[time] = self.breaks.get(time, False) or jump
         if schedule.kind == "harmonic":
@@ -90,9 +95,11 @@ def lower(schedule) -> np.ndarray:
 
 def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
     """Coefficients of scale * value + offset."""
-    values = pieces[:, 3:] * scale
-    power, kept = pieces[:, 1] == POWER, pieces[:, 1] != 0
+    values, kept = pieces[:, 3:] * scale, pieces[:, 1] != 0
     values[:, 0] += offset
+    if not kept.any():
+        return values
+    power = pieces[:, 1] == POWER
     values[power, 1] += offset
     values[kept, 2:] = pieces[kept, 5:]
     return values

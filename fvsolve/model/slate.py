@@ -69,6 +69,11 @@ class Slate:
         shared = model.places if self.tables is model.tables else places_of(self.tables)
         return joined((*shared, *places_of((*self.written, functions.calls, functions.hooks))))
 
+    def blank(self, armed: np.ndarray | float = 0.0) -> None:
+        """Ready for a look at another state: flags as given, nothing sent into delay lines."""
+        self.armed[:], self.clock["limit"] = armed, np.inf
+        begin_past(self.past, self.model.tables.delays)
+
     @property
     def past(self) -> np.ndarray:
         """What was sent into delay lines."""

@@ -83,7 +83,11 @@ class Start:
 
     def given(self, schedule: int) -> float:
         """What a schedule gives up to the start."""
-        return float(value_until(self.draft.tables.schedules, self.draft.tables.pieces, int(schedule), self.t, self.t))
+        known, key = self.draft.schedules.given, (int(schedule), self.t)
+        if key not in known:
+            schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
+            known[key] = float(value_until(schedules, pieces, key[0], self.t, self.t))
+        return known[key]
 
     def solve(self) -> None:
         """The steady state in which every device is as its pressures and flows ask for."""
@@ -213,10 +217,10 @@ class Start:
             return Edge(i, j, None, 0.0, shut=True)
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        ahead, behind = transition_of(row, g), transition_of(row, g * back) if back != 1.0 else None
 
         def newton(flow, present):
-            here = g * back if present < 0.0 else g
-            transition = transition_of(row, here)
+            here, transition = (g, ahead) if behind is None or not present < 0.0 else (g * back, behind)
             target = flow_at_drop(here, transition, present)
             if transition > 0.0 and abs(target) < transition:
                 slope = flow_slope(here, transition, present)
@@ -235,9 +239,13 @@ class Start:
 
     def conductance(self, k: int) -> float:
         """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""
-        if self.valves[k]["device"] < 0:
-            return conductance_of(self.draft.tables, k, self.given(self.valves[k]["schedule"]))
-        return 0.0 if k in self.shut else float(self.valves[k]["conductance"])
+        row = self.valves[k]
+        if row["device"] >= 0:
+            return 0.0 if k in self.shut else float(row["conductance"])
+        opening = self.given(row["schedule"])
+        if row["characteristic"] == 0:  # as `conductance_of` has it, which wants all tables
+            return float(row["conductance"]) * opening * opening
+        return conductance_of(self.draft.tables, k, opening)
 
     def leak_edge(self, k: int) -> Edge:
         """What leaks past a piston: M = rho leakage dP."""

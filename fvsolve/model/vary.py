@@ -8,7 +8,7 @@ from typing import Any
 from fvsolve.case import load, located
 from fvsolve.doors import TABLE, door, made
 from fvsolve.errors import CaseError
-from fvsolve.model.build import build
+from fvsolve.model.build import built
 from fvsolve.model.model import Model
 
 
@@ -22,6 +22,6 @@ def vary(model: Model, set: Mapping[str, Any]) -> Model:
     """
     case = load(model.case, dict(set))
     try:
-        return build(case)
+        return built(case, model)
     except CaseError as error:
         raise located(error, case) from None

@@ -27,9 +27,9 @@ class MemorySink:
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
-        self._blocks.append(
-            np.column_stack([self.time.from_si(np.asarray(t)), converted(self.columns, np.asarray(values))])
-        )
+        block = np.empty((len(t), 1 + len(self.columns)))
+        block[:, 0], block[:, 1:] = self.time.from_si(np.asarray(t)), converted(self.columns, np.asarray(values))
+        self._blocks.append(block)
 
     def field(self, t: float, frame: dict) -> None:
         """Not kept."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -114,6 +115,7 @@ class Scheduled(Value):
             return self._read_wave(given, setting)
         return self._read_table(given, setting)
 
+    @cached_property
     def forms(self) -> dict[str, dict[str, tuple[Value, Any]]]:
         """The forms a table may have: per key its value and default."""
         item, kind = (self.dimension, self.range), (Choice("kind of schedule", KINDS), "linear")
@@ -140,10 +142,10 @@ class Scheduled(Value):
         return f"{Quantity(self.dimension, self.range).takes}; schedule"
 
     def json(self) -> dict[str, Any]:
-        return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms().values())]}
+        return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms.values())]}
 
     def _read_table(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms()["table"], setting)
+        found = read_keys(given, self.forms["table"], setting)
         t, v, kind = found["time"], found["value"], found["kind"]
         if len(t) != len(v):
             raise Misfit([(("value",), f"{len(v)} values for {len(t)} times; wanted as many of both")])
@@ -156,7 +158,7 @@ class Scheduled(Value):
         return Schedule(kind, t, v, origin={"time": list(t), "value": list(v), "kind": kind})
 
     def _read_ramp(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms()["ramp"], setting)
+        found = read_keys(given, self.forms["ramp"], setting)
         start, duration, v, exponent = (found[key] for key in ("start", "duration", "value", "exponent"))
         origin = {**found, "value": list(v)}
         if start + duration == start:  # no duration: a jump
@@ -164,7 +166,7 @@ class Scheduled(Value):
         return Schedule("ramp", (start, start + duration), v, exponent, origin)
 
     def _read_wave(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms()["wave"], setting)
+        found = read_keys(given, self.forms["wave"], setting)
         mean, amplitude, period, phase = (found[key] for key in ("mean", "amplitude", "period", "phase"))
         reach = mean - abs(amplitude), mean + abs(amplitude)
         try:
@@ -175,7 +177,7 @@ class Scheduled(Value):
         return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, found, (mean, amplitude, period, phase))
 
     def _read_file(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms()["file"], setting)
+        found = read_keys(given, self.forms["file"], setting)
         kind = found["kind"]
         try:
             path = find_file(found["file"], setting)
@@ -190,7 +192,7 @@ class Scheduled(Value):
 
     def _read_signal(self, given: dict[str, Any], setting: Setting) -> Schedule:
         setting.asked += 1
-        name = read_keys(given, self.forms()["signal"], setting)["signal"]
+        name = read_keys(given, self.forms["signal"], setting)["signal"]
         if name not in setting.signals:
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
             raise Misfit([(("signal",), f"no signal named {show(name)}{near}; signals are {names}")])

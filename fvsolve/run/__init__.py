@@ -63,16 +63,20 @@ def open_run(directory: str | Path) -> Result:
     return Result(*read_directory(Path(directory)))
 
 
-def model_of(case, set: Mapping | None = None):
-    """The model of what `run` takes; what cannot start is a fault with its line, as what cannot be read is."""
+def model_of(case, set: Mapping | None = None, like=None):
+    """The model of what `run` takes; what cannot start is a fault with its line, as what cannot be read is.
+
+    like : a model, as `model.build.built` has it
+    """
     from fvsolve.case import Case, load, located
-    from fvsolve.model import Model, build
+    from fvsolve.model import Model
+    from fvsolve.model.build import built
 
     if not isinstance(case, Model):
         if set or not isinstance(case, Case):
             case = load(case, dict(set or {}))
         try:
-            return build(case)
+            return built(case, like)
         except CaseError as error:
             raise located(error, case) from None
         except MemoryError:

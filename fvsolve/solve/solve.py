@@ -182,8 +182,8 @@ class Run:
         return out
 
     def flush(self) -> None:
-        rows = self.loop.take_rows()
-        if len(rows):
+        if self.loop.flags[slots.ROWS]:
+            rows = self.loop.take_rows()
             self.sink.rows(rows[:, 0], rows[:, 1:])
             self.widen(rows)
 
@@ -192,11 +192,13 @@ class Run:
         least, t_least, greatest, t_greatest = self.slate.extremes
         t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
-        lower = values[at, each] < least
-        least[lower], t_least[lower] = values[at, each][lower], t[at][lower]
+        lower = (found := values[at, each]) < least
+        if lower.any():
+            least[lower], t_least[lower] = found[lower], t[at][lower]
         at = values.argmax(axis=0)
-        higher = values[at, each] > greatest
-        greatest[higher], t_greatest[higher] = values[at, each][higher], t[at][higher]
+        higher = (found := values[at, each]) > greatest
+        if higher.any():
+            greatest[higher], t_greatest[higher] = found[higher], t[at][higher]
 
     def look(self, t: float, y: np.ndarray) -> None:
         """Let what watches basins see a state."""

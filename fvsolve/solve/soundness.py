@@ -27,7 +27,7 @@ class Soundness:
         model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
-        self.predicted = step_limits(model)
+        self.predicted = step_limits(model, slate=slate)
         self.halves = Halves(slate)
         self.unfelt = Unfelt(model)
         self.largest = MOST * drives(model)
@@ -59,7 +59,7 @@ class Soundness:
     def warnings(self, ledgers: dict) -> list[Notice]:
         """All notices of a run that ended."""
         found = list(self.predicted)
-        if self.model.case.numerics.step is not None:  # now with what the run has shown
+        if self.model.case.numerics.step is not None and (found or self.moving):  # now with what the run has shown
             found = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
         astray = self.halves.notice()
         found += [] if astray is None else [astray]

@@ -86,6 +86,8 @@ class Summary:
 def find_marks(slate: Slate) -> list[Mark]:
     """First time and place of everything the model cannot really follow; cavities are none where the law has them."""
     model, marks = slate.model, slate.marks
+    if np.isnan(marks).all():
+        return []
     pipes, nodes = model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
     kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]

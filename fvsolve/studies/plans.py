@@ -85,7 +85,7 @@ def quantity_of(raw: dict[str, Any], key: str) -> Quantity | None:
     value = declared(raw, keys)
     if isinstance(value, Scheduled):
         within = len(keys) > 1 and isinstance(declared(raw, keys[:-1]), Scheduled)
-        forms = value.forms().values() if within else ()
+        forms = value.forms.values() if within else ()
         value = next((one[keys[-1]][0] for one in forms if keys[-1] in one), Quantity(value.dimension, value.range))
     return value if isinstance(value, Quantity) else None
 

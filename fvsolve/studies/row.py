@@ -22,12 +22,13 @@ QUIET = {"output.fields": 0, "output.lines": {}}  # what no row shows
 class RowMaker:
     """What makes rows of values of keys: of a case, with `base` set in all of them.
 
-    source : what `load` takes; case : it as it was read first, from which the others are read
+    source : what `load` takes; case, model : as they were made first, of which the others are made
     """
 
     source: Any
     base: dict[str, Any]
     case: Case | None = field(default=None, compare=False)
+    model: Any = field(default=None, compare=False)
 
     def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The row of a run; a case that is refused has one too."""
@@ -36,10 +37,10 @@ class RowMaker:
         from fvsolve.solve import initial_state, solve
 
         try:
-            model = model_of(self.read(values))
+            model = model_of(self.read(values), like=self.model)
         except CaseError as error:
             return {"ok": False, "reason": refusal(error)}
-        sink = MemorySink(model)
+        self.model, sink = self.model or model, MemorySink(model)
         summary = solve(model, initial_state(model), sink)
         if summary.reason.startswith("interrupted"):
             raise KeyboardInterrupt
@@ -62,7 +63,7 @@ class RowMaker:
         return {"sent": Sent(self.case or self.source), "base": self.base}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.source, self.base, self.case = state["sent"].source, state["base"], None
+        self.source, self.base, self.case, self.model = state["sent"].source, state["base"], None, None
 
     def lost(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The row of a run that ends its process."""

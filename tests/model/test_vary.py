@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -114,6 +115,30 @@ def test_one_model_follows_from_another_that_was_varied_itself():
     twice = fvsolve.vary(fvsolve.vary(model, {"links.valve.area": 0.001}), {"nodes.lake.head": 30.0})
     once = fvsolve.build(fvsolve.load("valve-closure", SMALL | {"links.valve.area": 0.001, "nodes.lake.head": 30.0}))
     assert said(twice) == said(once)
+
+
+def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monkeypatch):
+    """Of one alone or several, laminar or not; a stem or a kind of law that is other asks for tables of its own."""
+    table = raw_case("valve-closure")
+    table["nodes"]["sump"] = {"type": "reservoir", "pressure": "0 barg"}
+    table["links"]["hole"] = {"type": "orifice", "from": "gate", "to": "sump", "diameter": "1 mm"}
+    table["links"]["bleed"] = {"type": "orifice", "from": "lake", "to": "sump", "diameter": "2 mm"}
+    model, room = fvsolve.build(fvsolve.load(table, SMALL)), sys.modules["fvsolve.model.build"]
+    before, found = said(model), []
+    taken = room.resized
+    monkeypatch.setattr(room, "resized", lambda *given: found.append(taken(*given)) or found[-1])
+    for move, in_place in (
+        ({"links.valve.area": 0.001}, True),
+        ({"links.hole.diameter": "3 mm", "links.bleed.discharge_coefficient": 0.7}, True),
+        ({"links.bleed.diameter": 1e-3, "links.valve.area": 2e-3, "links.valve.discharge_coefficient": 0.5}, True),
+        ({"links.valve.laminar_reynolds": 100.0}, False),
+        ({"links.valve.opening.duration": 0.3}, False),
+        ({"links.hole.diameter": "3 mm", "nodes.lake.head": 30.0}, False),
+    ):
+        ours = fvsolve.vary(model, move)
+        assert said(ours) == said(fvsolve.build(fvsolve.load(table, SMALL | move))), move
+        assert (found[-1] is not None) == in_place, move
+        assert said(model) == before, move
 
 
 def test_what_files_and_signals_say_is_read_again(tmp_path):

@@ -64,6 +64,21 @@ def test_rows_of_stability_are_the_same(line):
     assert plain(together) == plain(alone)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("study", "asked"),
+    [
+        (order, {"levels": 3, "cells": 8, "against": "finer"}),
+        (chart, {"schemes": ["upwind5"], "methods": ["rk4", "ssp-rk3"], "cells": [10, 20]}),
+        (failures, {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 0.9, 1.5], "tolerance": 0.05}),
+        (stability, {"schemes": ["upwind", "upwind5"], "methods": ["euler", "rk4"], "steps": 50}),
+    ],
+)
+def test_workers_of_dask_find_the_same(line, cluster, study, asked):
+    alone, there = (plain(study(line, dask=dask, **asked).plain()) for dask in (None, cluster.scheduler_address))
+    assert timeless(there) == timeless(alone)
+
+
 def test_what_has_no_name_to_be_sent_by_is_refused(line):
     with pytest.raises(FvsolveError, match="initial, source and exact are functions of this process; wanted jobs = 1"):
         order(line, jobs=2, initial=lambda pipe, x: (x, x))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fvsolve.model.clusters import soften_root
 from fvsolve.model.inputs import opening
 from fvsolve.model.lowering import Restriction
 
@@ -18,6 +19,16 @@ class ValveRows(Restriction, kind="valve"):
             row["characteristic"], row["table"] = 2, len(draft.floats)
             row["table_size"] = len(link.characteristic.opening)
             draft.floats += [*link.characteristic.opening, *link.characteristic.flow_area]
+
+    def resize(self, draft, name, before, part, row) -> bool:
+        others = part.opening != before.opening or part.characteristic != before.characteristic
+        if others or row["hooks"] >= 0 or (part.laminar_reynolds is None) != (before.laminar_reynolds is None):
+            return False
+        softened = part.laminar_reynolds is None and row["transition"] > 0.0
+        draft.restriction(name, part, row)
+        if softened:
+            soften_root(draft, name, part, row)
+        return True
 
     def inputs(self, model, name, part):
         return opening(model, name)
