@@ -184,8 +184,7 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, spans, orders, memory, times, flags, memory[T] - memory[LAST], y[old],
-                    f_old, y[now], k[s - 1] if steep else k[0], k, dense, out, out_row, y_out, rows, within_at,
-                    within_by,
+                    f_old, y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
                 )  # fmt: skip
                 if why != DONE:
                     return why

@@ -15,7 +15,7 @@ from fvsolve.steppers.slots import (
     STOP_AT,
     T,
 )
-from fvsolve.steppers.step import BEGIN, HUGE, STOP, copy, interpolate
+from fvsolve.steppers.step import BEGIN, HUGE, STOP, interpolate
 
 BASE, GAIN, LEAST, MOST = range(4)
 LITTLE = 1e-9  # of what there are shares of, too little to tell them by
@@ -75,13 +75,10 @@ def keep_within(at, by, y_old, y, out):
 
 @njit
 def emit(
-    rhs, observe, handle, spans, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, known, out, y_out,
-    rows, within_at, within_by,
+    rhs, observe, handle, spans, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
+    within_at, within_by,
 ):  # fmt: skip
-    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full.
-
-    known : what goes with y, the state now: a row that is due now asks for nothing more
-    """
+    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
     while True:
         row = row_due(orders, memory, times)
@@ -93,15 +90,9 @@ def emit(
             return ROWS_FULL
         for m in range(spans.shape[0]):
             begin, end = spans[m, BEGIN], spans[m, STOP]
-            if due == t:
-                copy(y[begin:end], y_out[begin:end])
-            else:
-                interpolate(begin, end, (due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
-        if due == t:
-            copy(known, out)
-        else:
-            keep_within(within_at, within_by, y_old, y, y_out)
-            rhs(due, y_out, y_out[:0], out, handle)
+            interpolate(begin, end, (due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
+        keep_within(within_at, within_by, y_old, y, y_out)
+        rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due
             observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
