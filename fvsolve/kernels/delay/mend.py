@@ -61,9 +61,7 @@ def quickness(tables, out, i, j):
 def mend(past, tables, y, out, pipe, i, flow, missed):
     """Give a store what a flow out of a line that began within the step has brought, and take it from the line."""
     if flow != 0.0 and stores(tables, i):
-        mass = flow * brought(
-            missed, stiffness_of(tables.nodes, tables.layout[0], out, i) * tables.nodes[i]["admittance"]
-        )
+        mass = flow * brought(missed, quickness(tables, out, i, i))
         y[tables.nodes[i]["y"]] += mass
         y[pipe["y"]] -= mass
         past[MENDED] = NAN
@@ -76,11 +74,9 @@ def mend_columns(past, tables, y, i, change, missed):
     for k in range(columns.size):
         side = (columns[k]["from_node"] == i) - (columns[k]["to_node"] == i)
         if side != 0 and change != 0.0:
-            quick = columns[k]["area"] / columns[k]["length"]
-            admittance = tables.nodes[i]["admittance"]
-            y[columns[k]["y"]] += (
-                side * change * quick * brought(missed, quick / admittance if admittance > 0.0 else 0.0)
-            )
+            share, admittance = columns[k]["area"] / columns[k]["length"], tables.nodes[i]["admittance"]
+            rate = share / admittance if admittance > 0.0 else 0.0
+            y[columns[k]["y"]] += side * change * share * brought(missed, rate)
             past[MENDED] = NAN
 
 
@@ -99,9 +95,7 @@ def mend_behind(past, tables, y, out, missed):
             if side == 1:
                 i, j, flow = j, i, -flow
             if flow != 0.0 and stores(tables, i):
-                gain = -flow * brought(
-                    missed, stiffness_of(tables.nodes, tables.layout[0], out, i) * nodes[j]["admittance"]
-                )
+                gain = -flow * brought(missed, quickness(tables, out, i, j))
                 y[nodes[i]["y"]] += gain
                 given += gain
                 past[MENDED] = NAN
