@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.output.column import UnitColumn, probe_columns
-from fvsolve.run.comparison import comparison, interpolated_at
+from fvsolve.run.comparison import comparison, interpolated
 
 
 def claims(model, extremes: dict, result) -> dict:
@@ -50,7 +50,7 @@ def _found(expect, probe: str, extremes: dict, result) -> float:
         return float(values[-1])
     if expect.function == "at":
         inside = t[0] <= expect.time <= t[-1]
-        return interpolated_at(t, values, expect.time) if inside else float("nan")
+        return float(interpolated(t, values, np.array([expect.time]))[0]) if inside else float("nan")
     span = t[-1] - t[0]
     area = np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
     return float(area / span) if span > 0.0 else float(values[0])

@@ -58,18 +58,6 @@ def interpolated(t: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.nd
     return np.where(part >= 1.0, values[after], np.where(part <= 0.0, values[before], exact))
 
 
-def interpolated_at(t: np.ndarray, values: np.ndarray, time: float) -> float:
-    """The same at one time."""
-    if len(t) == 1:
-        return float(values[0])
-    after = min(max(int(t.searchsorted(time, side="right")), 1), len(t) - 1)
-    gap = t[after] - t[after - 1]
-    part = (time - t[after - 1]) / gap if gap > 0.0 else 1.0
-    if part >= 1.0 or part <= 0.0:
-        return float(values[after] if part >= 1.0 else values[after - 1])
-    return float(values[after - 1] + part * (values[after] - values[after - 1]))
-
-
 def differences(a, b) -> dict:
     """How far two runs are apart, per probe that both have: greatest and rms difference, b - a.
 

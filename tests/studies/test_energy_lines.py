@@ -49,6 +49,14 @@ def test_the_ledger_of_an_instant_closure_is_exact(method, share):
     assert np.max(np.abs(found.made)) < 1e-12 * found.through
 
 
+@pytest.mark.parametrize("h", [0.01, 0.013])
+def test_stages_outside_a_step_see_jumps_of_its_neighbours(h):
+    """crouzeix-4 looks ahead and back: once the gate is shut nothing is made, also where jumps arrive as steps end."""
+    found = energy(main(LOSSLESS, junction(step(0.1, FLOW, 0.0)), "crouzeix-4", h, 2.0))
+    shut = found.made[found.t > 0.12]
+    assert np.max(np.abs(shut - shut[0])) < 1e-12 * found.through
+
+
 def test_what_is_stored_and_taken_as_by_fine_cells():
     found, cells = chain(0.0025), chain(0.0025)
     found = energy(found | {"numerics": found["numerics"] | {"accuracy": 1e-3}})

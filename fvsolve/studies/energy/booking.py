@@ -73,7 +73,7 @@ class Booked(Loop):
     def jumped(self, t: float, y: np.ndarray) -> np.ndarray:
         """What the weights of the step from (t, y) miss of what jumps in delay lines change within it [J].
 
-        Stages before it know nothing of it, those behind it that it was always there.
+        Stages before it know nothing of it, those behind it that it was always there; some lie outside the step.
         """
         past, total, h = self.slate.past, np.zeros_like(self.total), self.t - t
         if not past.size or past[LIVE] == 0.0:
@@ -81,12 +81,13 @@ class Booked(Loop):
         (_, b, c), apart = self.tableau(), same_time(past)
         if self.stepper.method.kind == "linear":
             b = self.weights_beside()
-        for when in times_of_jumps(past, self.model.tables.delays, t, self.t):
+        begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
+        for when in times_of_jumps(past, self.model.tables.delays, begin, end):
             before, behind = (
                 self.power(at, y + (at - t) / h * (self.now - y)) for at in (when - 2.0 * apart, when + 2.0 * apart)
             )
             booked = h * float(b[t + c * h >= when - apart].sum())
-            total[:-1] += (behind - before) * ((self.t - when) - booked)
+            total[:-1] += (behind - before) * (min(h, max(0.0, self.t - when)) - booked)
         return total
 
     def stage(self, t: float, y: np.ndarray, slope: np.ndarray, supply: np.ndarray) -> np.ndarray:
