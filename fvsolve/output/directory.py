@@ -110,7 +110,7 @@ class RunDirectory:
         with self.writing():
             self.history.close()
             if summary.envelope:
-                envelope = with_start(summary.envelope, self.model)
+                envelope = with_start(summary, self.model)
                 write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
 
     def close(self) -> None:

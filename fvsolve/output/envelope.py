@@ -28,12 +28,18 @@ def envelope_columns(case) -> list[UnitColumn]:
     return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
 
 
-def with_start(envelope: dict, model) -> dict:
-    """The envelope of a solver with the heads that the run began from, `initial_head` [m]."""
+def with_start(summary, model) -> dict:
+    """The envelope of a solver, cells and what is watched between them by distance, with the heads that the run began
+    from, `initial_head` [m]."""
     found = {}
     for k, pipe in enumerate(model.pipes):
-        pressure = model.cell_pressure(k, np.zeros(pipe.cells))
-        found[pipe.name] = {**envelope[pipe.name], "initial_head": model.head(pressure, pipe.elevation)}
+        one = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
+        if (points := summary.points.get(pipe.name)) is not None:
+            one = {key: np.concatenate([values, points[key]]) for key, values in one.items()}
+            order = np.argsort(one["distance"], kind="stable")
+            one = {key: values[order] for key, values in one.items()}
+        one["initial_head"] = model.head(one.pop("initial_pressure"), one["elevation"])
+        found[pipe.name] = one
     return found
 
 
