@@ -43,17 +43,24 @@ def with_start(summary, model) -> dict:
     return found
 
 
+def in_units(envelope: dict, case) -> dict:
+    """An envelope in SI in the units of envelope.csv."""
+    columns = envelope_columns(case)
+    return {pipe: {one.name: np.asarray(one.from_si(np.asarray(arrays[one.name], float))) for one in columns}
+            for pipe, arrays in envelope.items()}  # fmt: skip
+
+
 def write_envelope(path: Path, envelope: dict, case) -> None:
     """One row per cell: pipe, distance from `from`, elevation, extremes and their times.
 
-    `envelope` maps a pipe to `float64[cells]` arrays in SI named as in `QUANTITIES`.
+    `envelope` maps a pipe to `float64[cells]` arrays named as in `QUANTITIES`, in units of the columns.
     """
     columns = envelope_columns(case)
     with open(path, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pipe", *(one.header for one in columns)])
         for pipe, arrays in envelope.items():
-            values = [one.from_si(np.asarray(arrays[one.name], float)).tolist() for one in columns]
+            values = [arrays[one.name].tolist() for one in columns]
             table.writerows([pipe, *map(repr, row)] for row in zip(*values, strict=True))
 
 

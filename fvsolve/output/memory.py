@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.output.column import converted, probe_columns, time_column
-from fvsolve.output.envelope import envelope_columns, with_start
+from fvsolve.output.envelope import in_units, with_start
 
 
 class MemorySink:
@@ -57,8 +57,4 @@ class MemorySink:
         """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
         if not self._summary:  # of a run that never ended
             return {}
-        columns = envelope_columns(self.model.case)
-        return {
-            pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns}
-            for pipe, arrays in with_start(self._summary, self.model).items()
-        }
+        return in_units(with_start(self._summary, self.model), self.model.case)

@@ -90,9 +90,9 @@ class Result(Shown):
     """Probes over time and what is to be said about them, in the units of `[output]`.
 
     `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
-    `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.expectations`, `.verdicts`,
-    `.comparisons`; all but the arrays as plain data in `result.summary`. `result.directory` is where it is on disk, or
-    None.
+    `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.routes`, `.expectations`,
+    `.verdicts`, `.comparisons`; all but the arrays as plain data in `result.summary`. `result.directory` is where it is
+    on disk, or None.
     """
 
     def __init__(
@@ -170,6 +170,13 @@ class Result(Shown):
             for array in arrays.values():
                 array.flags.writeable = False
         return found
+
+    @cached_property
+    def routes(self) -> dict:
+        """Route -> chainage, pipe, distance, elevation, least and greatest pressure and head, times, along it."""
+        from fvsolve.output.routes import along_routes
+
+        return along_routes(self.envelope, self.case)
 
     @property
     def probes(self) -> list[str]:

@@ -225,3 +225,20 @@ def test_a_route_runs_through_pumps_and_valves_and_against_its_pipes() -> None:
     assert [leg.backwards for leg in legs(found.routes["home"], found.links)] == [False, True, True]
     assert np.isfinite(judged(case)["end"].chainage)
     assert fvsolve.load(found.table()) == found
+
+
+def test_a_route_is_one_table_with_a_running_chainage(tmp_path) -> None:
+    case = shut(
+        turned=True, routes={"line": {"pipes": ["low", "high"], "start": "5 km"}}, output={"units": {"head": "ft"}}
+    )
+    found = fvsolve.run(case, out=tmp_path / "out", pictures=False)
+    one = found.routes["line"]
+    assert np.array_equal(one["chainage"], 5000.0 + 25.0 + 50.0 * np.arange(20))
+    assert list(one["pipe"]) == ["low"] * 10 + ["high"] * 10
+    assert np.array_equal(one["least_head"][:10], found.envelope["low"]["least_head"][::-1])
+    with open(tmp_path / "out" / "routes.csv", encoding="utf-8") as file:
+        header, *rows = [line.strip().split(",") for line in file]
+    assert header[:4] == ["route", "chainage [m]", "pipe", "distance [m]"] and "least_head [ft]" in header
+    assert [float(row[1]) for row in rows] == one["chainage"].tolist() and rows[0][:1] == ["line"]
+    assert "routes.csv" in found.summary["files"]
+    assert np.array_equal(fvsolve.open_run(tmp_path / "out").routes["line"]["chainage"], one["chainage"])
