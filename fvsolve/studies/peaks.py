@@ -23,7 +23,7 @@ SAFETY = 1.25  # Roache's, of three grids
 HALF = math.sqrt(2.0) / (math.sqrt(2.0) - 1.0)  # of order one half, to what twice the resolution leaves and all beyond
 MOST = 2.0  # order that is believed at most
 LEAST = 2e-6  # of a value: what iterations, and rows between steps, leave
-ROUNDING = 1e-13  # of the greatest value in that unit
+ROUNDING = 1e-12  # of the greatest value in that unit
 SIDES = ("least", "greatest")
 
 
