@@ -15,6 +15,7 @@ COMMANDS = (  # files that add commands to the application: those of one command
     "chart",
     "energy",
     "failure_map",
+    "handed",
     "linearise",
     "order",
     "response",

@@ -72,10 +72,10 @@ def quantity(probe: str) -> str:
     return probe.partition("@")[0].rpartition(".")[2]
 
 
-def thinned(t, values):
+def thinned(t, values, points=POINTS):
     """Long series as least and greatest per bin of rows, so that no peak is lost and pictures stay small."""
-    bins = POINTS // 2
-    if len(t) <= POINTS:
+    bins = points // 2
+    if len(t) <= points:
         return t, values
     edges = np.linspace(0, len(t), bins + 1).astype(int)
     low = np.array([a + np.argmin(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])

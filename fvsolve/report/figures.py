@@ -1,0 +1,143 @@
+"""Figures of the page as plotly.js takes them: traces and layout as plain data. Knows arrays and colours; draws nothing.
+
+plotly.js reads a little markup in names and titles, so every word of a case goes through `as_it_stands`.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
+from fvsolve.errors import visible
+from fvsolve.report.histories import Panel
+from fvsolve.report.motion import Motion
+from fvsolve.report.section import Section
+
+HIGH, LOW, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
+APART = 0.035  # of the length: names of devices nearer to each other than this would cover each other
+FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
+
+
+def section_figure(one: Section, moving: Motion | None, unit: str, along: str) -> dict[str, Any]:
+    """A long section: heads, pipe, vapour and class line, spans where liquid parted, devices; the line that moves."""
+    k = one.picked
+    x, lines = one.chainage[k], {name: values[k] for name, values in one.along.items()}
+    data = [
+        _line("greatest head", x, lines["greatest_head"], HIGH, width=2),
+        _line("least head", x, lines["least_head"], LOW, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
+        _line("initial head", x, lines["initial_head"], INK, width=1.2, dash="dash"),
+        _line("pipe", x, lines["elevation"], MUTED, width=3.5),
+    ]
+    if one.vapour is not None:
+        data.append(_line("vapour line", x, one.vapour[k], VAPOUR, width=1.4, dash="dot"))
+    if one.allowed is not None:
+        data.append(_line("class line", x, one.allowed[k], CLASS, width=1.6, dash="dashdot"))
+    if one.parted:
+        data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
+                     "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
+    shapes = [_span(a, b, VAPOUR, 0.18) for a, b in one.parted]
+    if moving is not None:
+        data.append(_line("head now", moving.chainage, moving.heads[0], NOW, width=2.6))
+    shapes += [_post(device.chainage) for device in one.devices]
+    layout = _layout(f"head [{unit}]", f"chainage [{along}]", 460)
+    layout |= {"shapes": shapes, "annotations": _names(one), "margin": {"l": 62, "r": 14, "t": 84, "b": 50}}
+    layout["xaxis"]["range"] = [0.0, one.way.places[-1][1]]
+    made: dict[str, Any] = {"data": data, "layout": layout}
+    if moving is not None:
+        made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
+                          "heads": [[float(f"{v:.6g}") for v in row] for row in moving.heads.tolist()]}  # fmt: skip
+    return made
+
+
+def history_figure(panel: Panel, time_unit: str, doubt: float | None) -> dict[str, Any]:
+    """Series of one quantity; from `doubt` on the ground is shaded."""
+    data, names = [], [line.name for line in panel.lines if not line.measured]
+    for line in panel.lines:
+        place = names.index(line.name)
+        colour = COLOURS[place % len(COLOURS)]
+        trace = _line(line.name, line.t, line.values, colour, dash=DASHES[place // len(COLOURS) % len(DASHES)])
+        if line.measured:
+            trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
+        data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
+    layout = _layout(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", 300)
+    ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
+    if ends:
+        layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]
+    if doubt is not None and ends:
+        layout["shapes"] = [_span(doubt, layout["xaxis"]["range"][1], DOUBT, 0.08)]
+    layout |= {"yaxis": layout["yaxis"] | _still(panel)}
+    return {"data": data, "layout": layout}
+
+
+def as_it_stands(text: str) -> str:
+    """Words of a case for plotly.js, none of them markup."""
+    return html.escape(visible(str(text)), quote=False)
+
+
+def exact(values: Sequence[float] | np.ndarray) -> dict[str, str]:
+    """Numbers to the last bit, as plotly.js reads arrays."""
+    return {"dtype": "f8", "bdata": base64.b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode()}
+
+
+def _line(name: str, x, y, colour: str, width: float = 1.5, dash: str = "solid", **more: Any) -> dict[str, Any]:
+    return {"type": "scatter", "mode": "lines", "name": as_it_stands(name), "x": exact(x), "y": exact(y),
+            "line": {"color": colour, "width": width, "dash": dash}, **more}  # fmt: skip
+
+
+def _layout(y: str, x: str, height: int) -> dict[str, Any]:
+    axis = {"showline": True, "linecolor": MUTED, "gridcolor": HAIR, "zeroline": False, "ticks": "outside",
+            "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power"}  # fmt: skip
+    return {
+        "height": height, "margin": {"l": 62, "r": 14, "t": 12, "b": 50}, "paper_bgcolor": "#fff", "plot_bgcolor": "#fff",
+        "font": {"family": FONT, "size": 12, "color": INK}, "hovermode": "x unified",
+        "hoverlabel": {"namelength": -1, "font": {"size": 11}}, "dragmode": "zoom", "showlegend": True,
+        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yref": "paper", "yanchor": "top", "font": {"size": 11.5}},
+        "xaxis": axis | {"title": {"text": as_it_stands(x), "standoff": 8}},
+        "yaxis": axis | {"title": {"text": as_it_stands(y), "standoff": 8}},
+    }  # fmt: skip
+
+
+def _span(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
+    return {"type": "rect", "xref": "x", "yref": "paper", "x0": a, "x1": b, "y0": 0, "y1": 1, "fillcolor": colour,
+            "opacity": opacity, "line": {"width": 0}, "layer": "below"}  # fmt: skip
+
+
+def _post(x: float) -> dict[str, Any]:
+    return {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1.015,
+            "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
+
+
+def _names(one: Section) -> list[dict[str, Any]]:
+    """Names over their chainages: devices and ends before joints, and none over another."""
+    length = one.way.places[-1][1]
+    order = sorted(one.devices, key=lambda device: (not device.parts, device.chainage not in (0.0, length)))
+    shown: list[Any] = []
+    for device in order:
+        if all(abs(device.chainage - other.chainage) >= APART * length for other in shown):
+            shown.append(device)
+    return [{"x": device.chainage, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
+             "xanchor": "right" if device.chainage > 0.9 * length else "left", "yanchor": "bottom",
+             "text": as_it_stands(_label(device)), "hovertext": as_it_stands(", ".join(device.parts) or device.place),
+             "font": {"size": 11, "color": INK if device.parts else MUTED}} for device in shown]  # fmt: skip
+
+
+def _label(device) -> str:
+    names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
+    text = ", ".join(names)
+    return text if len(text) <= 18 else f"{text[:17]}\u2026"
+
+
+def _still(panel: Panel) -> dict[str, Any]:
+    """A range for series at rest, whose round-off would else be magnified."""
+    values = np.concatenate([line.values for line in panel.lines if line.seen] or [np.zeros(0)])
+    values = values[np.isfinite(values)]
+    if not values.size or np.ptp(values) >= 1e-9 * np.abs(values).max():
+        return {}
+    middle, half = float(values.mean()), float(np.abs(values).max()) * 1e-3 or 1.0
+    return {"range": [middle - half, middle + half]}

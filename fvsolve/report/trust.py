@@ -1,0 +1,86 @@
+"""What a reader must know before any number: why a run stopped, what is not to be trusted, whether limits hold."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fvsolve.output.column import column
+from fvsolve.report.tables import Table
+
+
+class Word(NamedTuple):
+    """A sentence at the top of the page; `level` is "bad", "doubt" or "good"."""
+
+    level: str
+    head: str
+    text: str
+
+
+def words(result) -> list[Word]:
+    """The sentences at the top: a stop first, then what is wrong, what is in doubt, and the verdict."""
+    said = result.summary
+    found = []
+    if result.reason != "finished":
+        reached = f"It reached t = {said['t']:.6g} s of {result.case.numerics.end:.6g} s"
+        found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; what would have come after is "
+                                                            "not known."))  # fmt: skip
+    found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
+    found += [Word("doubt", f"Results from {one.time:.6g} s on are not to be trusted.", one.text)
+              for one in sorted(result.marks, key=lambda one: one.time)]  # fmt: skip
+    failed = [one for one in result.expectations if not one.ok]
+    found += [Word("bad", "A claim of the case fails.", claim(one)) for one in failed]
+    return [*found, verdict(result)]
+
+
+def sound(result) -> bool:
+    """Whether the run came to its end and nothing casts doubt on its numbers."""
+    return result.reason == "finished" and result.ok and not result.marks
+
+
+def verdict(result) -> Word:
+    """Whether the limits of the case hold."""
+    verdicts = result.summary.get("verdicts", [])
+    if not verdicts:
+        return Word("none", "No limits were stated.", "The case says nothing of what its parts may bear, so this report "
+                    "shows what happens and not whether it is allowed.")  # fmt: skip
+    failed = [one for one in verdicts if not one["ok"]]
+    many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
+    if failed:
+        return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.",
+                    "; ".join(one["name"] for one in failed))  # fmt: skip
+    if not sound(result):
+        return Word("doubt", "All limits hold as far as the run can be trusted.", "")
+    return Word("good", f"All {len(verdicts)} limits hold." if len(verdicts) > 1 else "The limit holds.", "")
+
+
+def verdicts(result) -> Table | None:
+    """The table of verdicts, those that fail first and the closest before others; None where no limits were stated."""
+    found = result.summary.get("verdicts", [])
+    if not found:
+        return None
+    found = sorted(found, key=lambda one: (one["ok"], one["margin"] if one["margin"] is not None else 0.0))
+    length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
+    rows = [[one["name"], "holds" if one["ok"] else "FAILS", one["value"], one["limit"], one["margin"], one["unit"],
+             one["place"], _in(length, one["chainage"]), _in(height, one["elevation"]), _in(time, one["time"])]
+            for one in found]  # fmt: skip
+    return Table("Limits", ("limit", "verdict", "value", "allowed", "margin", "unit", "worst at", "chainage",
+                            "elevation", "time"), rows, ("",) * 7 + (length.unit, height.unit, time.unit),
+                 frozenset(k for k, one in enumerate(found) if not one["ok"]), frozenset({2, 3, 4}))  # fmt: skip
+
+
+def claims(result) -> Table | None:
+    """What the case claims of its own results."""
+    rows = [[one.text, one.claimed, one.found, one.tolerance, one.unit, "holds" if one.ok else "FAILS"]
+            for one in result.expectations]  # fmt: skip
+    bad = frozenset(k for k, one in enumerate(result.expectations) if not one.ok)
+    heads = ("claim", "claimed", "found", "tolerance", "unit", "verdict")
+    return Table("What the case claims", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
+
+
+def claim(one) -> str:
+    """A claim in words."""
+    return f"{one.text}: claimed {one.claimed:.6g}, found {one.found:.6g} {one.unit}"
+
+
+def _in(shown, value):
+    return None if value is None else float(shown.from_si(value))
