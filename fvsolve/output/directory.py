@@ -22,6 +22,7 @@ from fvsolve.output.summary import read_summary
 OWN = ("restart.npz", "history.csv", "envelope.csv", "fields.pvd", "case.toml")
 ENDED = "summary.json"
 PICTURES = ("history.png", "envelope.png")
+REPORTS = ("report.html", "report.xlsx")  # of `fvsolve report`: another run's must not stand beside this one's numbers
 
 
 class RunDirectory:
@@ -65,7 +66,7 @@ class RunDirectory:
 
     def begin(self, model, state) -> None:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
-        for name in (ENDED, *PICTURES):
+        for name in (ENDED, *PICTURES, *REPORTS):
             (self.folder / name).unlink(missing_ok=True)
         if self.restart is None:
             self._start()
@@ -187,7 +188,7 @@ def read_directory(folder: Path) -> tuple:
 
 def clear(folder: Path) -> None:
     """Delete what an earlier run left in `folder`, and nothing else."""
-    for name in (ENDED, *OWN, *PICTURES):
+    for name in (ENDED, *OWN, *PICTURES, *REPORTS):
         (folder / name).unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.*vtu"):
         path.unlink()
@@ -196,7 +197,7 @@ def clear(folder: Path) -> None:
 
 def _refuse_names(case) -> None:
     for name, path in case.copies.items():
-        if name in (ENDED, *OWN, *PICTURES):
+        if name in (ENDED, *OWN, *PICTURES, *REPORTS):
             raise RunError(f"{path} has the name of a file that every run writes; give it another name")
 
 

@@ -13,6 +13,7 @@ from fvsolve.parts.value import Quantity
 from fvsolve.report.tables import Table, worded
 from fvsolve.units import DIMENSIONS, UNITS
 
+ELSEWHERE = "in case.toml and in the workbook (--xlsx)"
 LONG = 120  # letters of a value
 FLUID = (
     ("density", "density", "density"), ("bulk_modulus", "bulk modulus", "modulus"),
@@ -28,13 +29,13 @@ def fluid(result) -> Table:
     rows = []
     for key, words, dimension in FLUID:
         shown = _pressed(column(key, dimension, case), case)
-        rows.append([words, None if said[key] is None else worded(float(shown.from_si(said[key]))), shown.unit])
+        rows.append([words, "unknown" if said[key] is None else worded(float(shown.from_si(said[key]))), shown.unit])
     ambient = column("", "pressure", case)
     rows.append(["ambient pressure", worded(float(ambient.from_si(case.ambient_pressure))), ambient.unit])
     gravity = column("", "acceleration", case)
     rows.append(["gravity", worded(float(gravity.from_si(case.gravity))), gravity.unit])
     rows += [["density law", case.fluid.law, ""], ["source", said["source"], ""]]
-    return Table(f"Fluid: {said['name']}", ("property", "value", "unit"), rows)
+    return Table(f"Fluid: {said['name']}", ("", "", ""), rows)
 
 
 def pipes(result) -> Table | None:
@@ -45,15 +46,22 @@ def pipes(result) -> Table | None:
         return None
     cells = default_cells(found, case.properties, case.numerics.cell_time)
     length, height, speed = (column("", one, case) for one in ("length", "head", "velocity"))
-    rows = [[name, link.ports["from"], link.ports["to"], float(length.from_si(link.length)),
-             float(length.from_si(link.diameter)), float(speed.from_si(case.wave_speed(name))),
-             float(height.from_si(case.elevation(link.ports["from"]))),
-             float(height.from_si(case.elevation(link.ports["to"]))),
-             _said(type(link).values()["friction"], plain(link.friction), case), cells[name]]
-            for name, link in found.items()]  # fmt: skip
-    heads = ("pipe", "from", "to", "length", "diameter", "wave speed", "elevation at from", "at to", "friction", "cells")
-    units = ("", "", "", length.unit, length.unit, speed.unit, height.unit, height.unit)
-    return Table("Pipes", heads, rows, units, more="in case.toml, and in the workbook (--xlsx)")
+    stated = case.elevations_stated
+    rows = []
+    for name, link in found.items():
+        ends = [link.ports["from"], link.ports["to"]]
+        sizes = [float(length.from_si(link.length)), float(length.from_si(link.diameter))]
+        heights = [float(height.from_si(case.elevation(end))) for end in ends] if stated else []
+        rows.append([name, *ends, *sizes, float(speed.from_si(case.wave_speed(name))), *heights, _friction(link, case),
+                     cells[name]])  # fmt: skip
+    heads = ("elevation at from", "at to") if stated else ()
+    heads = ("pipe", "from", "to", "length", "diameter", "wave speed", *heads, "friction", "cells")
+    units = ("", "", "", length.unit, length.unit, speed.unit, *[height.unit] * (2 * stated))
+    return Table("Pipes", heads, rows, units, more=ELSEWHERE)
+
+
+def _friction(link, case) -> str:
+    return _said(type(link).values()["friction"], plain(link.friction), case).removeprefix("(model ").removesuffix(")")
 
 
 def parts(result) -> Table:
@@ -61,20 +69,22 @@ def parts(result) -> Table:
     case, rows = result.case, []
     height = column("", "head", case)
     for name, part in [*case.nodes.items(), *case.links.items()]:
-        if part.kind == "pipe" or (part.kind == "junction" and "demand" not in part.table()):
-            continue
+        if part.kind == "pipe" or (part.kind == "junction" and part.table().get("demand") == 0.0):
+            continue  # pipes stand in a table of their own, and a joint is but where they meet
         joins = ", ".join(map(str, getattr(part, "ports", {}).values()))
         stands = getattr(part, "elevation", None)
-        rows.append([name, part.kind, joins, None if stands is None else float(height.from_si(stands)), keys(part, case)])
+        rows.append(
+            [name, part.kind, joins, None if stands is None else float(height.from_si(stands)), keys(part, case)]
+        )
     heads, units = ("part", "kind", "joins", "elevation", "as understood"), ("", "", "", height.unit, "")
-    return Table("Other parts", heads, rows, units, more="in case.toml, and in the workbook (--xlsx)")
+    return Table("Other parts", heads, rows, units, more=ELSEWHERE)
 
 
 def keys(part: Keys, case) -> str:
     """The keys of a part with their values in the units of [output]."""
     values, found = type(part).values(), []
     for key, value in part.table().items():
-        if key not in SILENT and value not in ({}, [], False):
+        if key not in SILENT and value is not False and value not in ({}, []):
             found.append(f"{key.replace('_', ' ')} {_said(values.get(key), value, case)}")
     return " \u00b7 ".join(found)
 
@@ -83,7 +93,9 @@ def _said(value: Any, given: Any, case) -> str:
     """What stands under a key, in words; `value` is what the key may be."""
     dimension = getattr(value, "dimension", None)
     if isinstance(given, dict):
-        text = ", ".join(f"{key.replace('_', ' ')} {_said(_below(value, key), one, case)}" for key, one in given.items())
+        text = ", ".join(
+            f"{key.replace('_', ' ')} {_said(_below(value, key), one, case)}" for key, one in given.items()
+        )
         text = f"({text})"
     elif isinstance(given, bool) or isinstance(given, str):
         text = inline(given).strip('"')

@@ -1,4 +1,4 @@
-"""Figures of the page as plotly.js takes them: traces and layout as plain data. Knows arrays and colours; draws nothing.
+"""Figures of the page as plotly.js takes them, traces and layout as plain data. Knows arrays and colours.
 
 plotly.js reads a little markup in names and titles, so every word of a case goes through `as_it_stands`.
 """
@@ -21,13 +21,14 @@ from fvsolve.report.section import Section
 HIGH, LOW, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
 APART = 0.035  # of the length: names of devices nearer to each other than this would cover each other
+LONGEST = 22  # letters over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
 
 def section_figure(one: Section, moving: Motion | None, unit: str, along: str) -> dict[str, Any]:
     """A long section: heads, pipe, vapour and class line, spans where liquid parted, devices; the line that moves."""
     k = one.picked
-    x, lines = one.chainage[k], {name: values[k] for name, values in one.along.items()}
+    x, lines = numbers(one.chainage[k], "f4"), {name: numbers(values[k], "f4") for name, values in one.along.items()}
     data = [
         _line("greatest head", x, lines["greatest_head"], HIGH, width=2),
         _line("least head", x, lines["least_head"], LOW, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
@@ -35,18 +36,20 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str) -
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
     if one.vapour is not None:
-        data.append(_line("vapour line", x, one.vapour[k], VAPOUR, width=1.4, dash="dot"))
+        data.append(_line("vapour line", x, numbers(one.vapour[k], "f4"), VAPOUR, width=1.4, dash="dot"))
     if one.allowed is not None:
-        data.append(_line("class line", x, one.allowed[k], CLASS, width=1.6, dash="dashdot"))
+        data.append(_line("class line", x, numbers(one.allowed[k], "f4"), CLASS, width=1.6, dash="dashdot"))
     if one.parted:
         data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
                      "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
     shapes = [_span(a, b, VAPOUR, 0.18) for a, b in one.parted]
     if moving is not None:
-        data.append(_line("head now", moving.chainage, moving.heads[0], NOW, width=2.6))
+        data.append(_line("head now", numbers(moving.chainage, "f4"), numbers(moving.heads[0], "f4"), NOW, width=2.6))
     shapes += [_post(device.chainage) for device in one.devices]
     layout = _layout(f"head [{unit}]", f"chainage [{along}]", 460)
-    layout |= {"shapes": shapes, "annotations": _names(one), "margin": {"l": 62, "r": 14, "t": 84, "b": 50}}
+    names = _names(one)
+    above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    layout |= {"shapes": shapes, "annotations": names, "margin": {"l": 62, "r": 14, "t": above, "b": 50}}
     layout["xaxis"]["range"] = [0.0, one.way.places[-1][1]]
     made: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
@@ -61,7 +64,9 @@ def history_figure(panel: Panel, time_unit: str, doubt: float | None) -> dict[st
     for line in panel.lines:
         place = names.index(line.name)
         colour = COLOURS[place % len(COLOURS)]
-        trace = _line(line.name, line.t, line.values, colour, dash=DASHES[place // len(COLOURS) % len(DASHES)])
+        trace = _line(
+            line.name, numbers(line.t), numbers(line.values), colour, dash=DASHES[place // len(COLOURS) % len(DASHES)]
+        )
         if line.measured:
             trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
@@ -80,24 +85,28 @@ def as_it_stands(text: str) -> str:
     return html.escape(visible(str(text)), quote=False)
 
 
-def exact(values: Sequence[float] | np.ndarray) -> dict[str, str]:
-    """Numbers to the last bit, as plotly.js reads arrays."""
-    return {"dtype": "f8", "bdata": base64.b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode()}
+def numbers(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:
+    """Numbers as plotly.js reads arrays: f8 to the last bit, f4 to seven digits."""
+    packed = np.ascontiguousarray(values, f"<{kind}").tobytes()
+    return {"dtype": kind, "bdata": base64.b64encode(packed).decode()}
 
 
 def _line(name: str, x, y, colour: str, width: float = 1.5, dash: str = "solid", **more: Any) -> dict[str, Any]:
-    return {"type": "scatter", "mode": "lines", "name": as_it_stands(name), "x": exact(x), "y": exact(y),
+    return {"type": "scatter", "mode": "lines", "name": as_it_stands(name), "x": x, "y": y,
             "line": {"color": colour, "width": width, "dash": dash}, **more}  # fmt: skip
 
 
 def _layout(y: str, x: str, height: int) -> dict[str, Any]:
     axis = {"showline": True, "linecolor": MUTED, "gridcolor": HAIR, "zeroline": False, "ticks": "outside",
-            "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power"}  # fmt: skip
+            "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
+            "separatethousands": True}  # fmt: skip
     return {
-        "height": height, "margin": {"l": 62, "r": 14, "t": 12, "b": 50}, "paper_bgcolor": "#fff", "plot_bgcolor": "#fff",
-        "font": {"family": FONT, "size": 12, "color": INK}, "hovermode": "x unified",
+        "height": height, "margin": {"l": 62, "r": 14, "t": 12, "b": 50},
+        "paper_bgcolor": "#fff", "plot_bgcolor": "#fff",
+        "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
         "hoverlabel": {"namelength": -1, "font": {"size": 11}}, "dragmode": "zoom", "showlegend": True,
-        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yref": "paper", "yanchor": "top", "font": {"size": 11.5}},
+        "legend": {"orientation": "h", "traceorder": "normal",
+                   "x": 0, "y": -0.2, "yref": "paper", "yanchor": "top", "font": {"size": 11.5}},
         "xaxis": axis | {"title": {"text": as_it_stands(x), "standoff": 8}},
         "yaxis": axis | {"title": {"text": as_it_stands(y), "standoff": 8}},
     }  # fmt: skip
@@ -114,23 +123,25 @@ def _post(x: float) -> dict[str, Any]:
 
 
 def _names(one: Section) -> list[dict[str, Any]]:
-    """Names over their chainages: devices and ends before joints, and none over another."""
+    """Names over their chainages: devices and ends before joints, none over another; devices nearby share one."""
     length = one.way.places[-1][1]
     order = sorted(one.devices, key=lambda device: (not device.parts, device.chainage not in (0.0, length)))
-    shown: list[Any] = []
+    shown: list[tuple[float, list[str], bool]] = []
     for device in order:
-        if all(abs(device.chainage - other.chainage) >= APART * length for other in shown):
-            shown.append(device)
-    return [{"x": device.chainage, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
-             "xanchor": "right" if device.chainage > 0.9 * length else "left", "yanchor": "bottom",
-             "text": as_it_stands(_label(device)), "hovertext": as_it_stands(", ".join(device.parts) or device.place),
-             "font": {"size": 11, "color": INK if device.parts else MUTED}} for device in shown]  # fmt: skip
+        names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
+        near = [one for one in shown if abs(device.chainage - one[0]) < APART * length]
+        if not near:
+            shown.append((device.chainage, names, bool(device.parts)))
+        elif device.parts:
+            near[0][1].extend(names)
+    return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
+             "xanchor": "right" if x > 0.9 * length else "left", "yanchor": "bottom",
+             "text": as_it_stands(_cut(", ".join(names))), "hovertext": as_it_stands(", ".join(names)),
+             "font": {"size": 11, "color": INK if stands else MUTED}} for x, names, stands in shown]  # fmt: skip
 
 
-def _label(device) -> str:
-    names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
-    text = ", ".join(names)
-    return text if len(text) <= 18 else f"{text[:17]}\u2026"
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}\u2026"
 
 
 def _still(panel: Panel) -> dict[str, Any]:

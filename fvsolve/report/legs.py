@@ -47,7 +47,9 @@ def _way(chain: list[tuple[str, bool, float]], result) -> Way:
     first, last = chain[0], chain[-1]
     begins = _start_head(result, first[0], last=first[1])
     ends = _start_head(result, last[0], last=not last[1])
-    if ends > begins + 1e-9 * abs(begins) or (ends >= begins and sum(turned for _, turned, _ in chain) * 2 > len(chain)):
+    if ends > begins + 1e-9 * abs(begins) or (
+        ends >= begins and sum(turned for _, turned, _ in chain) * 2 > len(chain)
+    ):
         chain = [(pipe, not turned, length) for pipe, turned, length in reversed(chain)]
     at, legs, places = 0.0, [], []
     for pipe, turned, length in chain:

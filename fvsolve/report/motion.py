@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.errors import RunError
-from fvsolve.output.fields import read_series
+from fvsolve.output.fields import read_pipes, read_series
 from fvsolve.report.legs import Way
 from fvsolve.report.section import in_units
 
 POINTS = 240  # of a moving line at most
-NUMBERS = 60_000  # of all moving lines of a report at most: frames give way
+NUMBERS = 45_000  # of all moving lines of a report at most: frames give way
 
 
 class Motion(NamedTuple):
@@ -66,12 +66,7 @@ def _spots(result, way: Way) -> tuple[np.ndarray, np.ndarray]:
 
 def _heads(path: Path, cells: int) -> np.ndarray:
     """Heads of all cells of pipes in a frame [m]."""
-    import meshio
-
-    try:
-        heads = meshio.read(path).cell_data_dict["head"]["line"]
-    except Exception as error:  # whatever meshio and its parsers make of a damaged file
-        raise RunError(f"{path} cannot be read: {error or type(error).__name__}; run again with --force") from None
+    heads = read_pipes(path, "head")
     if len(heads) != cells:
         raise RunError(f"{path} has {len(heads)} cells of pipes, envelope.csv {cells}; run again with --force")
     return heads

@@ -13,7 +13,9 @@ def settings(result) -> Table:
     """Scheme, method, step and what the run took."""
     said, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
-    given = [f"{words} {worded(getattr(numerics, key))}" for key, words in steps.items() if getattr(numerics, key, None)]
+    given = [
+        f"{words} {worded(getattr(numerics, key))}" for key, words in steps.items() if getattr(numerics, key, None)
+    ]
     time = column("", "time", result.case)
     span = [worded(float(time.from_si(one))) for one in (numerics.start, said["t"])]
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
@@ -22,7 +24,7 @@ def settings(result) -> Table:
     rows += [["method", "; ".join(_method(one) for one in said["methods"])], ["step", "; ".join(given) or "by default"],
              ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
              ["seconds of stepping", said["seconds"]]]  # fmt: skip
-    return Table("Method", ("", "setting"), [[key, worded(value)] for key, value in rows])
+    return Table("Method", ("", ""), [[key, worded(value)] for key, value in rows])
 
 
 def ledgers(result) -> Table | None:
@@ -43,7 +45,7 @@ def versions(result) -> Table:
     words = {"case": "hash of the case", "sources": "hash of compiled sources", "fluid": "fluid properties",
              "target": "machine"}  # fmt: skip
     rows += [[words.get(key, key), one] for key, one in result.summary["versions"].items()]
-    return Table("Versions", ("", "version"), rows)
+    return Table("", ("", ""), rows)
 
 
 def events(result) -> Table | None:

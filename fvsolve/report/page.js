@@ -5,6 +5,19 @@
   const histories = Object.keys(figures).filter((id) => id.startsWith("history-"));
   const chart = (id) => document.getElementById(id);
 
+  // Where fingers scroll, a chart is zoomed by its buttons; on a narrow page names that would cover each other give way.
+  const touched = matchMedia("(pointer: coarse)").matches;
+  if (touched) config.displayModeBar = true;
+  for (const [id, one] of Object.entries(figures)) {
+    if (touched) one.layout.dragmode = false;
+    if (!one.layout.annotations) continue;
+    const apart = 24 / (chart(id).clientWidth - 76) * one.layout.xaxis.range[1];
+    const kept = [];
+    for (const name of one.layout.annotations)
+      if (kept.every((other) => Math.abs(other.x - name.x) >= apart)) kept.push(name);
+    one.layout.annotations = kept;
+  }
+
   const drawn = Object.entries(figures).map(([id, one]) => Plotly.newPlot(chart(id), one.data, one.layout, config));
 
   // One time axis for all histories: what is zoomed in one is zoomed in all.
@@ -50,8 +63,9 @@
     show(0);
   }
 
-  // Paper has its own width; the moving line stays on the screen.
-  const PAPER = 680;
+  // Paper has its own sizes; the moving line stays on the screen.
+  const PAPER = 680, TALL = { section: 350, history: 230 };
+  const heights = Object.fromEntries(Object.entries(figures).map(([id, one]) => [id, one.layout.height]));
   const all = () => Object.keys(figures).map(chart);
   const moving = (id, seen) => {
     if (figures[id].moving) Plotly.restyle(chart(id), { visible: seen }, [figures[id].moving.trace]);
@@ -59,13 +73,13 @@
   addEventListener("beforeprint", () => {
     for (const id of Object.keys(figures)) {
       moving(id, false);
-      Plotly.relayout(chart(id), { width: PAPER, autosize: false });
+      Plotly.relayout(chart(id), { width: PAPER, height: TALL[id.split("-")[0]], autosize: false });
     }
   });
   addEventListener("afterprint", () => {
     for (const id of Object.keys(figures)) {
       moving(id, true);
-      Plotly.relayout(chart(id), { width: null, autosize: true });
+      Plotly.relayout(chart(id), { width: null, height: heights[id], autosize: true });
     }
   });
   Promise.all(drawn).then(() => { document.documentElement.dataset.drawn = all().length; });

@@ -15,7 +15,7 @@ from fvsolve.report.legs import Way
 from fvsolve.report.libraries import charts, template
 from fvsolve.report.motion import motions
 from fvsolve.report.section import Section, in_units, section
-from fvsolve.report.tables import Table
+from fvsolve.report.tables import Table, worded
 
 HERE = Path(__file__).parent
 
@@ -61,9 +61,10 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
     for k, one in enumerate(sections):
         line = moving[k] if moving else None
         figures[f"section-{k}"] = section_figure(one, line, height, along)
-        told.append({"id": f"section-{k}", "name": visible(one.way.name), "length": one.way.places[-1][1], "unit": along,
+        told.append({"id": f"section-{k}", "name": visible(one.way.name),
+                     "length": f"{worded(one.way.places[-1][1])} {along}",
                      "frames": 0 if line is None else len(line.times), "pipes": len(one.way.legs),
-                     "parted": bool(one.parted), "cells": len(one.chainage)})  # fmt: skip
+                     "parted": bool(one.parted)})  # fmt: skip
     return told
 
 

@@ -13,7 +13,7 @@ from fvsolve.report.legs import Way
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
-BINS = 400  # of a long line: of each the greatest and the least head stand, and where
+BINS = 250  # of a long line: of each the greatest and the least head stand, and where
 
 
 class Device(NamedTuple):

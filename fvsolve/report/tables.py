@@ -10,7 +10,8 @@ from typing import Any
 from fvsolve.errors import visible
 
 DIGITS = 5  # of the greatest number of a column
-DECIMALS = 6  # behind a point at most
+DECIMALS = 6  # behind a point, unless its least number needs more
+MOST = 7  # digits behind the first of a column whose numbers all have the same decimals
 ROWS = 60  # of a table on the page, unless it says how many (`most`)
 NARROW, FIGURE, POINT = "\u202f", "\u2007", "\u2008"  # spaces between thousands, as wide as a digit, as a point
 
@@ -36,6 +37,11 @@ class Table:
     def heads(self) -> list[tuple[str, str]]:
         """Header and unit of every column."""
         return list(zip(self.headers, [*self.units, *[""] * (len(self.headers) - len(self.units))], strict=True))
+
+    @property
+    def named(self) -> bool:
+        """Whether any column has a header."""
+        return any(self.headers)
 
     @property
     def numeric(self) -> list[bool]:
@@ -86,7 +92,9 @@ def decimals(numbers: Sequence[float]) -> int | None:
         return 0
     top = math.floor(math.log10(max(sizes)))
     places = min(max(DIGITS - 1 - top, 0), DECIMALS)
-    if top > 9 or min(sizes) < 10.0 ** (1 - places) and not all(float(one).is_integer() for one in sizes):
+    least = 0 if all(float(one).is_integer() for one in sizes) else 1 - math.floor(math.log10(min(sizes)))
+    places = max(places, least)
+    if top > 9 or top + places > MOST:
         return None
     texts = [f"{one:.{places}f}" for one in sizes]
     while places and all(text.endswith("0") for text in texts):

@@ -7,6 +7,8 @@ from typing import NamedTuple
 from fvsolve.output.column import column
 from fvsolve.report.tables import Table
 
+LATER = 6  # marks named behind the first
+
 
 class Word(NamedTuple):
     """A sentence at the top of the page; `level` is "bad", "doubt" or "good"."""
@@ -22,14 +24,25 @@ def words(result) -> list[Word]:
     found = []
     if result.reason != "finished":
         reached = f"It reached t = {said['t']:.6g} s of {result.case.numerics.end:.6g} s"
-        found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; what would have come after is "
-                                                            "not known."))  # fmt: skip
+        found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; the rest is not known."))
     found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
-    found += [Word("doubt", f"Results from {one.time:.6g} s on are not to be trusted.", one.text)
-              for one in sorted(result.marks, key=lambda one: one.time)]  # fmt: skip
+    found += [*_doubt(result), verdict(result)]
     failed = [one for one in result.expectations if not one.ok]
-    found += [Word("bad", "A claim of the case fails.", claim(one)) for one in failed]
-    return [*found, verdict(result)]
+    if failed:
+        more = f"; and {len(failed) - 1} more, under Numerics" if len(failed) > 1 else ""
+        found.append(Word("bad", "The case claims what this run does not show.", claim(failed[0]) + more))
+    return found
+
+
+def _doubt(result) -> list[Word]:
+    """From when on results are not to be trusted: the first mark, and where others follow."""
+    marks = sorted(result.marks, key=lambda one: one.time)
+    if not marks:
+        return []
+    later = ", ".join(f"{one.place} at {one.time:.6g} s" for one in marks[1 : 1 + LATER])
+    more = f", and {len(marks) - 1 - LATER} more places" if len(marks) > 1 + LATER else ""
+    text = marks[0].text + (f". Later also {later}{more}" if later else "")
+    return [Word("doubt", f"Results from {marks[0].time:.6g} s on are not to be trusted.", text)]
 
 
 def sound(result) -> bool:
@@ -41,8 +54,8 @@ def verdict(result) -> Word:
     """Whether the limits of the case hold."""
     verdicts = result.summary.get("verdicts", [])
     if not verdicts:
-        return Word("none", "No limits were stated.", "The case says nothing of what its parts may bear, so this report "
-                    "shows what happens and not whether it is allowed.")  # fmt: skip
+        return Word("none", "No limits were stated.", "The case does not say what its parts may bear: this report says "
+                    "what happens, not whether it is allowed.")  # fmt: skip
     failed = [one for one in verdicts if not one["ok"]]
     many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
     if failed:

@@ -22,7 +22,9 @@ def of_all(result, ways: list[Way]) -> Table | None:
     envelope = result.envelope
     if not envelope:
         return None
-    legs = {leg.pipe: leg for leg in ways[0].legs} if len(ways) == 1 else {}
+    legs = {leg.pipe: leg for way in ways for leg in way.legs}
+    if len(ways) > 1 or all(leg.begins == 0.0 and not leg.backwards for leg in legs.values()):
+        legs = {}  # the chainage says nothing more, or not of which section
     rows = []
     for name, words, most, when in EXTREMES:
         ends = {pipe: int(most(arrays[name])) for pipe, arrays in envelope.items()}
