@@ -67,17 +67,16 @@ def _friction(link, case) -> str:
 def parts(result) -> Table:
     """Every other part: its kind, what it joins, and its keys."""
     case, rows = result.case, []
-    height = column("", "head", case)
+    height, stated = column("", "head", case), case.elevations_stated
     for name, part in [*case.nodes.items(), *case.links.items()]:
         if part.kind == "pipe" or (part.kind == "junction" and part.table().get("demand") == 0.0):
             continue  # pipes stand in a table of their own, and a joint is but where they meet
         joins = ", ".join(map(str, getattr(part, "ports", {}).values()))
-        stands = getattr(part, "elevation", None)
-        rows.append(
-            [name, part.kind, joins, None if stands is None else float(height.from_si(stands)), keys(part, case)]
-        )
-    heads, units = ("part", "kind", "joins", "elevation", "as understood"), ("", "", "", height.unit, "")
-    return Table("Other parts", heads, rows, units, more=ELSEWHERE)
+        lies = getattr(part, "elevation", None)
+        lies = [None if lies is None else float(height.from_si(lies))] if stated else []
+        rows.append([name, part.kind, joins, *lies, keys(part, case)])
+    heads = ("part", "kind", "joins", *["elevation"] * stated, "as understood")
+    return Table("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=ELSEWHERE)
 
 
 def keys(part: Keys, case) -> str:

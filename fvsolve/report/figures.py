@@ -70,7 +70,12 @@ def history_figure(panel: Panel, time_unit: str, doubt: float | None) -> dict[st
         if line.measured:
             trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
-    layout = _layout(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", 300)
+    layout = _layout(
+        f"{panel.quantity.replace('_', ' ')} [{panel.unit}]",
+        f"time [{time_unit}]",
+        280 + 7 * max(len(panel.lines) - 4, 0),
+    )
+    layout["legend"] |= {"y": 1.01, "yanchor": "bottom"}
     ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
     if ends:
         layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]

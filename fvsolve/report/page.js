@@ -64,16 +64,15 @@
   }
 
   // Paper has its own sizes; the moving line stays on the screen.
-  const PAPER = 680, TALL = { section: 350, history: 230 };
+  const PAPER = 680, TALL = 0.77;
   const heights = Object.fromEntries(Object.entries(figures).map(([id, one]) => [id, one.layout.height]));
-  const all = () => Object.keys(figures).map(chart);
   const moving = (id, seen) => {
     if (figures[id].moving) Plotly.restyle(chart(id), { visible: seen }, [figures[id].moving.trace]);
   };
   addEventListener("beforeprint", () => {
     for (const id of Object.keys(figures)) {
       moving(id, false);
-      Plotly.relayout(chart(id), { width: PAPER, height: TALL[id.split("-")[0]], autosize: false });
+      Plotly.relayout(chart(id), { width: PAPER, height: TALL * heights[id], autosize: false });
     }
   });
   addEventListener("afterprint", () => {
@@ -82,5 +81,5 @@
       Plotly.relayout(chart(id), { width: null, height: heights[id], autosize: true });
     }
   });
-  Promise.all(drawn).then(() => { document.documentElement.dataset.drawn = all().length; });
+  Promise.all(drawn).then(() => { document.documentElement.dataset.drawn = drawn.length; });
 })();

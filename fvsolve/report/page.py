@@ -24,14 +24,15 @@ def page(result, ways: list[Way]) -> str:
     """The report of a run as HTML."""
     sections = [section(result, way) for way in ways]
     figures: dict[str, Any] = {}
+    probes = worst.of_probes(result)
     filled = {
         "title": visible(result.summary["title"] or result.summary["case"]), "run": result.summary,
         "description": visible(result.case.description), "source": visible(result.case.source),
         "ended": result.summary.get("ended", ""), "words": trust.words(result), "ink": INK,
-        "limits": trust.verdicts(result), "worst": worst.of_all(result, ways),
+        "limits": trust.verdicts(result), "worst": worst.of_all(result, ways) or probes,
         "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
-        "probes_left_out": len(result.probes) - len(chosen(result)), "places": _there([*worst.by_pipe(result),
-                                                                                      worst.of_probes(result)]),
+        "probes_left_out": len(result.probes) - len(chosen(result)),
+        "places": _there([*worst.by_pipe(result), probes if result.envelope else None]),
         "model": _there([described.fluid(result), described.pipes(result), described.parts(result)]),
         "numbers": _there([numerics.settings(result), numerics.ledgers(result), trust.claims(result),
                            numerics.comparisons(result)]),

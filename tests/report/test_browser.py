@@ -18,7 +18,7 @@ def report(tmp_path_factory):
     links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
              "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0))}  # fmt: skip
     case = scene(nodes, links, 3.0, {}, ["gate.head", "main.head@0.5", "valve.flow"], title=TITLE)
-    case["output"] |= {"fields": 20, "units": {"flow": "l/s"}}
+    case["output"] |= {"fields": 6, "units": {"flow": "l/s"}}
     fvsolve.run(case, out=folder, pictures=False)
     return write_report(folder)[0]
 
@@ -54,7 +54,7 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     }
     before = heads(page)
     page.click(".player button")
-    until(page, "Number(document.querySelector('.player input').value) >= 5")
+    until(page, "Number(document.querySelector('.player input').value) >= 2")
     assert heads(page) != before and "Pause" in page.inner_text(".player button")
     until(page, "document.querySelector('.player button').textContent == 'Play'")
     assert "t = 3 s" in page.inner_text(".player output")
