@@ -3,10 +3,12 @@
 import base64
 import json
 import re
+import shlex
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from truth.folders import DOCS
 from truth.scenes import junction, lake, pipe, ramp, scene, tank, valve
 
 import fvsolve
@@ -198,3 +200,16 @@ def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkey
     monkeypatch.setitem(__import__("sys").modules, "xlsxwriter", None)
     with pytest.raises(fvsolve.FvsolveError, match=r'needs xlsxwriter: pip install "fvsolve\[report\]"'):
         write_report(closure.directory, tmp_path / "report.html", xlsx=True)
+
+
+def test_the_commands_of_its_page_run(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (DOCS / "report.md").read_text(encoding="utf-8")
+    for line in re.search(r"```sh\n(.*?)```", text, re.S)[1].splitlines():
+        assert fvs(*shlex.split(line)[1:])[0] == 0
+    there = {path.name for path in (tmp_path / "runs/pump-trip-air-vessel").glob("report.*")}
+    assert there == {"report.html", "report.xlsx"}
+    again = fvs(
+        "run", "pump-trip-air-vessel", "--force", "--no-pictures", "--set", "numerics.end=1", "--set", "expect={}"
+    )
+    assert again[0] == 0 and not list((tmp_path / "runs").glob("*/report.*"))  # of the run before
