@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.envelope import QUANTITIES
+from fvsolve.report.section import in_units
 from fvsolve.run import open_run
 
-PAGE, BOOK = "report.html", "report.xlsx"
+PAGE = "report.html"
+ASKED = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "seconds", "events", "cavities")
 
 
 def write_report(directory: str | Path, out: str | Path | None = None, xlsx: bool = False) -> list[Path]:
@@ -44,7 +48,14 @@ def opened(directory: Path):
         resume = f"fvsolve run CASE --out {directory} --resume"
         raise RunError(f"{directory} holds an unfinished run: go on with it, {resume}, and report it then")
     result = open_run(directory)
-    for pipe, arrays in result.envelope.items():
+    if lacks := [key for key in ASKED if key not in result.summary]:
+        raise RunError(f"{directory / 'summary.json'} lacks {listing(lacks)}; run again with --force")
+    pipes = {name: link.length for name, link in result.case.links.items() if link.kind == "pipe"}
+    for pipe, length in pipes.items():
+        arrays = result.envelope.get(pipe, {})
         if lacks := [name for name in QUANTITIES if name not in arrays]:
             raise RunError(f"{directory / 'envelope.csv'} lacks {listing(lacks)} of {pipe}; run again with --force")
+        x = in_units(result, "distance").to_si(arrays["distance"])
+        if length - x[-1] > max([2.0 * x[0], *np.diff(x)]):  # its last cell is not there
+            raise RunError(f"{directory / 'envelope.csv'} ends within {pipe}; run again with --force")
     return result
