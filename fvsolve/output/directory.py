@@ -22,7 +22,8 @@ from fvsolve.output.summary import read_summary
 OWN = ("restart.npz", "history.csv", "envelope.csv", "fields.pvd", "case.toml")
 ENDED = "summary.json"
 PICTURES = ("history.png", "envelope.png")
-REPORTS = ("report.html", "report.xlsx")  # of `fvsolve report`: another run's must not stand beside this one's numbers
+# Of `fvsolve report` and `plot`: another run's must not stand beside this one's numbers.
+REPORTS = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
 
 
 class RunDirectory:
@@ -66,8 +67,9 @@ class RunDirectory:
 
     def begin(self, model, state) -> None:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
-        for name in (ENDED, *PICTURES, *REPORTS):
+        for name in (ENDED, *PICTURES):
             (self.folder / name).unlink(missing_ok=True)
+        _clear_reports(self.folder)
         if self.restart is None:
             self._start()
             self._write_case()
@@ -188,11 +190,16 @@ def read_directory(folder: Path) -> tuple:
 
 def clear(folder: Path) -> None:
     """Delete what an earlier run left in `folder`, and nothing else."""
-    for name in (ENDED, *OWN, *PICTURES, *REPORTS):
+    for name in (ENDED, *OWN, *PICTURES):
         (folder / name).unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.*vtu"):
         path.unlink()
     clear_lines(folder)
+
+
+def _clear_reports(folder: Path) -> None:
+    for path in [*(folder / name for name in REPORTS), *folder.glob("section-*.png")]:
+        path.unlink(missing_ok=True)
 
 
 def _refuse_names(case) -> None:

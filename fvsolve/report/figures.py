@@ -20,7 +20,6 @@ from fvsolve.report.section import Section
 
 HIGH, LOW, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
-APART = 0.035  # of the length: names of devices nearer to each other than this would cover each other
 LONGEST = 22  # letters over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
@@ -128,21 +127,12 @@ def _post(x: float) -> dict[str, Any]:
 
 
 def _names(one: Section) -> list[dict[str, Any]]:
-    """Names over their chainages: devices and ends before joints, none over another; devices nearby share one."""
+    """What stands over the chainages of a section."""
     length = one.way.places[-1][1]
-    order = sorted(one.devices, key=lambda device: (not device.parts, device.chainage not in (0.0, length)))
-    shown: list[tuple[float, list[str], bool]] = []
-    for device in order:
-        names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
-        near = [one for one in shown if abs(device.chainage - one[0]) < APART * length]
-        if not near:
-            shown.append((device.chainage, names, bool(device.parts)))
-        elif device.parts:
-            near[0][1].extend(names)
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
              "xanchor": "right" if x > 0.9 * length else "left", "yanchor": "bottom",
-             "text": as_it_stands(_cut(", ".join(names))), "hovertext": as_it_stands(", ".join(names)),
-             "font": {"size": 11, "color": INK if stands else MUTED}} for x, names, stands in shown]  # fmt: skip
+             "text": as_it_stands(_cut(names)), "hovertext": as_it_stands(names),
+             "font": {"size": 11, "color": INK if stands else MUTED}} for x, names, stands in one.labels()]  # fmt: skip
 
 
 def _cut(text: str) -> str:

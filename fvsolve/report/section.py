@@ -13,6 +13,7 @@ from fvsolve.report.legs import Way
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
+APART = 0.035  # of the length: names nearer to each other than this would cover each other
 BINS = 250  # of a long line: of each the greatest and the least head stand, and where
 
 
@@ -50,6 +51,23 @@ class Section:
         lines = [(self.along["greatest_head"], np.argmax), (self.along["least_head"], np.argmin)]
         kept = [a + most(line[a:b]) for line, most in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
         return np.unique([0, *kept, n - 1])
+
+    def labels(self) -> list[tuple[float, str, bool]]:
+        """Chainages with names, and whether more than a joint stands there; none would cover another.
+
+        Devices and ends go before joints; devices that are near share a label.
+        """
+        length = self.way.places[-1][1]
+        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in (0.0, length)))
+        shown: list[tuple[float, list[str], bool]] = []
+        for device in order:
+            names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
+            near = [one for one in shown if abs(device.chainage - one[0]) < APART * length]
+            if not near:
+                shown.append((device.chainage, names, bool(device.parts)))
+            elif device.parts:
+                near[0][1].extend(names)
+        return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
 
 
 def section(result, way: Way) -> Section:
