@@ -97,9 +97,9 @@ def _near(a: np.ndarray, b: np.ndarray, room: float) -> bool:
 
 
 def _alike(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether b is a, scaled and moved."""
-    if not (np.isfinite(a).all() and np.isfinite(b).all()) or len(a) < 2:
-        return False
+    """Whether b is a, scaled and moved; of nothing that moves."""
     low, high = int(a.argmin()), int(a.argmax())
+    if not (np.isfinite(a).all() and np.isfinite(b).all() and a[low] < a[high]):
+        return False
     scale = (b[high] - b[low]) / (a[high] - a[low])
     return bool(scale > 0.0 and np.abs(b - b[low] - scale * (a - a[low])).max() <= ALIKE * np.ptp(b))
