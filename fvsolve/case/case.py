@@ -10,7 +10,10 @@ from typing import Any
 
 from fvsolve.case import basins, bodies, ranges, riding_networks, text
 from fvsolve.case.claims import Compare, Expect
+from fvsolve.case.extent import of_profiles
+from fvsolve.case.limits import DesignLimit
 from fvsolve.case.probe import Probe
+from fvsolve.case.routes import Route
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import LAWS, Fluid
@@ -49,6 +52,8 @@ class Case(Shown):
     output: Output
     expect: dict[str, Expect]
     compare: dict[str, Compare]
+    routes: dict[str, Route]
+    limits: dict[str, DesignLimit]
     exact: ExactSpec | None
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
@@ -81,7 +86,17 @@ class Case(Shown):
     def probes(self) -> list[Probe]:
         """All that must be recorded: probes of the output, then those that only expect or compare name."""
         named = [*self.output.probes]
-        named += [one.probe for one in [*self.expect.values(), *self.compare.values()]]
+        named += [one.probe for one in [*self.expect.values(), *self.compare.values()] if one.probe is not None]
+        return list({probe.text: probe for probe in named}.values())
+
+    @cached_property
+    def watched(self) -> list[Probe]:
+        """What is followed beside the probes for its extremes alone: points of profiles, and what limits and claims
+        extent."""
+        named = [*of_profiles(self.links)]
+        extents = [one.extent for one in [*self.limits.values(), *self.expect.values()] if one.extent is not None]
+        for extent in extents:
+            named += extent.probes(self.links)
         return list({probe.text: probe for probe in named}.values())
 
     @property
@@ -225,6 +240,8 @@ class Case(Shown):
             "output": self.output.table(),
             "expect": {name: one.table() for name, one in self.expect.items()},
             "compare": {name: one.table() for name, one in self.compare.items()},
+            "routes": {name: one.table() for name, one in self.routes.items()},
+            "limits": {name: one.table() for name, one in self.limits.items()},
             "exact": self.exact.table() if self.exact else {},
         }
         return {key: value for key, value in said.items() if value not in ("", {})}

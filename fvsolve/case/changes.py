@@ -8,8 +8,10 @@ from typing import Any
 
 from fvsolve.case.case import Case
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys
+from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.raw import dotted
+from fvsolve.case.routes import Route
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
@@ -82,6 +84,7 @@ def known(raw: dict[str, Any]) -> dict[str, Value]:
         parts = raw.get(group, {}).items()
         found[group] = Keys({name: Keys({"type": Value(), **kinds[one["type"]].values()}) for name, one in parts})
     said = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
+    said |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
     return found | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(one))) for group, one in said.items()}
 
 

@@ -11,12 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, bodies, check, scalars, shipped, size, text
+from fvsolve.case import basins, bodies, check, heights, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
+from fvsolve.case.extent import ALL
+from fvsolve.case.limits import NAMED, VAPOR, DesignLimit, read_limit
 from fvsolve.case.moved import moved
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
+from fvsolve.case.routes import Route
+from fvsolve.case.routes import misfits as route_misfits
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
@@ -50,7 +54,7 @@ GROUPS = {
 ALONE = ("basin", "body")  # nodes that need no link
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "scalars", "numerics", "output", "expect", "compare", "exact",
+    "signals", "scalars", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
@@ -123,6 +127,7 @@ class _Reader:
         self.setting.signals = self.group("signals")
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
+        parts["nodes"] = heights.lent(**parts)
         meshes = self.meshes(parts["nodes"])
         self.unused_signals()
         numerics = self.table("numerics", Numerics)
@@ -149,7 +154,9 @@ class _Reader:
                 kinds["nodes"] |= {f"{name}.{patch}": basins.place_kind(pool, patch)
                                    for patch in basins.patch_names(meshes[name])}  # fmt: skip
         output = self.output(numerics, kinds)
-        expect, compare = self.expect(kinds), self.compare(kinds)
+        routes = self.routes(parts["links"])
+        expect, compare = self.expect(kinds, routes), self.compare(kinds)
+        limits = self.limits(kinds, routes, parts["links"], properties)
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0
@@ -182,6 +189,8 @@ class _Reader:
             output=output,
             expect=expect,
             compare=compare,
+            routes=routes,
+            limits=limits,
             exact=named,
             copies=dict(self.setting.files),
             raw=self.raw.table,
@@ -454,11 +463,44 @@ class _Reader:
             changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS
         return output.model_copy(update=changes)
 
-    def expect(self, kinds: dict) -> dict[str, Expect]:
+    def routes(self, links: dict[str, Any]) -> dict[str, Route | None]:
+        """Routes by name; None in the place of what is at fault itself."""
+        made: dict[str, Route | None] = {}
+        named = self.group("links")
+        for name, given in self.group("routes").items():
+            made[name] = None
+            if name in self.group("nodes") or name in named or name in ALL:
+                self.fault(("routes", name), f"{show(name)} is the name of something else; wanted one of its own")
+                continue
+            try:
+                made[name] = Route.model_validate(given, context=self.setting)
+            except ValueError as error:
+                self.misfit(("routes", name), error)
+        faulty = list(route_misfits(made, links, named))
+        self.add(faulty)
+        return {name: None if any(keys[1] == name for keys, _ in faulty) else one for name, one in made.items()}
+
+    def limits(
+        self, kinds: dict, routes: dict, links: dict[str, Any], properties: Any
+    ) -> dict[str, DesignLimit | None]:
+        """Limits by name."""
+        made = {}
+        for name, given in self.group("limits").items():
+            try:
+                made[name] = read_limit(name, given, kinds, routes, links, self.setting)
+            except ValueError as error:
+                self.misfit(("limits", name), error)
+            said = given.get("least") if isinstance(given, dict) else None
+            boils = isinstance(said, str) and NAMED.get(said.casefold()) == VAPOR
+            if boils and properties is not None and properties.vapor_pressure is None:
+                self.fault(("limits", name, "least"), "the fluid states no vapor_pressure; give it under [fluid]")
+        return made
+
+    def expect(self, kinds: dict, routes: dict) -> dict[str, Expect]:
         made = {}
         for claim, given in self.group("expect").items():
             try:
-                made[claim] = read_expect(claim, given, kinds, self.setting)
+                made[claim] = read_expect(claim, given, kinds, routes, self.setting)
             except ValueError as error:
                 self.misfit(("expect", claim), error)
         return made

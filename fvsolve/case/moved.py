@@ -6,7 +6,7 @@ import functools
 from dataclasses import replace
 from typing import Any
 
-from fvsolve.case import check
+from fvsolve.case import check, heights
 from fvsolve.case.case import Case
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.schedule import Schedule, Scheduled
@@ -40,7 +40,7 @@ def moved(reader: Any) -> Case | None:
                     return None
                 reader.read[group, name] = known
             found[group][name] = known[1]
-    nodes, numerics = found["nodes"], before.numerics
+    nodes, numerics = heights.lent(**found), before.numerics
     about = before.ambient_pressure, before.gravity, before.properties, raw
     reader.add(check.parts(nodes, found["links"], *about, numerics.start, {}, {}))
     links = reader.cells(found["links"], before.properties, numerics)

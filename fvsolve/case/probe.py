@@ -24,7 +24,7 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 @dataclass(frozen=True)
 class Probe:
     """What is recorded: text of the case, part and quantity; along a pipe the fraction from `from`, in a basin the
-    point [m]."""
+    point [m]; straight : read along a straight line between cells, not by the scheme's polynomial."""
 
     text: str
     part: str  # "nodes" | "links"
@@ -34,6 +34,7 @@ class Probe:
     dimension: str
     point: tuple[float, float] | None = None
     unit: str = ""  # of a scalar, a label
+    straight: bool = False
 
 
 Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | Scalar | None"]]

@@ -5,13 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
-from fvsolve.parts.conduit import Conduit
+from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.conduit import LENGTH, Conduit
+from fvsolve.parts.pipe.profile import Profile, ProfileValue
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import COUNTED, Choice, Number, Quantity, Setting, Usual, Value, Whole, between, positive
+from fvsolve.parts.value import (
+    COUNTED,
+    Choice,
+    Misfit,
+    Number,
+    Quantity,
+    Setting,
+    Usual,
+    Value,
+    Whole,
+    between,
+    positive,
+)
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
+SPANNED = 1e-6  # of its length, by which chainage may differ from it
+MET = 1e-6  # in elevation, by which a profile may miss its nodes [m]
+ENDS = {"from": "begins", "to": "ends"}
 LINES = ("cells", "delay", "auto")  # how waves in a pipe are followed
 
 
@@ -54,7 +71,7 @@ class WallOrStiff(Value):
 
 
 class Pipe(Conduit, kind="pipe"):
-    """A pipe of constant slope: mass and momentum along it, wave speed sqrt(K / rho).
+    """A pipe, straight or along a profile: mass and momentum along it, wave speed sqrt(K / rho).
 
     Ports: from, to; each end offers its outgoing characteristic. Stored energy, p from ambient: rho A
     integral of (v^2 / 2 + p^2 / (2 rho K) + g z) dx [J]. Dissipated power: friction and minor loss, pressure
@@ -68,6 +85,10 @@ class Pipe(Conduit, kind="pipe"):
         "flow": "flow",
     }  # fmt: skip
 
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.needs, ("length", "profile"))
+
+    length: Annotated[float, LENGTH] = None  # that of profile stands in for it
+    profile: Annotated[Profile | None, ProfileValue()] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     cells: Annotated[
@@ -84,6 +105,33 @@ class Pipe(Conduit, kind="pipe"):
         ),
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
+
+    @classmethod
+    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+        found = super().in_numbers(given, setting)
+        if "profile" not in found:
+            return found
+        try:
+            found = {**found, "profile": ProfileValue().read(found["profile"], setting)}
+        except Misfit as error:
+            raise Misfit([(("profile", *below), text) for below, text in error.faults]) from None
+        except ValueError as error:
+            raise Misfit([(("profile",), str(error))]) from None
+        return {"length": found["profile"].length, **found}
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if self.profile is None:
+            return
+        if abs(self.profile.length - self.length) > SPANNED * self.length:
+            text = f"chainage spans {self.profile.length:.10g} m, and length is {self.length:.10g} m"
+            yield ("profile",), f"{text}; leave it out"
+        for place, end, z in zip(("from", "to"), (self.from_, self.to), self.profile.elevation[[0, -1]], strict=True):
+            node = around.nodes.get(end)
+            if getattr(node, "on", None) is not None:
+                yield ("profile",), f"{end} rides on {node.on}, and a pipe on a body is straight"
+            stated = getattr(node, "elevation", None)
+            if stated is not None and abs(stated - z) > MET:
+                yield ("profile",), f"{end} lies at {stated:.10g} m, and it {ENDS[place]} at {z:.10g} m"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from super().unusual()
