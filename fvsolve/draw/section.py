@@ -7,14 +7,18 @@ import numpy as np
 from fvsolve.draw import style
 from fvsolve.draw.plot import thinned
 
+LINES = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
+         "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
+LIMIT = {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))}
 LONGEST = 22  # letters over a chainage
 
 
 @style.as_it_stands
-def section_figure(chainage, along, units, vapour=None, allowed=None, parted=(), posts=(), labels=(), title=""):
-    """Heads along one chainage with the pipe, the vapour line and the class line; shaded where liquid parted.
+def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=(), labels=(), title=""):
+    """Heads along one chainage with the pipe, lines of vapour, classes and limits; shaded where liquid parted.
 
-    chainage, along["greatest_head"] ... : float64[n] in `units`; posts : chainages of places
+    chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]; posts : chainages
+    beyond : (chainage, head, name) where a limit is passed
     labels : (chainage, names, whether more than a joint)
     """
     figure = style.figure(4.6)
@@ -29,13 +33,15 @@ def section_figure(chainage, along, units, vapour=None, allowed=None, parted=(),
     axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
               label="initial head")  # fmt: skip
     axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
-    if vapour is not None:
-        axes.plot(chainage, vapour, ":", color=style.COLOURS[3], linewidth=1.2, label="vapour line")
-    if allowed is not None:
-        axes.plot(chainage, allowed, "-.", color=style.COLOURS[6], linewidth=1.2, label="class line")
+    for name, line in lines.items():
+        axes.plot(chainage, line, label=name, **LINES.get(name, LIMIT))
     if parted:
         axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
-    axes.set_xlim(min(0.0, chainage[0]), max([chainage[-1], *posts]))
+    if beyond:
+        at, heads, _ = zip(*beyond, strict=True)
+        axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
+                  label="limit passed")  # fmt: skip
+    axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
     _places(axes, posts, labels)
     axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
     axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)

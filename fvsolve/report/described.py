@@ -46,15 +46,18 @@ def pipes(result) -> Table | None:
         return None
     cells = default_cells(found, case.properties, case.numerics.cell_time)
     length, height, speed = (column("", one, case) for one in ("length", "head", "velocity"))
-    stated = case.elevations_stated
+    profiled = any(link.profile is not None for link in found.values())
+    stated = case.elevations_stated or profiled
     rows = []
     for name, link in found.items():
         ends = [link.ports["from"], link.ports["to"]]
         sizes = [float(length.from_si(link.length)), float(length.from_si(link.diameter))]
-        heights = [float(height.from_si(case.elevation(end))) for end in ends] if stated else []
-        rows.append([name, *ends, *sizes, float(speed.from_si(case.wave_speed(name))), *heights, _friction(link, case),
-                     cells[name]])  # fmt: skip
-    heads = ("elevation at from", "at to") if stated else ()
+        heights = [case.elevation(end) for end in ends] if link.profile is None else link.profile.elevation[[0, -1]]
+        heights = [float(height.from_si(one)) for one in heights] if stated else []
+        points = [None if link.profile is None else len(link.profile.chainage)] if profiled else []
+        rows.append([name, *ends, *sizes, float(speed.from_si(case.wave_speed(name))), *heights, *points,
+                     _friction(link, case), cells[name]])  # fmt: skip
+    heads = [*["elevation at from", "at to"] * stated, *["points of profile"] * profiled]
     heads = ("pipe", "from", "to", "length", "diameter", "wave speed", *heads, "friction", "cells")
     units = ("", "", "", length.unit, length.unit, speed.unit, *[height.unit] * (2 * stated))
     return Table("Pipes", heads, rows, units, more=ELSEWHERE)

@@ -19,6 +19,9 @@ from fvsolve.report.motion import Motion
 from fvsolve.report.section import Section
 
 HIGH, LOW, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
+LINES = {"vapour line": {"colour": VAPOUR, "width": 1.4, "dash": "dot"},
+         "class line": {"colour": CLASS, "width": 1.8, "dash": "dashdot"}}  # fmt: skip
+LIMIT = {"colour": CLASS, "width": 1.3, "dash": "longdash"}
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
 LONGEST = 22  # letters over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
@@ -34,13 +37,16 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str) -
         _line("initial head", x, lines["initial_head"], INK, width=1.2, dash="dash"),
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
-    if one.vapour is not None:
-        data.append(_line("vapour line", x, numbers(one.vapour[k], "f4"), VAPOUR, width=1.4, dash="dot"))
-    if one.allowed is not None:
-        data.append(_line("class line", x, numbers(one.allowed[k], "f4"), CLASS, width=1.6, dash="dashdot"))
+    for name, line in one.lines.items():
+        data.append(_line(name, x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
     if one.parted:
         data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
                      "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
+    if one.beyond:
+        at, heads, names = zip(*one.beyond, strict=True)
+        data.append({"type": "scatter", "mode": "markers", "name": "limit passed", "x": at, "y": heads,
+                     "cliponaxis": False, "text": [as_it_stands(name) for name in names],
+                     "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}}})  # fmt: skip
     shapes = [_span(a, b, VAPOUR, 0.18) for a, b in one.parted]
     if moving is not None:
         data.append(_line("head now", numbers(moving.chainage, "f4"), numbers(moving.heads[0], "f4"), NOW, width=2.6))
@@ -49,7 +55,7 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str) -
     names = _names(one)
     above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
     layout |= {"shapes": shapes, "annotations": names, "margin": {"l": 62, "r": 14, "t": above, "b": 50}}
-    layout["xaxis"]["range"] = [0.0, one.way.places[-1][1]]
+    layout["xaxis"]["range"] = [one.way.begin, one.way.end]
     made: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
         made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
@@ -128,9 +134,9 @@ def _post(x: float) -> dict[str, Any]:
 
 def _names(one: Section) -> list[dict[str, Any]]:
     """What stands over the chainages of a section."""
-    length = one.way.places[-1][1]
+    late = one.way.begin + 0.9 * one.way.length
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
-             "xanchor": "right" if x > 0.9 * length else "left", "yanchor": "bottom",
+             "xanchor": "right" if x > late else "left", "yanchor": "bottom",
              "text": as_it_stands(_cut(names)), "hovertext": as_it_stands(names),
              "font": {"size": 11, "color": INK if stands else MUTED}} for x, names, stands in one.labels()]  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Which pipes make a long section, and which way round. Knows the network of a case; draws nothing.
 
-The one place that chooses: the longest ways through pipes that meet end to end, each pipe in one of them.
+The one place that chooses: the routes of the case, then the longest ways through pipes on none of them that meet end to
+end, each pipe in one.
 """
 
 from __future__ import annotations
@@ -8,16 +9,10 @@ from __future__ import annotations
 import heapq
 from typing import NamedTuple
 
-MOST = 6  # sections of a run
+from fvsolve.case.routes import Leg
+from fvsolve.case.routes import legs as legs_of
 
-
-class Leg(NamedTuple):
-    """A pipe of a section: the chainage where it begins [m], and whether it is run from its `to` end."""
-
-    pipe: str
-    begins: float
-    length: float
-    backwards: bool
+MOST = 6  # sections of a run, unless it has more routes
 
 
 class Way(NamedTuple):
@@ -27,22 +22,39 @@ class Way(NamedTuple):
     legs: list[Leg]
     places: list[tuple[str, float]]
 
+    @property
+    def begin(self) -> float:
+        """Chainage where it begins [m]."""
+        return self.legs[0].begin
+
+    @property
+    def end(self) -> float:
+        """Chainage where it ends [m]."""
+        return self.legs[-1].end
+
+    @property
+    def length(self) -> float:
+        """From end to end [m]."""
+        return self.end - self.begin
+
 
 def ways(result) -> list[Way]:
-    """The sections of a run, longest first; none of a case without pipes."""
+    """The sections of a run, its routes first, then the longest; none of a case without pipes."""
     links = result.case.links
-    pipes = {name: (links[name].ports["from"], links[name].ports["to"], links[name].length)
-             for name in result.envelope if name in links}  # fmt: skip
-    found = []
-    while pipes and len(found) < MOST:
+    found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
+    strung = {leg.pipe for way in found for leg in way.legs}
+    pipes = {name: (links[name].from_, links[name].to, links[name].length)
+             for name in result.envelope if name in links and name not in strung}  # fmt: skip
+    others = []
+    while pipes and len(found) + len(others) < MOST:
         chain = _longest(pipes)
         for pipe, _, _ in chain:
             del pipes[pipe]
-        found.append(_way(chain, result))
-    return sorted(found, key=lambda one: -one.places[-1][1])
+        others.append(_chained(chain, result))
+    return [*found, *sorted(others, key=lambda one: -one.length)]
 
 
-def _way(chain: list[tuple[str, bool, float]], result) -> Way:
+def _chained(chain: list[tuple[str, bool, float]], result) -> Way:
     """A chain with its chainages, turned so that the head falls along it at the start."""
     first, last = chain[0], chain[-1]
     begins = _start_head(result, first[0], last=first[1])
@@ -51,16 +63,23 @@ def _way(chain: list[tuple[str, bool, float]], result) -> Way:
         ends >= begins and sum(turned for _, turned, _ in chain) * 2 > len(chain)
     ):
         chain = [(pipe, not turned, length) for pipe, turned, length in reversed(chain)]
-    at, legs, places = 0.0, [], []
+    at, legs = 0.0, []
     for pipe, turned, length in chain:
-        ports = result.case.links[pipe].ports
-        places.append((ports["to" if turned else "from"], at))
-        legs.append(Leg(pipe, at, length, turned))
+        legs.append(Leg(pipe, at, at + length, turned))
         at += length
-        end = ports["from" if turned else "to"]
+    way = _way("", legs, result.case.links)
     names = [leg.pipe for leg in legs]
-    name = " \u2013 ".join(names) if len(names) < 4 else f"{places[0][0]} to {end}"
-    return Way(name, legs, [*places, (end, at)])
+    name = " \u2013 ".join(names) if len(names) < 4 else f"{way.places[0][0]} to {way.places[-1][0]}"
+    return way._replace(name=name)
+
+
+def _way(name: str, legs: list[Leg], links: dict) -> Way:
+    """A section with the places where its pipes begin and end; what stands between two of them has both."""
+    places = []
+    for leg in legs:
+        ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
+        places += ends[::-1] if leg.backwards else ends
+    return Way(name, legs, list(dict.fromkeys((place, float(at)) for place, at in places)))
 
 
 def _start_head(result, pipe: str, last: bool) -> float:

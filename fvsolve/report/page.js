@@ -11,7 +11,7 @@
   for (const [id, one] of Object.entries(figures)) {
     if (touched) one.layout.dragmode = false;
     if (!one.layout.annotations) continue;
-    const apart = 24 / (chart(id).clientWidth - 76) * one.layout.xaxis.range[1];
+    const apart = 24 / (chart(id).clientWidth - 76) * (one.layout.xaxis.range[1] - one.layout.xaxis.range[0]);
     const kept = [];
     for (const name of one.layout.annotations)
       if (kept.every((other) => Math.abs(other.x - name.x) >= apart)) kept.push(name);

@@ -10,11 +10,12 @@ from fvsolve.draw.style import INK
 from fvsolve.errors import visible
 from fvsolve.report import described, numerics, trust, worst
 from fvsolve.report.figures import history_figure, section_figure
+from fvsolve.report.heads import in_units
 from fvsolve.report.histories import chosen, panels
 from fvsolve.report.legs import Way
 from fvsolve.report.libraries import charts, template
 from fvsolve.report.motion import motions
-from fvsolve.report.section import Section, in_units, section
+from fvsolve.report.section import Section, section
 from fvsolve.report.tables import Table, worded
 
 HERE = Path(__file__).parent
@@ -32,7 +33,7 @@ def page(result, ways: list[Way]) -> str:
         "limits": trust.verdicts(result), "worst": worst.of_all(result, ways) or probes,
         "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(chosen(result)),
-        "places": _there([*worst.by_pipe(result), probes if result.envelope else None]),
+        "places": _there([*trust.worst(result), *worst.by_pipe(result), probes if result.envelope else None]),
         "model": _there([described.fluid(result), described.pipes(result), described.parts(result)]),
         "numbers": _there([numerics.settings(result), numerics.ledgers(result), trust.claims(result),
                            numerics.comparisons(result)]),
@@ -63,7 +64,7 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
         line = moving[k] if moving else None
         figures[f"section-{k}"] = section_figure(one, line, height, along)
         told.append({"id": f"section-{k}", "name": visible(one.way.name),
-                     "length": f"{worded(one.way.places[-1][1])} {along}",
+                     "length": f"{worded(in_units(result, 'distance').from_si(one.way.length))} {along}",
                      "frames": 0 if line is None else len(line.times), "pipes": len(one.way.legs),
                      "parted": bool(one.parted)})  # fmt: skip
     return told

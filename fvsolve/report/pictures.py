@@ -91,8 +91,8 @@ def _sections(found: list[Way], route: str, others: bool, faults: list[str]) -> 
 def _section_figure(result, way: Way):
     one = section(result, way)
     k, title = one.picked, "\n".join(filter(None, [result.summary["title"], way.name]))
-    vapour, allowed = (None if line is None else line[k] for line in (one.vapour, one.allowed))
     return section_figure(
         one.chainage[k], {name: values[k] for name, values in one.along.items()}, result.summary["envelope_units"],
-        vapour, allowed, one.parted, [device.chainage for device in one.devices], one.labels(), title,
+        {name: line[k] for name, line in one.lines.items()}, one.parted, one.beyond,
+        [device.chainage for device in one.devices], one.labels(), title,
     )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.envelope import QUANTITIES
-from fvsolve.report.section import in_units
+from fvsolve.report.heads import in_units
 from fvsolve.run import open_run
 
 PAGE = "report.html"

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.output.column import UnitColumn
+from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.output.routes import strung
+from fvsolve.report.heads import head_of, in_units
 from fvsolve.report.legs import Way
+from fvsolve.report.limits import limit_lines
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
 APART = 0.035  # of the length: names nearer to each other than this would cover each other
-BINS = 250  # of a long line: of each the greatest and the least head stand, and where
+BINS = 150  # of a long line: of each the greatest and the least head and elevation stand, and where
 
 
 class Device(NamedTuple):
@@ -29,16 +31,18 @@ class Device(NamedTuple):
 class Section:
     """One way with what was met along it.
 
-    chainage : float64[n] [m]; along : quantity -> float64[n]; vapour, allowed : head at which liquid boils, and that
-    the class allows, or None; parted : spans of chainage where the vapour pressure was reached
+    chainage : float64[n]; pipe : str[n]; along : quantity -> float64[n]; lines : name -> float64[n], heads at which
+    liquid boils, that a class allows, that limits state, nan where there is none; parted : spans of chainage where the
+    vapour pressure was reached; beyond : (chainage, head, name) of what passes a limit
     """
 
     way: Way
     chainage: np.ndarray
+    pipe: np.ndarray
     along: dict[str, np.ndarray]
-    vapour: np.ndarray | None
-    allowed: np.ndarray | None
+    lines: dict[str, np.ndarray]
     parted: list[tuple[float, float]]
+    beyond: list[tuple[float, float, str]]
     devices: list[Device]
 
     @property
@@ -48,8 +52,14 @@ class Section:
         if n <= 2 * BINS:
             return np.arange(n)
         edges = np.linspace(0, n, BINS + 1).astype(int)
-        lines = [(self.along["greatest_head"], np.argmax), (self.along["least_head"], np.argmin)]
-        kept = [a + most(line[a:b]) for line, most in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        most = [
+            ("greatest_head", np.argmax),
+            ("least_head", np.argmin),
+            ("elevation", np.argmax),
+            ("elevation", np.argmin),
+        ]
+        lines = [(self.along[name], end) for name, end in most]
+        kept = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
         return np.unique([0, *kept, n - 1])
 
     def labels(self) -> list[tuple[float, str, bool]]:
@@ -57,8 +67,8 @@ class Section:
 
         Devices and ends go before joints; devices that are near share a label.
         """
-        length = self.way.places[-1][1]
-        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in (0.0, length)))
+        length, ends = self.way.length, (self.way.begin, self.way.end)
+        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in ends))
         shown: list[tuple[float, list[str], bool]] = []
         for device in order:
             names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
@@ -66,36 +76,23 @@ class Section:
             if not near:
                 shown.append((device.chainage, names, bool(device.parts)))
             elif device.parts:
-                near[0][1].extend(names)
+                near[0][1].extend(name for name in names if name not in near[0][1])
         return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
 
 
 def section(result, way: Way) -> Section:
     """The section of a way through a run."""
-    pieces: dict[str, list] = {name: [] for name in ("chainage", *ALONG, "width")}
-    for leg in way.legs:
-        arrays = result.envelope[leg.pipe]
-        order = slice(None, None, -1 if leg.backwards else 1)
-        x = arrays["distance"][order]
-        pieces["chainage"].append(leg.begins + (leg.length - x if leg.backwards else x))
-        pieces["width"].append(np.full(len(x), leg.length / len(x)))
-        for name in ALONG:
-            pieces[name].append(arrays[name][order])
-    joined = {name: np.concatenate(found) for name, found in pieces.items()}
-    chainage, width = joined.pop("chainage"), joined.pop("width")
-    along = {name: joined[name] for name in ALONG}
-    boils = result.summary["fluid"]["vapor_pressure"]
-    vapour = None if boils is None else _head(result, boils, along["elevation"])
-    return Section(way, chainage, along, vapour, _allowed(result, way, along["elevation"]),
-                   _parted(result, along["least_pressure"], chainage, width), _devices(result, way))  # fmt: skip
-
-
-def in_units(result, name: str) -> UnitColumn:
-    """The column of a quantity of the envelope."""
-    from fvsolve.output.envelope import QUANTITIES
-
-    unit, ambient = result.summary["envelope_units"][name], result.summary["ambient_pressure"]
-    return UnitColumn(name, QUANTITIES[name], unit, ambient)
+    distances = in_units(result, "distance")
+    strung_up = strung(result.envelope, way.legs, distances)
+    chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
+    along = {name: strung_up[name] for name in ALONG}
+    lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
+    if boils is not None:
+        lines["vapour line"] = head_of(result, boils, along["elevation"])
+    lines |= limit_lines(result, pipe, along["elevation"])
+    return Section(way, strung_up["chainage"], pipe, along, lines,
+                   _parted(result, along["least_pressure"], chainage, way), _beyond(result, way, chainage, along),
+                   _devices(result, way))  # fmt: skip
 
 
 def boiling(result) -> float | None:
@@ -104,32 +101,33 @@ def boiling(result) -> float | None:
     return None if boils is None else boils * (2.0 if result.case.law.cavitates else 1.0)
 
 
-def _head(result, pressure: float | np.ndarray, elevation: np.ndarray) -> np.ndarray:
-    """The head of a pressure [Pa] at elevations, both in the unit of heads."""
-    height = in_units(result, "elevation")
-    law: Callable[..., Any] = result.case.law.head
-    return in_units(result, "greatest_head").from_si(law(pressure, height.to_si(elevation)))
-
-
-def _allowed(result, way: Way, elevation: np.ndarray) -> np.ndarray | None:
-    """The head of the pressure that the class of each pipe allows; None where no pipe of the way has one."""
-    pipes = [result.case.links[leg.pipe] for leg in way.legs]
-    allowed = [getattr(pipe, "allowable_pressure", None) for pipe in pipes]
-    if all(one is None for one in allowed):
-        return None
-    counts = [len(result.envelope[leg.pipe]["distance"]) for leg in way.legs]
-    return _head(result, np.repeat([np.nan if one is None else one for one in allowed], counts), elevation)
-
-
-def _parted(result, least, chainage, width) -> list[tuple[float, float]]:
-    """Spans of cells whose pressure fell to that of vapour."""
+def _parted(result, least: np.ndarray, chainage: np.ndarray, way: Way) -> list[tuple[float, float]]:
+    """Spans of chainage [m] about places whose pressure fell to that of vapour."""
     limit = boiling(result)
     if limit is None:
         return []
     low = in_units(result, "least_pressure").to_si(least) <= limit * (1.0 + 1e-9)
+    middles = np.concatenate([[way.begin], 0.5 * (chainage[1:] + chainage[:-1]), [way.end]])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], low.astype(int), [0]])))
-    return [(float(chainage[a] - 0.5 * width[a]), float(chainage[b - 1] + 0.5 * width[b - 1]))
-            for a, b in zip(edges[::2], edges[1::2], strict=True)]  # fmt: skip
+    return [(float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _beyond(result, way: Way, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
+    """Places of a way where a limit on pressure or head is passed: chainage [m], head there, name of the limit."""
+    found = []
+    for one in result.summary["verdicts"]:
+        for worst in one["worst"] if one["quantity"] in OF_PRESSURE else []:
+            leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
+            if leg is None or worst["margin"] is None or worst["margin"] >= 0.0:
+                continue
+            at = worst["chainage"]
+            if way.name not in result.case.routes:  # of a pipe on none it counts along the pipe
+                profile = result.case.links[leg.pipe].profile
+                at = float(leg.chainage(at - (0.0 if profile is None else profile.chainage[0])))
+            if leg.begin <= at <= leg.end:
+                line = along["least_head" if worst["bound"] == "least" else "greatest_head"]
+                found.append((at, float(line[np.argmin(np.abs(chainage - at))]), one["name"]))
+    return found
 
 
 def _devices(result, way: Way) -> list[Device]:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 from fvsolve.output.column import column
 from fvsolve.report.tables import Table
 
+HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
+BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
 LATER = 6  # marks named behind the first
 
 
@@ -39,7 +41,7 @@ def _doubt(result) -> list[Word]:
     marks = sorted(result.marks, key=lambda one: one.time)
     if not marks:
         return []
-    later = ", ".join(f"{one.place} at {one.time:.6g} s" for one in marks[1 : 1 + LATER])
+    later = ", ".join(f"{one.place.partition('.')[2]} at {one.time:.6g} s" for one in marks[1 : 1 + LATER])
     more = f", and {len(marks) - 1 - LATER} more places" if len(marks) > 1 + LATER else ""
     text = marks[0].text + (f". Later also {later}{more}" if later else "")
     return [Word("doubt", f"Results from {marks[0].time:.6g} s on are not to be trusted.", text)]
@@ -52,33 +54,53 @@ def sound(result) -> bool:
 
 def verdict(result) -> Word:
     """Whether the limits of the case hold."""
-    verdicts = result.summary.get("verdicts", [])
+    verdicts = result.verdicts
     if not verdicts:
         return Word("none", "No limits were stated.", "The case does not say what its parts may bear: this report says "
                     "what happens, not whether it is allowed.")  # fmt: skip
-    failed = [one for one in verdicts if not one["ok"]]
-    many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
+    states = [state(one) for one in verdicts]
+    failed = [one.name for one, how in zip(verdicts, states, strict=True) if how == FAILS]
     if failed:
-        return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.",
-                    "; ".join(one["name"] for one in failed))  # fmt: skip
-    if not sound(result):
-        return Word("doubt", "All limits hold as far as the run can be trusted.", "")
-    return Word("good", f"All {len(verdicts)} limits hold." if len(verdicts) > 1 else "The limit holds.", "")
+        many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
+        return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
+    if OPEN in states:
+        return Word("doubt", "Whether the limits hold is open,", "as the run is not sound; no limit was passed in it.")
+    every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
+    return Word("good", f"{every}.", "") if sound(result) else Word("doubt", f"{every}, as far as to be trusted.", "")
+
+
+def state(one) -> str:
+    """What is to be said of a verdict: open where no place is beyond the limit in a run that is not ok."""
+    return HOLDS if one.ok else FAILS if one.margin is None or one.margin < 0.0 else OPEN
 
 
 def verdicts(result) -> Table | None:
-    """The table of verdicts, those that fail first and the closest before others; None where no limits were stated."""
-    found = result.summary.get("verdicts", [])
-    if not found:
-        return None
-    found = sorted(found, key=lambda one: (one["ok"], one["margin"] if one["margin"] is not None else 0.0))
+    """The table of verdicts, those that fail first; None where no limits were stated."""
+    order = (FAILS, OPEN, HOLDS)
+    found = sorted(result.verdicts, key=lambda one: order.index(state(one)))
     length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
-    rows = [[one["name"], "holds" if one["ok"] else "FAILS", one["value"], one["limit"], one["margin"], one["unit"],
-             one["place"], _in(length, one["chainage"]), _in(height, one["elevation"]), _in(time, one["time"])]
+    rows = [[one.name, state(one), one.quantity.replace("_", " "), one.value, BOUNDS[one.bound], one.limit, one.margin,
+             one.unit, one.place, _in(length, one.chainage), _in(height, one.elevation), _in(time, one.time)]
             for one in found]  # fmt: skip
-    return Table("Limits", ("limit", "verdict", "value", "allowed", "margin", "unit", "worst at", "chainage",
-                            "elevation", "time"), rows, ("",) * 7 + (length.unit, height.unit, time.unit),
-                 frozenset(k for k, one in enumerate(found) if not one["ok"]), frozenset({2, 3, 4}))  # fmt: skip
+    heads = ("limit", "verdict", "quantity", "value", "", "limit", "margin", "unit", "worst at")
+    heads += ("chainage", "elevation", "time")
+    bad = frozenset(k for k, one in enumerate(found) if state(one) == FAILS)
+    units = ("",) * 9 + (length.unit, height.unit, time.unit)
+    return Table("Limits", heads, rows, units, bad, frozenset({3, 5, 6})) if rows else None
+
+
+def worst(result) -> list[Table]:
+    """Of each limit that more than one part has, its worst places."""
+    length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
+    made = []
+    for one in result.verdicts:
+        rows = [[row["place"], _in(length, row["chainage"]), _in(height, row["elevation"]), _in(time, row["time"]),
+                 row["value"], row["limit"], row["margin"]] for row in one.worst]  # fmt: skip
+        bad = frozenset(k for k, row in enumerate(rows) if row[-1] is None or row[-1] < 0.0)
+        units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, one.unit)
+        heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), BOUNDS[one.bound], "margin")
+        made += [Table(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
+    return made
 
 
 def claims(result) -> Table | None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 from fvsolve.errors import FvsolveError, visible
 from fvsolve.report import described, numerics, trust, worst
+from fvsolve.report.heads import in_units
 from fvsolve.report.legs import Way
 from fvsolve.report.libraries import workbook
-from fvsolve.report.section import Section, in_units, section
+from fvsolve.report.section import Section, section
 from fvsolve.report.tables import Table, is_number
 
 WIDEST = 60  # letters of a column as it opens
@@ -42,7 +42,8 @@ def tables(result, ways: list[Way]) -> list[Table]:
     notes = Table("Warnings", ("kind", "place", "text"), [[one.kind, one.place, one.text] for one in result.warnings])
     versions = numerics.versions(result)
     found = [
-        words, trust.verdicts(result), worst.of_all(result, ways), *worst.by_pipe(result), worst.of_probes(result),
+        words, trust.verdicts(result), *trust.worst(result),
+        worst.of_all(result, ways), *worst.by_pipe(result), worst.of_probes(result),
         *(_along(result, section(result, way)) for way in ways), numerics.cavities(result), numerics.events(result),
         described.fluid(result), described.pipes(result), described.parts(result), numerics.settings(result),
         numerics.ledgers(result), trust.claims(result), numerics.comparisons(result), notes,
@@ -53,14 +54,12 @@ def tables(result, ways: list[Way]) -> list[Table]:
 
 def _along(result, one: Section) -> Table:
     """A long section, a row a cell."""
-    columns: list[Any] = [one.chainage, *(one.along[name] for name in ALONG)]
-    heads, units = ["chainage", *ALONG.values()], [in_units(result, name).unit for name in ("distance", *ALONG)]
-    for line, words in ((one.vapour, "vapour line"), (one.allowed, "class line")):
-        if line is not None:
-            columns, heads, units = [*columns, line], [*heads, words], [*units, in_units(result, "least_head").unit]
-    return Table(
-        f"Section {one.way.name}", heads, [[float(x) for x in row] for row in zip(*columns, strict=True)], units
-    )
+    head = in_units(result, "least_head").unit
+    columns = [one.chainage, one.pipe, *(one.along[name] for name in ALONG), *one.lines.values()]
+    heads = ["chainage", "pipe", *ALONG.values(), *one.lines]
+    units = [in_units(result, "distance").unit, "", *(in_units(result, name).unit for name in ALONG)]
+    rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    return Table(f"Section {one.way.name}", heads, rows, [*units, *[head] * len(one.lines)])
 
 
 def _sheet(book, table: Table, name: str, bold) -> None:

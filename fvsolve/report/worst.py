@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.report.legs import Leg, Way
-from fvsolve.report.section import in_units
+from fvsolve.case.routes import Leg
+from fvsolve.report.heads import in_units
+from fvsolve.report.legs import Way
 from fvsolve.report.tables import Table
 
 FIRST = 10  # rows of a ranking on the page
@@ -23,7 +24,7 @@ def of_all(result, ways: list[Way]) -> Table | None:
     if not envelope:
         return None
     legs = {leg.pipe: leg for way in ways for leg in way.legs}
-    if len(ways) > 1 or all(leg.begins == 0.0 and not leg.backwards for leg in legs.values()):
+    if len(ways) > 1 or all(leg.begin == 0.0 and not leg.backwards for leg in legs.values()):
         legs = {}  # the chainage says nothing more, or not of which section
     rows = []
     for name, words, most, when in EXTREMES:
@@ -31,7 +32,7 @@ def of_all(result, ways: list[Way]) -> Table | None:
         pipes = list(ends)
         pipe = pipes[int(most([envelope[one][name][ends[one]] for one in pipes]))]
         arrays, k = envelope[pipe], ends[pipe]
-        chainage = [_chainage(legs[pipe], arrays["distance"][k])] if legs else []
+        chainage = [_chainage(result, legs.get(pipe), arrays["distance"][k])] if legs else []
         rows.append([words, float(arrays[name][k]), in_units(result, name).unit, pipe, float(arrays["distance"][k]),
                      *chainage, float(arrays["elevation"][k]), float(arrays[when][k])])  # fmt: skip
     units = [in_units(result, one).unit for one in ("distance", *["distance"] * bool(legs), "elevation", "t_greatest")]
@@ -67,6 +68,7 @@ def of_probes(result) -> Table | None:
                  more="in summary.json and in the workbook (--xlsx)") if rows else None  # fmt: skip
 
 
-def _chainage(leg: Leg, distance: float) -> float:
-    """Chainage of a distance from the start of a pipe."""
-    return float(leg.begins + (leg.length - distance if leg.backwards else distance))
+def _chainage(result, leg: Leg | None, distance: float) -> float | None:
+    """Chainage of a distance from the start of a pipe; None of a pipe that is on no section."""
+    shown = in_units(result, "distance")
+    return None if leg is None else float(shown.from_si(leg.chainage(shown.to_si(distance))))

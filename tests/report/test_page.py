@@ -20,6 +20,10 @@ from fvsolve.run.result import Result
 
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
 
+VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "elevation": 0.0, "time": 1.25,
+           "bound": "greatest", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
+           "quantity": "gauge_pressure", "until": 3.0, "worst": []}  # fmt: skip
+
 
 class Read(HTMLParser):
     """Tags with attributes, words outside of scripts, and what each script holds."""
@@ -97,8 +101,7 @@ def test_the_peak_of_a_million_rows_is_in_the_page_to_the_last_bit(closure):
 
 
 def test_words_of_a_case_are_data_and_never_markup(closure):
-    verdict = {"name": WICKED, "ok": False, "place": "main", "chainage": 9.0, "elevation": 0.0, "time": 1.2,
-               "value": 9.0, "limit": 6.0, "margin": -3.0, "unit": "bar"}  # fmt: skip
+    verdict = VERDICT | {"name": WICKED}
     warning = {"kind": "range", "place": "x", "key": None, "value": None, "limit": None, "ok": True, "text": WICKED}
     found = read(changed(closure, verdicts=[verdict], warnings=[warning]))
     assert [attributes.get("type") for tag, attributes in found.tags if tag == "script"] == [
@@ -165,12 +168,13 @@ def test_marks_and_warnings_that_spoil_numbers_stand_at_the_top(closure):
 
 
 def test_verdicts_stand_first_those_that_fail_before_others(closure):
-    one = {"place": "main", "chainage": 480.0, "elevation": 3.0, "time": 1.25, "unit": "bar"}
-    verdicts = [one | {"name": "vacuum", "ok": True, "value": 0.5, "limit": 0.2, "margin": 0.3},
-                one | {"name": "class", "ok": False, "value": 13.5, "limit": 10.0, "margin": -3.5}]  # fmt: skip
+    holds = {"name": "vacuum", "ok": True, "value": 0.5, "limit": 0.2, "margin": 0.3, "bound": "least"}
+    verdicts = [VERDICT | holds, VERDICT]
     text = read(changed(closure, verdicts=verdicts)).text
-    assert "1 of 2 limits does not hold. class" in text and "FAILS 13.5" in text
+    assert "1 of 2 limits does not hold. class" in text and "FAILS gauge pressure 13.5 at most 10" in text
     assert text.index("FAILS") < text.index("vacuum") < text.index("Worst of all pipes")
+    early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], ok=False)).text
+    assert "Whether the limits hold is open" in early and "FAILS" not in early
 
 
 def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):

@@ -32,7 +32,7 @@ def test_sections_are_the_longest_ways_and_run_down_the_head(fork):
     found = ways(fork)
     assert [[leg.pipe for leg in way.legs] for way in found] == [["first", "second", "third"], ["branch", "beside"]]
     longest = found[0]
-    assert [(leg.begins, leg.backwards) for leg in longest.legs] == [(0.0, False), (400.0, True), (700.0, False)]
+    assert [(leg.begin, leg.backwards) for leg in longest.legs] == [(0.0, False), (400.0, True), (700.0, False)]
     assert longest.places == [("high", 0.0), ("a", 400.0), ("b", 700.0), ("low", 1200.0)]
 
 
