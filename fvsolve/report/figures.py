@@ -27,9 +27,9 @@ LONGEST = 22  # letters over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
 
-def section_figure(one: Section, moving: Motion | None, unit: str, along: str) -> dict[str, Any]:
+def section_figure(one: Section, moving: Motion | None, unit: str, along: str, bins: int) -> dict[str, Any]:
     """A long section: heads, pipe, vapour and class line, spans where liquid parted, devices; the line that moves."""
-    k = one.picked
+    k = one.picked(bins)
     x, lines = numbers(one.chainage[k], "f4"), {name: numbers(values[k], "f4") for name, values in one.along.items()}
     data = [
         _line("greatest head", x, lines["greatest_head"], HIGH, width=2),

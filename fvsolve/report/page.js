@@ -64,7 +64,7 @@
   }
 
   // Paper has its own sizes; the moving line stays on the screen.
-  const PAPER = 680, TALL = 0.77;
+  const PAPER = 680, TALL = { section: 0.85, history: 0.77 };
   const heights = Object.fromEntries(Object.entries(figures).map(([id, one]) => [id, one.layout.height]));
   const moving = (id, seen) => {
     if (figures[id].moving) Plotly.restyle(chart(id), { visible: seen }, [figures[id].moving.trace]);
@@ -72,7 +72,7 @@
   addEventListener("beforeprint", () => {
     for (const id of Object.keys(figures)) {
       moving(id, false);
-      Plotly.relayout(chart(id), { width: PAPER, height: TALL * heights[id], autosize: false });
+      Plotly.relayout(chart(id), { width: PAPER, height: TALL[id.split("-")[0]] * heights[id], autosize: false });
     }
   });
   addEventListener("afterprint", () => {

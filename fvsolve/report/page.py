@@ -15,10 +15,12 @@ from fvsolve.report.histories import chosen, panels
 from fvsolve.report.legs import Way
 from fvsolve.report.libraries import charts, template
 from fvsolve.report.motion import motions
-from fvsolve.report.section import Section, section
+from fvsolve.report.section import BINS, Section, section
 from fvsolve.report.tables import Table, worded
 
 HERE = Path(__file__).parent
+SHARED = 900  # bins of all sections together
+WARNINGS = 40  # on the page; all are in summary.json
 
 
 def page(result, ways: list[Way]) -> str:
@@ -37,7 +39,7 @@ def page(result, ways: list[Way]) -> str:
         "model": _there([described.fluid(result), described.pipes(result), described.parts(result)]),
         "numbers": _there([numerics.settings(result), numerics.ledgers(result), trust.claims(result),
                            numerics.comparisons(result)]),
-        "told": [one.text for one in result.warnings if one.ok], "happened": _there([numerics.cavities(result),
+        "told": _cut([one.text for one in result.warnings if one.ok]), "happened": _there([numerics.cavities(result),
                                                                                      numerics.events(result)]),
         "versions": numerics.versions(result),
     }  # fmt: skip
@@ -59,10 +61,10 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
     """What the page says of each section; its figure goes into `figures`."""
     moving = motions(result, [one.way for one in sections])
     height, along = in_units(result, "greatest_head").unit, in_units(result, "distance").unit
-    told = []
+    told, bins = [], min(BINS, SHARED // max(len(sections), 1))
     for k, one in enumerate(sections):
         line = moving[k] if moving else None
-        figures[f"section-{k}"] = section_figure(one, line, height, along)
+        figures[f"section-{k}"] = section_figure(one, line, height, along, bins)
         told.append({"id": f"section-{k}", "name": visible(one.way.name),
                      "length": f"{worded(in_units(result, 'distance').from_si(one.way.length))} {along}",
                      "frames": 0 if line is None else len(line.times), "pipes": len(one.way.legs),
@@ -84,3 +86,8 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _there(tables: list[Table | None]) -> list[Table]:
     return [one for one in tables if one is not None and one.rows]
+
+
+def _cut(texts: list[str]) -> list[str]:
+    more = len(texts) - WARNINGS
+    return [visible(one) for one in texts[:WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])

@@ -90,7 +90,7 @@ def _sections(found: list[Way], route: str, others: bool, faults: list[str]) -> 
 
 def _section_figure(result, way: Way):
     one = section(result, way)
-    k, title = one.picked, "\n".join(filter(None, [result.summary["title"], way.name]))
+    k, title = one.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
         one.chainage[k], {name: values[k] for name, values in one.along.items()}, result.summary["envelope_units"],
         {name: line[k] for name, line in one.lines.items()}, one.parted, one.beyond,

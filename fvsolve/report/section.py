@@ -16,7 +16,7 @@ from fvsolve.report.limits import limit_lines
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
 APART = 0.035  # of the length: names nearer to each other than this would cover each other
-BINS = 150  # of a long line: of each the greatest and the least head and elevation stand, and where
+BINS = 150  # of a long line at most: of each the greatest and the least head and elevation stand, and where
 
 
 class Device(NamedTuple):
@@ -45,13 +45,12 @@ class Section:
     beyond: list[tuple[float, float, str]]
     devices: list[Device]
 
-    @property
-    def picked(self) -> np.ndarray:
+    def picked(self, bins: int = BINS) -> np.ndarray:
         """Numbers of the points to be drawn: all, or of a long line the extremes of each bin."""
         n = len(self.chainage)
-        if n <= 2 * BINS:
+        if n <= 4 * bins:
             return np.arange(n)
-        edges = np.linspace(0, n, BINS + 1).astype(int)
+        edges = np.linspace(0, n, bins + 1).astype(int)
         most = [
             ("greatest_head", np.argmax),
             ("least_head", np.argmin),

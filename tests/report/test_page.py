@@ -100,6 +100,16 @@ def test_the_peak_of_a_million_rows_is_in_the_page_to_the_last_bit(closure):
         assert t[v.argmax()] == table[table[:, k].argmax(), 0] and t[v.argmin()] == table[table[:, k].argmin(), 0]
 
 
+def test_a_report_of_many_long_sections_probes_and_frames_stays_below_six_megabytes(tmp_path):
+    case = line(0.02, fields=100)
+    case["links"]["main"]["cells"] = 4000
+    case["output"] |= {"every": 1e-5, "probes": [f"main.head@{k / 200}" for k in range(200)]}
+    found = fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    (way,) = ways(found)
+    text = page(found, [way] * 40)
+    assert 5e6 < len(text.encode()) < 6e6 and "152 probes that swing less are not drawn" in text
+
+
 def test_words_of_a_case_are_data_and_never_markup(closure):
     verdict = VERDICT | {"name": WICKED}
     warning = {"kind": "range", "place": "x", "key": None, "value": None, "limit": None, "ok": True, "text": WICKED}
