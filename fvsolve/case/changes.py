@@ -10,6 +10,7 @@ from fvsolve.case.case import Case
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys
 from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import TOP
+from fvsolve.case.placing import own_keys
 from fvsolve.case.raw import dotted
 from fvsolve.case.routes import Route
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
@@ -54,7 +55,8 @@ def classed(case: Case, keys: tuple[Any, ...]) -> str:
 def declared(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
     """What a key may be, as its part declares it; of a key below one that says all, what that one may be."""
     found: Value | None = Keys(known(raw))
-    for key in keys:
+    keys = own_keys(raw, keys)
+    for key in (*keys[:2], *keys[4:]) if keys[2:3] == ("pieces",) else keys:
         outer = found
         try:
             found = outer.below(key)

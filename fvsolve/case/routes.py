@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -55,6 +56,19 @@ class Leg:
     def chainage(self, distance: Any) -> Any:
         """Of places at distances from the pipe's `from` end [m]."""
         return self.end - distance if self.backwards else self.begin + distance
+
+
+def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
+    """A route with the pieces of cut pipes in their place, in the order in which it runs through them."""
+    cut = [name for name in route.pipes if name in pieces]
+    options = []
+    for turned in itertools.product((1, -1), repeat=len(cut)):
+        ways_of = dict(zip(cut, turned, strict=True))
+        whole = [pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes]
+        options.append(route.model_copy(update={"pipes": tuple(itertools.chain(*whole))}))
+        if not cut or (all(pipe in links for pipe in options[-1].pipes) and broken(options[-1], links) is None):
+            return options[-1]
+    return options[0]
 
 
 def misfits(routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any]) -> Iterator[tuple]:
