@@ -1,7 +1,7 @@
 """Which pipes make a long section, and which way round. Knows the network of a case; draws nothing.
 
 The one place that chooses: the routes of the case, then the longest ways through pipes on none of them that meet end to
-end, each pipe in one.
+end, or at the two junctions of a link without length, each pipe in one.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 from typing import NamedTuple
 
-from fvsolve.case.routes import Leg
+from fvsolve.case.routes import Leg, joined
 from fvsolve.case.routes import legs as legs_of
 
 MOST = 6  # sections of a run, unless it has more routes
@@ -43,8 +43,10 @@ def ways(result) -> list[Way]:
     links = result.case.links
     found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
     strung = {leg.pipe for way in found for leg in way.legs}
-    pipes = {name: (links[name].from_, links[name].to, links[name].length)
-             for name in result.envelope if name in links and name not in strung}  # fmt: skip
+    one = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
+    free = [name for name in result.envelope if name in links and name not in strung]
+    pipes = {name: (*(one.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
+             for name in free}  # fmt: skip
     others = []
     while pipes and len(found) + len(others) < MOST:
         chain = _longest(pipes)
@@ -52,6 +54,11 @@ def ways(result) -> list[Way]:
             del pipes[pipe]
         others.append(_chained(chain, result))
     return [*found, *sorted(others, key=lambda one: -one.length)]
+
+
+def _in_line(link, case) -> bool:
+    """Whether a section may run through a link: it has no length, and joins two junctions."""
+    return all(getattr(case.nodes.get(place), "kind", "") == "junction" for place in link.ports.values())
 
 
 def _chained(chain: list[tuple[str, bool, float]], result) -> Way:
@@ -95,8 +102,10 @@ def _longest(pipes: dict) -> list[tuple[str, bool, float]]:
     for name, (a, b, length) in pipes.items():
         around.setdefault(a, []).append((b, name, False, length))
         around.setdefault(b, []).append((a, name, True, length))
-    start = pipes[max(pipes, key=lambda name: pipes[name][2])][0]
-    far = _farthest(around, start)[0]
+    longest = max(pipes, key=lambda name: pipes[name][2])
+    if pipes[longest][0] == pipes[longest][1]:  # its ends are joined by a link without length
+        return [(longest, False, pipes[longest][2])]
+    far = _farthest(around, pipes[longest][0])[0]
     end, came = _farthest(around, far)
     chain = []
     while end != far:

@@ -13,8 +13,7 @@ CHAINAGE, ELEVATION = [0.0, 130.0, 300.0, 500.0], [0.0, 42.0, 5.0, 20.0]
 SHUT = 0.3
 
 
-@pytest.fixture(scope="module")
-def main(tmp_path_factory):
+def over_a_hill(**more) -> dict:
     """A lake, a pipe over a summit, an open valve, a pipe that is drawn the other way round; a flow that stops."""
     nodes = {"lake": lake(100.0, elevation=0.0), "a": junction(elevation=20.0), "b": junction(elevation=20.0),
              "gate": junction(step(SHUT, 0.03, 0.0), elevation=30.0)}  # fmt: skip
@@ -22,11 +21,16 @@ def main(tmp_path_factory):
              "last": pipe("gate", "b", 300.0, 0.3, 1000.0, 12)}  # fmt: skip
     links["hill"] |= {"profile": {"chainage": CHAINAGE, "elevation": ELEVATION}}
     del links["hill"]["length"]
+    case = scene(nodes, links, 1.5, {}, ["gate.head"], **more)
+    case["output"] |= {"fields": 5}
+    return case
+
+
+@pytest.fixture(scope="module")
+def main(tmp_path_factory):
     limits = {"class": {"on": "line", "quantity": "gauge_pressure", "greatest": "10 bar"},
               "surge": {"on": "last", "quantity": "pressure_head", "greatest": 400.0}}  # fmt: skip
-    case = scene(nodes, links, 1.5, {}, ["gate.head"], routes={"line": {"pipes": ["hill", "last"], "start": "2 km"}},
-                 limits=limits)  # fmt: skip
-    case["output"] |= {"fields": 5}
+    case = over_a_hill(routes={"line": {"pipes": ["hill", "last"], "start": "2 km"}}, limits=limits)
     return fvsolve.run(case, out=tmp_path_factory.mktemp("runs") / "main", pictures=False)
 
 
@@ -39,6 +43,12 @@ def test_a_route_is_the_section_and_its_chainage_runs_through_what_stands_betwee
     line = np.interp(one.chainage, [*(2000.0 + np.array(CHAINAGE)), 2800.0], [*ELEVATION, 30.0])
     assert one.along["elevation"] == pytest.approx(line)
     assert [name for _, name, _ in one.labels()] == ["lake", "valve", "gate"]
+
+
+def test_without_a_route_a_section_runs_through_a_link_between_junctions(main, tmp_path):
+    (way,) = ways(fvsolve.run(over_a_hill(), out=tmp_path / "run", pictures=False))
+    assert (way.name, way.begin, way.end) == ("hill \u2013 last", 0.0, 800.0)
+    assert [(leg.pipe, leg.backwards) for leg in way.legs] == [("hill", False), ("last", True)]
 
 
 def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
