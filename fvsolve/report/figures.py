@@ -91,8 +91,8 @@ def history_figure(panel: Panel, time_unit: str, doubt: float | None) -> dict[st
 
 
 def as_it_stands(text: str) -> str:
-    """Words of a case for plotly.js, none of them markup."""
-    return html.escape(visible(str(text)), quote=False)
+    """Words of a case for plotly.js, none of them markup, and no dollar the begin of a formula."""
+    return html.escape(visible(str(text)), quote=False).replace("$", "&#36;")
 
 
 def numbers(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:

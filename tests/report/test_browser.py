@@ -5,6 +5,7 @@ from truth import browser
 from truth.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
+from fvsolve.report.figures import as_it_stands
 from fvsolve.report.report import write_report
 
 TITLE = "</script><b>A & B</b> costs $5 and $6"
@@ -60,6 +61,10 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     assert "t = 3 s" in page.inner_text(".player output")
     page.evaluate("Plotly.relayout('history-0', {'xaxis.range[0]': 0.4, 'xaxis.range[1]': 1.2})")
     until(page, "document.querySelector('#history-1').layout.xaxis.range[1] == 1.2")
+    name = "a <b>bold</b> & $x$ &lt; </script>"
+    page.evaluate("name => Plotly.restyle('history-1', {name: name}, [0])", as_it_stands(name))
+    page.evaluate("Plotly.relayout('history-1', {showlegend: true})")
+    assert page.locator("#history-1 .legendtext").all_text_contents() == [name]
     assert said == [] and asked == [report.as_uri()]
 
 
