@@ -24,6 +24,8 @@ def settings(result) -> Table:
     rows += [["method", "; ".join(_method(one) for one in said["methods"])], ["step", "; ".join(given) or "by default"],
              ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
              ["seconds of stepping", said["seconds"]]]  # fmt: skip
+    if "resolution" in said:
+        rows.append(["errors of peaks (\u00b1)", said["resolution"]["words"]])
     return Table("Method", ("", ""), [[key, worded(value)] for key, value in rows])
 
 

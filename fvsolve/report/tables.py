@@ -13,6 +13,7 @@ DIGITS = 5  # of the greatest number of a column
 DECIMALS = 6  # behind a point, unless its least number needs more
 MOST = 7  # digits behind the first of a column whose numbers all have the same decimals
 ROWS = 60  # of a table on the page, unless it says how many (`most`)
+ERROR = "\u00b1"  # the header of what is known to two digits
 NARROW, FIGURE, POINT = "\u202f", "\u2007", "\u2008"  # spaces between thousands, as wide as a digit, as a point
 
 
@@ -54,6 +55,9 @@ class Table:
     def words(self) -> list[list[str]]:
         """The rows that the page shows, in words."""
         shown = self.rows[: self.most]
+        rough = [k for k, head in enumerate(self.headers) if head == ERROR]
+        shown = [[float(f"{one:.2g}") if k in rough and is_number(one) else one for k, one in enumerate(row)]
+                 for row in shown]  # fmt: skip
         columns = [aligned([row[k] for row in shown], k in self.loose) for k in range(len(self.headers))]
         return [list(row) for row in zip(*columns, strict=True)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fvsolve.output.column import column
-from fvsolve.report.tables import Table
+from fvsolve.report.tables import ERROR, Table, worded
 
 HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
 BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
@@ -63,15 +63,23 @@ def verdict(result) -> Word:
     if failed:
         many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
         return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
-    if OPEN in states:
-        return Word("doubt", "Whether the limits hold is open,", "as the run is not sound; no limit was passed in it.")
+    unsure = [one.name for one, how in zip(verdicts, states, strict=True) if how == OPEN]
+    if unsure:
+        why = "their margins are smaller than the error of the numbers" if result.ok else "the run is not sound"
+        return Word("doubt", f"Whether {'limits hold' if len(unsure) > 1 else 'a limit holds'} is open.",
+                    f"{', '.join(unsure)}: {why}.")  # fmt: skip
     every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
     return Word("good", f"{every}.", "") if sound(result) else Word("doubt", f"{every}, as far as to be trusted.", "")
 
 
 def state(one) -> str:
-    """What is to be said of a verdict: open where no place is beyond the limit in a run that is not ok."""
-    return HOLDS if one.ok else FAILS if one.margin is None or one.margin < 0.0 else OPEN
+    """What is to be said of a verdict: open where the margin is smaller than the error of the value, and where no place
+    is beyond the limit in a run that is not ok."""
+    if one.margin is None:
+        return FAILS
+    if one.error is not None and abs(one.margin) < one.error:
+        return OPEN
+    return HOLDS if one.ok else FAILS if one.margin < 0.0 else OPEN
 
 
 def verdicts(result) -> Table | None:
@@ -79,14 +87,17 @@ def verdicts(result) -> Table | None:
     order = (FAILS, OPEN, HOLDS)
     found = sorted(result.verdicts, key=lambda one: order.index(state(one)))
     length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
-    rows = [[one.name, state(one), one.quantity.replace("_", " "), one.value, BOUNDS[one.bound], one.limit, one.margin,
-             one.unit, one.place, _in(length, one.chainage), _in(height, one.elevation), _in(time, one.time)]
-            for one in found]  # fmt: skip
-    heads = ("limit", "verdict", "quantity", "value", "", "limit", "margin", "unit", "worst at")
+    asked = any(one.error is not None for one in found)
+    rows = []
+    for one in found:
+        asks = f"{one.quantity.replace('_', ' ')} {BOUNDS[one.bound]} {worded(one.limit)} {one.unit}"
+        rows.append([one.name, asks, state(one), one.value, *[one.error] * asked, one.margin, one.unit, one.place,
+                     _in(length, one.chainage), _in(height, one.elevation), _in(time, one.time)])  # fmt: skip
+    heads = ("limit", "asks for", "verdict", "value", *[ERROR] * asked, "margin", "unit", "worst at")
     heads += ("chainage", "elevation", "time")
     bad = frozenset(k for k, one in enumerate(found) if state(one) == FAILS)
-    units = ("",) * 9 + (length.unit, height.unit, time.unit)
-    return Table("Limits", heads, rows, units, bad, frozenset({3, 5, 6})) if rows else None
+    units = ("",) * (7 + asked) + (length.unit, height.unit, time.unit)
+    return Table("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * asked})) if rows else None
 
 
 def worst(result) -> list[Table]:

@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.case.routes import Leg
 from fvsolve.report.heads import in_units
 from fvsolve.report.legs import Way
-from fvsolve.report.tables import Table
+from fvsolve.report.tables import ERROR, Table
 
 FIRST = 10  # rows of a ranking on the page
 EXTREMES = (  # quantity, its words, which end of it, when
@@ -60,11 +60,16 @@ def _ranked(result, name: str, words: str, most, when: str) -> Table:
 
 
 def of_probes(result) -> Table | None:
-    """Least and greatest of each probe over all accepted steps, and when."""
-    rows = [[name, result.units[name], one.least, one.t_least, one.greatest, one.t_greatest]
-            for name, one in result.extremes.items()]  # fmt: skip
-    heads, units = ("probe", "unit", "least", "time", "greatest", "time"), ("", "", "", "s", "", "s")
-    return Table("Probes", heads, rows, units, loose=frozenset({2, 4}),
+    """Least and greatest of each probe over all accepted steps, and when; how far off where it was asked for."""
+    peaks, rows = result.summary.get("peaks", {}), []
+    for name, one in result.extremes.items():
+        off = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
+        rows.append([name, result.units[name], one.least, *off["least"], one.t_least, one.greatest, *off["greatest"],
+                     one.t_greatest])  # fmt: skip
+    heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
+    units = ["s" if column == "time" else "" for column in heads]
+    loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
+    return Table("Probes", ("probe", "unit", *heads), rows, ("", "", *units), loose=loose,
                  more="in summary.json and in the workbook (--xlsx)") if rows else None  # fmt: skip
 
 

@@ -22,7 +22,7 @@ WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- 
 
 VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "elevation": 0.0, "time": 1.25,
            "bound": "greatest", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
-           "quantity": "gauge_pressure", "until": 3.0, "worst": []}  # fmt: skip
+           "quantity": "gauge_pressure", "until": 3.0, "error": None, "worst": []}  # fmt: skip
 
 
 class Read(HTMLParser):
@@ -181,10 +181,12 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
     holds = {"name": "vacuum", "ok": True, "value": 0.5, "limit": 0.2, "margin": 0.3, "bound": "least"}
     verdicts = [VERDICT | holds, VERDICT]
     text = read(changed(closure, verdicts=verdicts)).text
-    assert "1 of 2 limits does not hold. class" in text and "FAILS gauge pressure 13.5 at most 10" in text
+    assert "1 of 2 limits does not hold. class" in text and "class gauge pressure at most 10 bar FAILS 13.5" in text
     assert text.index("FAILS") < text.index("vacuum") < text.index("Worst of all pipes")
     early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], ok=False)).text
-    assert "Whether the limits hold is open" in early and "FAILS" not in early
+    assert "Whether a limit holds is open. vacuum: the run is not sound." in early and "FAILS" not in early
+    unsure = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
+    assert "open. class: their margins are smaller than the error" in unsure and "open 13.5 4" in unsure
 
 
 def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):
