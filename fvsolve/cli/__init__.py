@@ -16,6 +16,7 @@ COMMANDS = (  # files that add commands to the application: those of one command
     "design",
     "energy",
     "failure_map",
+    "handed",
     "linearise",
     "order",
     "response",
