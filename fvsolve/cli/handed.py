@@ -12,11 +12,11 @@ from fvsolve.cli.app import app
 
 @app.command()
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/report.html")] = None,
+    directory: Annotated[Path, typer.Argument(metavar="RUN_OR_STUDY", help="directory of a run or a study")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="default report.html there")] = None,
     xlsx: Annotated[bool, typer.Option("--xlsx", help="the tables too, as a workbook beside it")] = False,
 ) -> None:
-    """One offline HTML page of a run: verdicts, long sections, histories, model, numerics."""
+    """One offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
     from fvsolve.report.report import write_report
 
     for path in write_report(directory, out, xlsx):
