@@ -12,14 +12,14 @@ from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import optimise
 
-LENGTH, DIAMETER, TIME, SUPPLY = 400.0, 0.3, 4.0, 6e5
+LENGTH, DIAMETER, TIME, SUPPLY = 100.0, 0.3, 4.0, 1.2e5
 
 
 def column() -> dict:
     """A frictionless rigid column that a valve stops within TIME."""
     nodes = {"lake": reservoir(SUPPLY), "gate": junction(), "air": reservoir(AMBIENT)}
     links = {"main": {"type": "rigid-column", "from": "lake", "to": "gate", "length": LENGTH, "diameter": DIAMETER},
-             "tap": valve("gate", "air", 0.05 * area(DIAMETER), ramp(0.5, TIME, 1.0, 0.0))}  # fmt: skip
+             "tap": valve("gate", "air", 0.5 * area(DIAMETER), ramp(0.5, TIME, 1.0, 0.0))}  # fmt: skip
     return scene(nodes, links, 5.0, {"method": "rk4", "step": 0.01}, ["gate.pressure", "main.flow"])
 
 
