@@ -23,7 +23,7 @@ from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.node import Rider
-from fvsolve.parts.pipe.part import Wall
+from fvsolve.parts.pipe.wall import Lining, Wall
 from fvsolve.parts.table import Table, plain
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
 from fvsolve.parts.valve.part import Sized
@@ -31,8 +31,8 @@ from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
-    "wall": Wall, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec,
-    "numerics": Numerics, "output": Output, "joint": Joint, "attitude": Attitude,
+    "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar,
+    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # whose keys -> the part that has them in full
 SHARED = {Node: "", Rider: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}

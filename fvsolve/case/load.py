@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, bodies, check, scalars, shipped, size, text
+from fvsolve.case import basins, bodies, check, defaults, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.moved import moved
@@ -50,7 +50,7 @@ GROUPS = {
 ALONE = ("basin", "body")  # nodes that need no link
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "scalars", "numerics", "output", "expect", "compare", "exact",
+    "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
@@ -119,8 +119,11 @@ class _Reader:
         top = self.top()
         if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
             self.before = None  # all that is gauge is other
+        if self.before is not None and self.before.raw.get("defaults") is not self.raw.table.get("defaults"):
+            self.before = None  # every pipe may be other
         fluid, properties = self.kept(("fluid",), self.raw.table.get("fluid"), self.fluid)
         self.setting.signals = self.group("signals")
+        self.add(defaults.misfits(self.raw.table, self.setting))
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
         meshes = self.meshes(parts["nodes"])
@@ -231,6 +234,7 @@ class _Reader:
     def fault(self, keys: tuple, message: str) -> None:
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
+        keys = defaults.place(self.raw.table, keys)
         place = text.path(keys)
         if self.raw.is_override(keys):
             self.faults.append(Fault(place, message, override=True))
@@ -351,7 +355,7 @@ class _Reader:
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
         """A part of a kind, as its table has it."""
-        rest = {key: value for key, value in given.items() if key != "type"}
+        rest = {key: value for key, value in defaults.filled(self.raw.table, given).items() if key != "type"}
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from fvsolve.case.basins import behind, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
+from fvsolve.parts.pipe.materials import materials
+from fvsolve.parts.pipe.wall import Wall, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.tableau import method_named
@@ -56,7 +58,7 @@ def checks(model) -> dict[str, Any]:
             "friction_factor": float(rubbed(loss, link, rho, velocity) / dynamic) if rubs else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
             **model.steady["lines"][mesh.name],
-            **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}),
+            **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}), **wall_facts(link),
         }  # fmt: skip
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
@@ -74,6 +76,20 @@ def checks(model) -> dict[str, Any]:
         "moving": model.steady["moving"],
         "warnings": [one.plain() for one in (*model.warnings, *dear(model, steps, set_by))],
     }  # fmt: skip
+
+
+def wall_facts(link) -> dict[str, Any]:
+    """What a pipe's wall is and whose figures these are; nothing of one that says wall or wave_speed alone."""
+    found = {
+        key: one for key in ("material", "allowable_pressure", "source") if (one := getattr(link, key)) is not None
+    }
+    if link.material is not None:
+        known = vars(link.wall) | {"roughness": link.friction.roughness} if isinstance(link.wall, Wall) else {}
+        unread = materials()[link.material].unread
+        found["unread"] = [key for key in unread if key != "density" and known.get(key) is None]
+    if link.restraint is not None and isinstance(link.wall, Wall):
+        found["restraint_factor"] = restraint_factor(link.restraint, link.diameter, link.wall)
+    return found
 
 
 def stands(pose) -> dict[str, float]:

@@ -5,52 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
+from pydantic import Field
+
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.conduit import Conduit
+from fvsolve.parts.pipe.catalogue import OfCatalogue, from_catalogue
+from fvsolve.parts.pipe.wall import MODULI, Lining, Restraint, Wall, WallOrStiff, wants_poisson
 from fvsolve.parts.scalar import Carried
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import COUNTED, Choice, Number, Quantity, Setting, Usual, Value, Whole, between, positive
+from fvsolve.parts.table import Inside
+from fvsolve.parts.value import (
+    COUNTED,
+    VALUE,
+    Choice,
+    Misfit,
+    Number,
+    Quantity,
+    Setting,
+    Text,
+    Usual,
+    Whole,
+    between,
+    positive,
+)
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
 LINES = ("cells", "delay", "auto")  # how waves in a pipe are followed
 
 
-MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
 WAVES = Usual(30.0, 2000.0, "soft hoses to stiff pipes")  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
 SOFT = (  # modulus [Pa], wall over bore below which no pipe of it stands: of the plastics SDR 26 is the thinnest
     (2e8, 0.1, "softer than any plastic, as rubber is"),
     (4e8, 0.04, "soft as low-density polyethylene"),
 )
-
-
-class Wall(Table):
-    """An elastic wall: 1/K = 1/beta + diameter / (youngs_modulus thickness), wave speed sqrt(K / rho)."""
-
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI, COUNTED)]
-    thickness: Annotated[
-        float, Quantity("length", positive, "of the wall [m]", Usual(1e-6, 2.0, "foils to lined rock"), COUNTED)
-    ]
-
-
-class WallOrStiff(Value):
-    """The text "stiff" or the table of an elastic wall."""
-
-    about = 'elastic or stiff; "stiff" if left out'
-    takes = '`"stiff"`, or `{ youngs_modulus, thickness }`, Pa and m'
-    changes = COUNTED
-
-    def read(self, given: Any, setting: Setting) -> Wall | str:
-        if isinstance(given, Wall) or given == "stiff":
-            return given
-        if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is no wall; wanted "stiff" or {{ youngs_modulus, thickness }}')
-        return Wall.model_validate(given, context=setting)
-
-    def below(self, key: str) -> Value | None:
-        return Wall.values()[key]
-
-    def json(self) -> dict[str, Any]:
-        return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
 
 
 class Pipe(Conduit, kind="pipe"):
@@ -62,7 +49,10 @@ class Pipe(Conduit, kind="pipe"):
     """
 
     own_scalars: ClassVar[str] = "along"
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.alternatives, ("wave_speed", "wall"))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *Conduit.alternatives, ("wave_speed", "wall"), ("diameter", "class"), ("schedule", "class"),
+        ("wave_speed", "restraint"),
+    )  # fmt: skip
     along: ClassVar[dict[str, str]] = {
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head", "velocity": "velocity",
         "flow": "flow",
@@ -70,6 +60,18 @@ class Pipe(Conduit, kind="pipe"):
 
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
+    material: Annotated[str | None, OfCatalogue()] = None
+    class_: Annotated[
+        str | None,
+        Text('"K9", "C40", "SDR11", "PN16" or "schedule 40" of the nominal size: bore, wall, what it bears', COUNTED),
+        Field(alias="class"),
+    ] = None
+    restraint: Annotated[str | float | None, Restraint()] = None
+    lining: Annotated[Lining | None, Inside(Lining, "a second layer within the wall; diameter is within it")] = None
+    allowable_pressure: Annotated[
+        float | None, Quantity("gauge_pressure", positive, "that its class bears, above ambient [Pa]", changes=VALUE)
+    ] = None
+    source: Annotated[str | None, Text("whose figures these are; those of the catalogue if left out", VALUE)] = None
     cells: Annotated[
         int | None,
         Whole(between(1, MOST_CELLS), "finite volumes along it; as many as its travel time over cell_time if left out"),
@@ -84,6 +86,36 @@ class Pipe(Conduit, kind="pipe"):
         ),
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
+
+    @classmethod
+    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+        """Names of the catalogue and of sizes turned into numbers; Misfit where one means nothing."""
+        faults = []
+        try:
+            found = from_catalogue(given)
+        except Misfit as error:
+            faults = error.faults
+            found = {key: one for key, one in given.items() if key not in ("nominal", "schedule", "class")}
+        try:
+            found = super().in_numbers(found, setting)
+        except Misfit as error:
+            faults = faults + error.faults
+        if faults:
+            raise Misfit(faults)
+        return found
+
+    def faults(self, name: str, around: Around) -> Faults:
+        wall = self.wall
+        if not isinstance(wall, Wall):
+            return
+        if wall.poisson_ratio is None and wants_poisson(self.restraint, self.diameter, wall):
+            why = f"no source of that of {self.material} was read" if self.material else "it has none"
+            text = (
+                f"{show(self.restraint)} wants Poisson's ratio of the wall, and {why}; give it in wall as poisson_ratio"
+            )
+            yield ("restraint",), text
+        if wall.creep is not None and self.lining is not None:
+            yield ("wall", "creep"), "is not known of a lined wall; keep one of creep and lining"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from super().unusual()

@@ -1,0 +1,177 @@
+"""The wall of a pipe: how far it gives way to pressure, at once and in time. Knows no fluid and no file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import COUNTED, SHAPE, Misfit, Number, Quantity, Setting, Usual, Value, between, positive
+from fvsolve.units import parse, show
+
+MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
+THICKNESS = Usual(1e-6, 2.0, "foils to lined rock")
+THIN = 25.0  # bores over walls from which on a wall counts as thin, Wylie, Streeter and Suo 1993
+RESTRAINTS = ("joints", "upstream", "anchored")
+POISSON = "poisson_ratio"
+
+
+@dataclass(frozen=True)
+class Creep:
+    """Kelvin-Voigt elements: strain J (1 - exp(-t / tau)) each under a unit of hoop stress, beside the elastic one.
+
+    compliance : J of each [1/Pa]; time : tau of each [s]
+    """
+
+    compliance: tuple[float, ...]
+    time: tuple[float, ...]
+
+    def table(self) -> dict[str, list[float]]:
+        """What the file would say."""
+        return {"compliance": list(self.compliance), "time": list(self.time)}
+
+
+class Elements(Value):
+    """The table of Kelvin-Voigt elements: as many compliances as times, all positive."""
+
+    about = "what the wall gives way by in time, Kelvin-Voigt elements"
+    takes = "`{ compliance, time }`, lists of 1/Pa and s"
+    changes = SHAPE
+
+    def read(self, given: Any, setting: Setting) -> Creep:
+        if isinstance(given, Creep):
+            return given
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is no table; wanted {{ compliance = [1e-10], time = [0.05] }}, 1/Pa and s")
+        faults: list = [((key,), "unknown key; keys are compliance, time") for key in given if key not in LISTS]
+        found = {}
+        for key in LISTS:
+            try:
+                found[key] = _positives(given[key], LISTS[key])
+            except KeyError:
+                faults.append(((), f"{key} is missing"))
+            except ValueError as error:
+                faults.append(((key,), str(error)))
+        if not faults and len(found["compliance"]) != len(found["time"]):
+            sizes = " and ".join(f"{len(found[key])} of {key}" for key in LISTS)
+            faults.append(((), f"{sizes}; wanted one of each an element"))
+        if faults:
+            raise Misfit(faults)
+        return Creep(**found)
+
+    def below(self, key: str) -> Value | None:
+        if key not in LISTS:
+            raise KeyError(key)
+        return None
+
+    def json(self) -> dict[str, Any]:
+        lists = {key: {"type": "array", "items": {"type": ["number", "string"]}} for key in LISTS}
+        return {"type": "object", "properties": lists, "required": list(LISTS), "additionalProperties": False}
+
+
+LISTS = {"compliance": "number", "time": "time"}
+
+
+def _positives(given: Any, dimension: str) -> tuple[float, ...]:
+    if not isinstance(given, (list, tuple)) or not given:
+        raise ValueError(f"{show(given)} is no list of numbers; wanted one an element")
+    found = tuple(float(parse(one, dimension)) for one in given)
+    for one, value in zip(given, found, strict=True):
+        if not value > 0.0:
+            raise ValueError(f"{show(one)} is out of range; wanted a value above 0")
+    return found
+
+
+class Wall(Table):
+    """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), c of its restraint."""
+
+    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI, COUNTED)]
+    thickness: Annotated[float, Quantity("length", positive, "of the wall [m]", THICKNESS, COUNTED)]
+    poisson_ratio: Annotated[
+        float | None, Number(between(0.0, 0.5), "of the wall's material, for restraint", changes=COUNTED)
+    ] = None
+    creep: Annotated[Creep | None, Elements()] = None
+
+
+class Lining(Table):
+    """A second layer within the wall, such as cement mortar: it shares the hoop strain, E e + E' e' in place of E e."""
+
+    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the lining [Pa]", MODULI, COUNTED)]
+    thickness: Annotated[float, Quantity("length", positive, "of the lining [m]", THICKNESS, COUNTED)]
+
+
+class WallOrStiff(Value):
+    """The text "stiff" or the table of an elastic wall."""
+
+    about = 'elastic or stiff; "stiff" if left out'
+    takes = '`"stiff"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
+    changes = COUNTED
+
+    def read(self, given: Any, setting: Setting) -> Wall | str:
+        if isinstance(given, Wall) or given == "stiff":
+            return given
+        if not isinstance(given, dict):
+            raise ValueError(f'{show(given)} is no wall; wanted "stiff" or {{ youngs_modulus, thickness }}')
+        return Wall.model_validate(given, context=setting)
+
+    def below(self, key: str) -> Value | None:
+        return Wall.values()[key]
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
+
+
+class Restraint(Value):
+    """How a pipe is held along its axis: a word, or the factor itself."""
+
+    about = "how it is held along its axis; 1, a thin wall between expansion joints, if left out"
+    takes = "`joints`, `upstream`, `anchored`, or a number, above 0"
+    changes = COUNTED
+
+    def read(self, given: Any, setting: Setting) -> str | float:
+        if isinstance(given, str):
+            if given in RESTRAINTS:
+                return given
+            raise ValueError(f"no restraint named {show(given)}; wanted one of {', '.join(RESTRAINTS)}, or a number")
+        value = parse(given, "number")
+        positive.check(value, given)
+        return value
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [{"enum": list(RESTRAINTS)}, {"type": "number", "exclusiveMinimum": 0}]}
+
+
+def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> float:
+    """c of the growth of area c D / (E e) dp / p: 1 where nothing is said.
+
+    Thin walls, D/e from 25 on: 1 between expansion joints, 1 - nu/2 held upstream alone, 1 - nu^2 anchored throughout.
+    Thick ones, of Lame's stresses: that times D / (D + e), and 2 (e/D) (1 + nu) more; as in Wylie and Streeter 1993.
+    """
+    if restraint is None:
+        return 1.0
+    if not isinstance(restraint, str):
+        return restraint
+    nu = wall.poisson_ratio or 0.0
+    held = {"joints": 1.0, "upstream": 1.0 - 0.5 * nu, "anchored": 1.0 - nu * nu}[restraint]
+    ratio = wall.thickness / bore
+    if ratio * THIN <= 1.0:
+        return held
+    return held / (1.0 + ratio) + 2.0 * ratio * (1.0 + nu)
+
+
+def wants_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
+    """Whether the factor depends on Poisson's ratio."""
+    return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN > bore)
+
+
+def softness(pipe: Any) -> float:
+    """Growth of a pipe's bore with pressure at once, dA / (A dp) [1/Pa]; 0 of a stiff wall."""
+    wall = pipe.wall
+    if not isinstance(wall, Wall):
+        return 0.0
+    stiffness = wall.youngs_modulus * wall.thickness
+    if pipe.lining is not None:
+        stiffness += pipe.lining.youngs_modulus * pipe.lining.thickness
+    if pipe.restraint is None:
+        return pipe.diameter / stiffness
+    return restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / stiffness
