@@ -26,8 +26,9 @@ def schema() -> dict[str, Any]:
 
 
 def printed(made: dict[str, Any]) -> str:
-    """A schema as text, lists of words or numbers in a line."""
-    return re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", dumps(made, indent=2))
+    """A schema as text, lists of words or numbers in a line, and bare references."""
+    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", dumps(made, indent=2))
+    return re.sub(r'\{\s+("\$ref": "[^"]*")\s+\}', r"{ \1 }", text)
 
 
 def whole() -> dict[str, Any]:
@@ -152,7 +153,7 @@ def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
     made = {}
     for kind, model in defaults.KINDS.items():
         keys = _hoisted(model, definitions)["properties"]
-        own = {key: one for key, one in keys.items() if key not in defaults.OWN}
+        own = {key: _bare(one) for key, one in keys.items() if key not in defaults.OWN}
         made[kind] = {"type": "object", "properties": own, "additionalProperties": False}
     return {"type": "object", "properties": made, "additionalProperties": False}
 

@@ -143,6 +143,10 @@ def _wall(case, one: dict) -> str:
     if "allowable_pressure" in one:
         unit = column("allowable", "gauge_pressure", case)
         said.append(f"bears {_number(_in(unit, one['allowable_pressure']))} {unit.unit}")
+    if "creep" in one:
+        said.append(
+            f"{one['creep']['elements']} elements creep, slow waves run at {one['creep']['slow_speed']:.4g} m/s"
+        )
     if "restraint_factor" in one:
         said.append(f"restraint {one['restraint_factor']:.4g}")
     if "source" in one:

@@ -44,7 +44,7 @@ def checks(model) -> dict[str, Any]:
         for name, row in zip(model.mass_names, model.tables.masses, strict=False)
     }
     bodies = {name: stands(pose) for name, pose in model.case.poses.items()}
-    pipes, remembered = {}, model.steady["unsteady"]
+    pipes, remembered, creeps = {}, model.steady["unsteady"], model.steady["creep"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
@@ -58,7 +58,8 @@ def checks(model) -> dict[str, Any]:
             "friction_factor": float(rubbed(loss, link, rho, velocity) / dynamic) if rubs else None,
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
             **model.steady["lines"][mesh.name],
-            **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}), **wall_facts(link),
+            **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}),
+            **({"creep": creeps[mesh.name]} if mesh.name in creeps else {}), **wall_facts(link),
         }  # fmt: skip
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
@@ -173,7 +174,8 @@ def step_and_reason(model) -> tuple[float | None, str]:
         return None, f"error control, rtol = {numerics.rtol:g}"
     if method_named(numerics.method).explicit:
         own = model.wave_rates * model.tables.pipes["quicker"]
-        own = np.maximum(own, [model.steady["unsteady"].get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
+        for found in (model.steady["unsteady"], model.steady["creep"]):
+            own = np.maximum(own, [found.get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
         rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
     else:  # waves alone: implicit steps cope with the rest
         own, rate = model.wave_rates, model.wave_rate

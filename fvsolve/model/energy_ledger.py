@@ -51,10 +51,10 @@ class Accounts:
         nodes = model.tables.nodes
         for row, (name, place) in zip(nodes, case.places.items(), strict=True):
             self.node(name, place, int(row["kind"]))
-        for pipe in model.pipes:
+        for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
             at = self.take(4)
             self.add("dissipated", pipe.name, "friction", at + 1)
-            self.add("dissipated", pipe.name, "jet", at + 2)
+            self.add("dissipated", pipe.name, "creep" if row["elements"] > 0 else "jet", at + 2)  # never both
             self.hold(pipe.name, "pipe", at + 3, 2)
             self.accounts.append(Account("scheme", pipe.name, "pipe", (at, at + 1, at + 2, at + 3), (1, -1, -1, -1)))
         self.valves()

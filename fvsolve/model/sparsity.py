@@ -65,6 +65,7 @@ class Couplings:
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
             yield from self.remembered(pipe)
+            yield from self.crept(pipe)
         for basin in self.basins:
             yield pattern.inside(basin)
         yield from self.passing()
@@ -320,6 +321,14 @@ class Couplings:
                     yield wave + here, other + here + offset
                 for k in range(pipe["terms"]):
                     yield pipe["memory"] + k * n + here, wave + here + offset
+
+    def crept(self, pipe) -> Iterator[Pairs]:
+        """Walls that creep: waves and elements of a cell on each other."""
+        n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
+        rows = [pipe["y"], pipe["y"] + n, *(pipe["strain"] + k * n for k in range(pipe["elements"]))]
+        for one in rows if pipe["elements"] > 0 else ():
+            for other in rows if one < pipe["y"] + 2 * n and one >= pipe["y"] else rows[:2]:
+                yield one + cells, other + cells
 
     def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
         """(cells of the wave that enters by an end, cells of the one that leaves), nearest first."""

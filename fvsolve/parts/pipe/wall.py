@@ -118,7 +118,9 @@ class WallOrStiff(Value):
         return Wall.values()[key]
 
     def json(self) -> dict[str, Any]:
-        return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
+        made = Wall.model_json_schema()
+        del made["required"]  # a material or a size may say it
+        return {"anyOf": [{"const": "stiff"}, made]}
 
 
 class Restraint(Value):
