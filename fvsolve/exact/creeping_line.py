@@ -12,7 +12,6 @@ import numpy as np
 from fvsolve.exact import laminar_line
 from fvsolve.exact.laminar_line import LINKS, NODES, LineDeviation, of_line
 from fvsolve.exact.solution import ExactStart, Solution
-from fvsolve.parts.pipe.wall import Wall, restraint_factor
 
 __all__ = ["LINKS", "NODES", "misfits", "solution"]
 
@@ -25,7 +24,7 @@ def misfits(case):
         if link is None or keys[2] != "friction" or link.friction.model != "none" or link.minor_loss:
             yield keys, text
     for link, pipe in case.links.items():
-        if not isinstance(pipe.wall, Wall) or pipe.wall.creep is None:
+        if not pipe.yielding:
             yield ("links", link, "wall"), f'the exact solution "{name}" wants a wall with creep'
 
 
@@ -40,15 +39,12 @@ class Creeping(LineDeviation):
 
     def __init__(self, case, pipe) -> None:
         super().__init__(case, pipe)
-        wall = pipe.wall
         self.plug = pipe.friction.model == "none"
-        factor = restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / wall.thickness
-        self.share = factor * self.rho * self.a**2 * np.array(wall.creep.compliance)
-        self.time = np.array(wall.creep.time)
+        self.elements = [(growth * self.rho * self.a**2, time) for growth, time in pipe.yielding]
 
     def swelling(self, s):
         total = np.ones(np.shape(s), dtype=complex)
-        for share, time in zip(self.share, self.time, strict=True):
+        for share, time in self.elements:
             total = total + share / (1.0 + time * s)
         return total
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.parts.pipe.wall import Wall, restraint_factor
-
 
 def add_creep(draft, name: str, link, row) -> None:
     """Numbers and states of a pipe's Kelvin-Voigt elements; faults where its walls may not creep."""
-    creep = creep_of(link)
-    if creep is None:
+    if not link.yielding:
         return
     place = f"links.{name}.wall.creep"
     if not draft.case.law.linear:
@@ -24,18 +21,11 @@ def add_creep(draft, name: str, link, row) -> None:
     row["strain"] = draft.states(names, 1e5 * row["admittance"])
 
 
-def creep_of(link):
-    """The elements of a pipe's wall, None of one without."""
-    return link.wall.creep if isinstance(link.wall, Wall) else None
-
-
 def gains(link, density: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """(G / tau, 1 / tau) of every element [1/s]; G = c D K J / e is what it takes over what the elastic wall and the
     liquid take together."""
-    creep, wall = creep_of(link), link.wall
-    softness = restraint_factor(link.restraint, link.diameter, wall) * link.diameter / wall.thickness
-    rate = 1.0 / np.array(creep.time)
-    return softness * density * speed**2 * np.array(creep.compliance) * rate, rate
+    growth, time = np.array(link.yielding).T
+    return growth * density * speed**2 / time, 1.0 / time
 
 
 def elements(floats: np.ndarray, row) -> np.ndarray:

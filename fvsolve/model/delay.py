@@ -16,7 +16,6 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.delay.lines import drag_and_slope
 from fvsolve.kernels.schedules import WAVE
-from fvsolve.model.creep import creep_of
 from fvsolve.model.past import past_size, rings_of
 from fvsolve.steppers import automatic
 from fvsolve.steppers.methods import AUTO
@@ -83,7 +82,7 @@ def what_needs_cells(case, link) -> str:
         return "scalars are carried in cells"
     if link.friction.model == "unsteady":
         return "unsteady friction remembers the flow of every cell"
-    if creep_of(link) is not None:
+    if link.yielding:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "a body that it rides on drives its cells"

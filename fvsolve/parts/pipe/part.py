@@ -10,7 +10,7 @@ from pydantic import Field
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.conduit import Conduit
 from fvsolve.parts.pipe.catalogue import OfCatalogue, from_catalogue
-from fvsolve.parts.pipe.wall import MODULI, Lining, Restraint, Wall, WallOrStiff, wants_poisson
+from fvsolve.parts.pipe.wall import MODULI, Lining, Restraint, Wall, WallOrStiff, wants_poisson, yielding
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Inside
 from fvsolve.parts.value import (
@@ -86,6 +86,11 @@ class Pipe(Conduit, kind="pipe"):
         ),
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
+
+    @property
+    def yielding(self) -> tuple[tuple[float, float], ...]:
+        """(growth of the bore with pressure in the end [1/Pa], time [s]) of each element by which its wall creeps."""
+        return yielding(self)
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:

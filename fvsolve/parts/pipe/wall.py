@@ -166,6 +166,15 @@ def wants_poisson(restraint: str | float | None, bore: float, wall: Wall) -> boo
     return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN > bore)
 
 
+def yielding(pipe: Any) -> tuple[tuple[float, float], ...]:
+    """(growth of its bore with pressure in the end, dA / (A dp) [1/Pa], time tau [s]) of each element of its wall."""
+    wall = pipe.wall
+    if not isinstance(wall, Wall) or wall.creep is None:
+        return ()
+    factor = restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / wall.thickness
+    return tuple((factor * one, time) for one, time in zip(wall.creep.compliance, wall.creep.time, strict=True))
+
+
 def softness(pipe: Any) -> float:
     """Growth of a pipe's bore with pressure at once, dA / (A dp) [1/Pa]; 0 of a stiff wall."""
     wall = pipe.wall
