@@ -40,6 +40,8 @@ def misfits(case):
                 f'the exact solution "{name}" wants a reservoir at one end and a junction at the other',
             )
             continue
+        if pipe.yielding and name == "laminar-line":
+            yield ("links", link, "wall", "creep"), f'the exact solution "{name}" holds for walls that do not creep'
         law = pipe.friction
         if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:
             message = f'the exact solution "{name}" wants "unsteady" friction by roughness, laminar, and no minor loss'

@@ -14,6 +14,8 @@ def add_creep(draft, name: str, link, row) -> None:
         draft.fault(place, f'is known under law = "linear"; this is law = "{draft.case.law.name}"')
     if draft.case.scalars:
         draft.fault(place, "takes up liquid, and scalars are not followed into it; keep one of scalars and creep")
+    if any(getattr(draft.case.places[end], "on", None) for end in link.ports.values()):
+        draft.fault(place, "of a pipe that rides on a body is not known")
     numbers = np.column_stack(gains(link, draft.fluid.density, float(row["speed"])))
     row["elements"], row["element"] = len(numbers), len(draft.floats)
     draft.floats += numbers.ravel().tolist()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from truth import creeping
+from truth import creeping, laminar
 from truth.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
@@ -168,6 +168,42 @@ def test_faults(change, words):
         fvsolve.build(fvsolve.load(case))
 
 
+def test_exact_solutions_of_elastic_walls_refuse_it():
+    for name in ("rays", "laminar-line"):
+        with pytest.raises(CaseError, match="walls that do not creep"):
+            fvsolve.load({**line(9), "exact": {"name": name}})
+
+
+def test_laminar_friction_that_remembers_and_a_wall_that_creeps_are_exact_together():
+    case = line(60, end=2.5)
+    case["fluid"] = {**case["fluid"], "viscosity": 0.2}
+    case["links"]["main"]["friction"] = {"model": "unsteady", "roughness": 0.0, "accuracy": 1e-5}
+    run, probe, jump, _ = solved(case)
+    assert np.max(np.abs(run["gate.pressure"] - probe(0, run.t))) < 1e-3 * jump
+
+
 def test_the_exact_line_wants_a_wall_that_creeps():
     with pytest.raises(CaseError, match="wants a wall with creep"):
         fvsolve.load({**line(9, creep=None), "exact": {"name": "creeping-line"}})
+
+
+def test_the_shipped_main_without_friction_is_the_transform_of_two_lines_in_series():
+    case = fvsolve.load("plastic-main", {"defaults.pipe.friction": {"model": "none"}, "expect": {}})
+    run, flow = fvsolve.run(case), 0.012
+
+    def line_of(name, s):
+        pipe, speed = case.links[name], case.wave_speed(name)
+        share = [(growth * case.properties.density * speed**2, time) for growth, time in pipe.yielding]
+        root = np.sqrt(1.0 + sum(one / (1.0 + time * s) for one, time in share))
+        return case.properties.density * speed / area(pipe.diameter) / root, np.tanh(s * pipe.length / speed * root)
+
+    def gate(s):
+        (upper, first), (lower, second) = line_of("upper", s), line_of("lower", s)
+        seen = upper * first
+        impedance = lower * (seen + lower * second) / (lower + seen * second)
+        return impedance * flow * (np.exp(-s) - np.exp(-3.0 * s)) / (2.0 * s**2)
+
+    start, jump = float(run["gate.gauge_pressure"][0]), np.ptp(run["gate.gauge_pressure"])
+    for t in (2.5, 5.0, 9.0, 11.0, 18.0, 33.0):
+        found = float(np.interp(t, run.t, run["gate.gauge_pressure"])) - start
+        assert found == approx(1e-5 * laminar.euler(gate, t, 2000), abs=1e-3 * jump)

@@ -8,41 +8,15 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from fvsolve.errors import did_you_mean
 from fvsolve.parts.conduit import sized
 from fvsolve.parts.friction import DARCY, KEYS
 from fvsolve.parts.pipe.classes import NoSize, rated
-from fvsolve.parts.pipe.materials import UNREAD, Material, materials
-from fvsolve.parts.value import COUNTED, Misfit, Setting, Value
+from fvsolve.parts.pipe.materials import Material, materials
+from fvsolve.parts.value import Misfit
 from fvsolve.units import parse, show
 
 STEELS = ("steel", "stainless-steel", "hydraulic-tube")
 OF_WALL = ("youngs_modulus", "poisson_ratio")
-
-
-class OfCatalogue(Value):
-    """The name of a material whose figures were read."""
-
-    about = "of the wall: modulus, Poisson's ratio and roughness, where their source was read"
-    changes = COUNTED
-
-    def read(self, given: Any, setting: Setting) -> str:
-        if isinstance(given, str) and given in materials():
-            return given
-        if not isinstance(given, str):
-            raise ValueError(f"{show(given)} is no text; wanted one of {', '.join(materials())}")
-        wall = "give wall = { youngs_modulus, thickness }"
-        if given in UNREAD:
-            raise ValueError(f"no source of the figures of {given} was read; {wall}")
-        raise ValueError(f"no material named {show(given)}{did_you_mean(given, materials())}; materials are "
-                         f"{', '.join(materials())}; of any other {wall}")  # fmt: skip
-
-    @property
-    def takes(self) -> str:
-        return ", ".join(f"`{name}`" for name in materials())
-
-    def json(self) -> dict[str, Any]:
-        return {"enum": list(materials())}
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:

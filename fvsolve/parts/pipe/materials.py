@@ -75,15 +75,19 @@ class Figure:
     def used(self) -> float:
         return self.greatest if self.key == "youngs_modulus" else 0.5 * (self.least + self.greatest)
 
+    def span(self, between: str) -> str:
+        """Least and greatest, in the unit of the table; one number where they are the same."""
+        low, high = (f"{x / SI[self.key]:.4g}" for x in (self.least, self.greatest))
+        return low if low == high else f"{low}{between}{high}"
+
     @property
     def said(self) -> str:
         """The number, its range and where both were read."""
-        low, used, high = (f"{x / SI[self.key]:.4g}" for x in (self.least, self.used, self.greatest))
         which = "the greatest" if self.key == "youngs_modulus" else "the mean"
-        span = "" if low == high else f", {which} of {low} to {high}"
+        span = "" if self.least == self.greatest else f", {which} of {self.span(' to ')}"
         what = f" ({self.what})" if self.what else ""
         read = "; ".join(SOURCES[one] for one in self.sources)
-        return f"{self.key.replace('_', ' ')} {used}{UNITS[self.key]}{span}{what}: {read}"
+        return f"{self.key.replace('_', ' ')} {self.used / SI[self.key]:.4g}{UNITS[self.key]}{span}{what}: {read}"
 
 
 @dataclass(frozen=True)

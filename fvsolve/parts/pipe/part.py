@@ -9,8 +9,7 @@ from pydantic import Field
 
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.conduit import Conduit
-from fvsolve.parts.pipe.catalogue import OfCatalogue, from_catalogue
-from fvsolve.parts.pipe.wall import MODULI, Lining, Restraint, Wall, WallOrStiff, wants_poisson, yielding
+from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrStiff, wants_poisson, yielding
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Inside
 from fvsolve.parts.value import (
@@ -30,6 +29,7 @@ from fvsolve.parts.value import (
 from fvsolve.units import show
 
 MOST_CELLS = 10**8
+CATALOGUE = frozenset(("material", "class", "lining"))  # keys that stand for others, beside names of sizes
 LINES = ("cells", "delay", "auto")  # how waves in a pipe are followed
 
 
@@ -95,9 +95,12 @@ class Pipe(Conduit, kind="pipe"):
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
         """Names of the catalogue and of sizes turned into numbers; Misfit where one means nothing."""
-        faults = []
+        faults, found = [], given
         try:
-            found = from_catalogue(given)
+            if not CATALOGUE.isdisjoint(given):
+                from fvsolve.parts.pipe.catalogue import from_catalogue
+
+                found = from_catalogue(given)
         except Misfit as error:
             faults = error.faults
             found = {key: one for key, one in given.items() if key not in ("nominal", "schedule", "class")}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
+from fvsolve.errors import did_you_mean
+from fvsolve.parts.pipe.creep import Creep, Elements
 from fvsolve.parts.table import Table
-from fvsolve.parts.value import COUNTED, SHAPE, Misfit, Number, Quantity, Setting, Usual, Value, between, positive
+from fvsolve.parts.value import COUNTED, Number, Quantity, Setting, Usual, Value, between, positive
 from fvsolve.units import parse, show
 
 MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
@@ -14,72 +15,6 @@ THICKNESS = Usual(1e-6, 2.0, "foils to lined rock")
 THIN = 25.0  # bores over walls from which on a wall counts as thin, Wylie, Streeter and Suo 1993
 RESTRAINTS = ("joints", "upstream", "anchored")
 POISSON = "poisson_ratio"
-
-
-@dataclass(frozen=True)
-class Creep:
-    """Kelvin-Voigt elements: strain J (1 - exp(-t / tau)) each under a unit of hoop stress, beside the elastic one.
-
-    compliance : J of each [1/Pa]; time : tau of each [s]
-    """
-
-    compliance: tuple[float, ...]
-    time: tuple[float, ...]
-
-    def table(self) -> dict[str, list[float]]:
-        """What the file would say."""
-        return {"compliance": list(self.compliance), "time": list(self.time)}
-
-
-class Elements(Value):
-    """The table of Kelvin-Voigt elements: as many compliances as times, all positive."""
-
-    about = "what the wall gives way by in time, Kelvin-Voigt elements"
-    takes = "`{ compliance, time }`, lists of 1/Pa and s"
-    changes = SHAPE
-
-    def read(self, given: Any, setting: Setting) -> Creep:
-        if isinstance(given, Creep):
-            return given
-        if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table; wanted {{ compliance = [1e-10], time = [0.05] }}, 1/Pa and s")
-        faults: list = [((key,), "unknown key; keys are compliance, time") for key in given if key not in LISTS]
-        found = {}
-        for key in LISTS:
-            try:
-                found[key] = _positives(given[key], LISTS[key])
-            except KeyError:
-                faults.append(((), f"{key} is missing"))
-            except ValueError as error:
-                faults.append(((key,), str(error)))
-        if not faults and len(found["compliance"]) != len(found["time"]):
-            sizes = " and ".join(f"{len(found[key])} of {key}" for key in LISTS)
-            faults.append(((), f"{sizes}; wanted one of each an element"))
-        if faults:
-            raise Misfit(faults)
-        return Creep(**found)
-
-    def below(self, key: str) -> Value | None:
-        if key not in LISTS:
-            raise KeyError(key)
-        return None
-
-    def json(self) -> dict[str, Any]:
-        lists = {key: {"type": "array", "items": {"type": ["number", "string"]}} for key in LISTS}
-        return {"type": "object", "properties": lists, "required": list(LISTS), "additionalProperties": False}
-
-
-LISTS = {"compliance": "number", "time": "time"}
-
-
-def _positives(given: Any, dimension: str) -> tuple[float, ...]:
-    if not isinstance(given, (list, tuple)) or not given:
-        raise ValueError(f"{show(given)} is no list of numbers; wanted one an element")
-    found = tuple(float(parse(one, dimension)) for one in given)
-    for one, value in zip(given, found, strict=True):
-        if not value > 0.0:
-            raise ValueError(f"{show(one)} is out of range; wanted a value above 0")
-    return found
 
 
 class Wall(Table):
@@ -98,6 +33,39 @@ class Lining(Table):
 
     youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the lining [Pa]", MODULI, COUNTED)]
     thickness: Annotated[float, Quantity("length", positive, "of the lining [m]", THICKNESS, COUNTED)]
+
+
+class OfCatalogue(Value):
+    """The name of a material whose figures were read."""
+
+    about = "of the wall: modulus, Poisson's ratio and roughness, where their source was read"
+    changes = COUNTED
+
+    @property
+    def names(self) -> list[str]:
+        from fvsolve.parts.pipe.materials import materials  # read by pipes that name one
+
+        return list(materials())
+
+    def read(self, given: Any, setting: Setting) -> str:
+        from fvsolve.parts.pipe.materials import UNREAD
+
+        if isinstance(given, str) and given in self.names:
+            return given
+        if not isinstance(given, str):
+            raise ValueError(f"{show(given)} is no text; wanted one of {', '.join(self.names)}")
+        wall = "give wall = { youngs_modulus, thickness }"
+        if given in UNREAD:
+            raise ValueError(f"no source of the figures of {given} was read; {wall}")
+        raise ValueError(f"no material named {show(given)}{did_you_mean(given, self.names)}; materials are "
+                         f"{', '.join(self.names)}; of any other {wall}")  # fmt: skip
+
+    @property
+    def takes(self) -> str:
+        return ", ".join(f"`{name}`" for name in self.names)
+
+    def json(self) -> dict[str, Any]:
+        return {"enum": self.names}
 
 
 class WallOrStiff(Value):
