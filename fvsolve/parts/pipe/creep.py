@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.parts.value import SHAPE, Misfit, Setting, Value
+from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.value import NEEDED, SHAPE, VALUE, Setting, Value, positive
 from fvsolve.units import parse, show
 
 
@@ -24,8 +25,30 @@ class Creep:
         return {"compliance": list(self.compliance), "time": list(self.time)}
 
 
+@dataclass(frozen=True)
+class Positives(Value):
+    """A list of numbers above 0, one an element."""
+
+    dimension: str
+    changes: str = VALUE
+
+    def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
+        if not isinstance(given, (list, tuple)) or not given:
+            raise ValueError(f"{show(given)} is no list of numbers; wanted one an element")
+        found = tuple(float(parse(one, self.dimension)) for one in given)
+        for one, value in zip(given, found, strict=True):
+            positive.check(value, one)
+        return found
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"type": ["number", "string"]}}
+
+
+LISTS = {"compliance": (Positives("number"), NEEDED), "time": (Positives("time"), NEEDED)}
+
+
 class Elements(Value):
-    """The table of Kelvin-Voigt elements: as many compliances as times, all positive."""
+    """The table of Kelvin-Voigt elements: as many compliances as times, all above 0."""
 
     about = "what the wall gives way by in time, Kelvin-Voigt elements"
     takes = "`{ compliance, time }`, lists of 1/Pa and s"
@@ -36,40 +59,14 @@ class Elements(Value):
             return given
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is no table; wanted {{ compliance = [1e-10], time = [0.05] }}, 1/Pa and s")
-        faults: list = [((key,), "unknown key; keys are compliance, time") for key in given if key not in LISTS]
-        found = {}
-        for key in LISTS:
-            try:
-                found[key] = _positives(given[key], LISTS[key])
-            except KeyError:
-                faults.append(((), f"{key} is missing"))
-            except ValueError as error:
-                faults.append(((key,), str(error)))
-        if not faults and len(found["compliance"]) != len(found["time"]):
-            sizes = " and ".join(f"{len(found[key])} of {key}" for key in LISTS)
-            faults.append(((), f"{sizes}; wanted one of each an element"))
-        if faults:
-            raise Misfit(faults)
-        return Creep(**found)
+        found = Creep(**read_keys(given, LISTS, setting))
+        if len(found.compliance) != len(found.time):
+            sizes = f"{len(found.compliance)} of compliance and {len(found.time)} of time"
+            raise ValueError(f"{sizes}; wanted one of each an element")
+        return found
 
     def below(self, key: str) -> Value | None:
-        if key not in LISTS:
-            raise KeyError(key)
-        return None
+        return LISTS[key][0]
 
     def json(self) -> dict[str, Any]:
-        lists = {key: {"type": "array", "items": {"type": ["number", "string"]}} for key in LISTS}
-        return {"type": "object", "properties": lists, "required": list(LISTS), "additionalProperties": False}
-
-
-LISTS = {"compliance": "number", "time": "time"}
-
-
-def _positives(given: Any, dimension: str) -> tuple[float, ...]:
-    if not isinstance(given, (list, tuple)) or not given:
-        raise ValueError(f"{show(given)} is no list of numbers; wanted one an element")
-    found = tuple(float(parse(one, dimension)) for one in given)
-    for one, value in zip(given, found, strict=True):
-        if not value > 0.0:
-            raise ValueError(f"{show(one)} is out of range; wanted a value above 0")
-    return found
+        return keys_json(LISTS)
