@@ -135,6 +135,7 @@ MEMBERS = {
     "carried": Pieces(leave="scalars: leave_pipes", carry="scalars: carry_in_pipes"),
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
+    "creep, barotropic": Pieces(rates="creep.barotropic: creep_walls_barotropic"),
     "creep": Pieces(
         rates="creep.wall: creep_walls", power="creep.energy: add_power", stored="creep.energy: add_stored",
     ),
@@ -230,7 +231,7 @@ class Cast:
         if self.memory:
             yield MEMBERS["memory" if linear else "memory, barotropic"]
         if self.creep:
-            yield MEMBERS["creep"]
+            yield MEMBERS["creep" if linear else "creep, barotropic"]
         yield from self.basins
         if self.scalars:  # which the flow carries that rates of waves now have
             yield MEMBERS["scalars"]

@@ -10,8 +10,6 @@ def add_creep(draft, name: str, link, row) -> None:
     if not link.yielding:
         return
     place = f"links.{name}.wall.creep"
-    if not draft.case.law.linear:
-        draft.fault(place, f'is known under law = "linear"; this is law = "{draft.case.law.name}"')
     if draft.case.scalars:
         draft.fault(place, "takes up liquid, and scalars are not followed into it; keep one of scalars and creep")
     if any(getattr(draft.case.places[end], "on", None) for end in link.ports.values()):

@@ -323,12 +323,18 @@ class Couplings:
                     yield pipe["memory"] + k * n + here, wave + here + offset
 
     def crept(self, pipe) -> Iterator[Pairs]:
-        """Walls that creep: waves and elements of a cell on each other."""
-        n, cells = int(pipe["cells"]), np.arange(pipe["cells"])
-        rows = [pipe["y"], pipe["y"] + n, *(pipe["strain"] + k * n for k in range(pipe["elements"]))]
-        for one in rows if pipe["elements"] > 0 else ():
-            for other in rows if one < pipe["y"] + 2 * n and one >= pipe["y"] else rows[:2]:
-                yield one + cells, other + cells
+        """Walls that creep: waves and elements of a cell on each other, and on what its pressure is averaged by."""
+        n = int(pipe["cells"])
+        cells, waves = np.arange(n), (pipe["y"], pipe["y"] + n)
+        strains = [pipe["strain"] + k * n for k in range(pipe["elements"])]
+        for offset in [0] if self.linear else [-1, 0, 1]:
+            here = cells[(cells + offset >= 0) & (cells + offset < n)]
+            for one in (*waves, *strains) if strains else ():
+                for other in waves:
+                    yield one + here, other + here + offset
+        for wave in waves:
+            for strain in strains:
+                yield wave + cells, strain + cells
 
     def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
         """(cells of the wave that enters by an end, cells of the one that leaves), nearest first."""

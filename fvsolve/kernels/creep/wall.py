@@ -20,6 +20,21 @@ def total(r, l, w):
 
 
 @njit
+def give_way(pipe, floats, w, y, dydt, taken):
+    """Elements of a pipe follow w, and what they take comes half off the rate of each wave."""
+    n, o, at = w.size, pipe["y"], pipe["strain"]
+    for i in range(n):
+        taken[i] = 0.0
+    for k in range(pipe["elements"]):
+        gain, rate = floats[pipe["element"] + 2 * k], floats[pipe["element"] + 2 * k + 1]
+        follow(gain, rate, w, y[at : at + n], dydt[at : at + n], taken)
+        at += n
+    for i in range(n):
+        dydt[o + i] -= 0.5 * taken[i]
+        dydt[o + n + i] -= 0.5 * taken[i]
+
+
+@njit
 def creep_walls(t, y, dydt, out, handle):
     """Creep of the walls of all pipes, taken off rates, where there are any."""
     tables = open_tables(handle)
@@ -27,15 +42,7 @@ def creep_walls(t, y, dydt, out, handle):
     for i in range(pipes.size):
         pipe = pipes[i]
         if pipe["elements"] > 0 and dydt.size > 0:
-            n, o, at = pipe["cells"], pipe["y"], pipe["strain"]
-            w, taken = scratch[:n], scratch[n : 2 * n]
+            n, o = pipe["cells"], pipe["y"]
+            w = scratch[:n]
             total(y[o : o + n], y[o + n : o + 2 * n], w)
-            for k in range(n):
-                taken[k] = 0.0
-            for k in range(pipe["elements"]):
-                gain, rate = floats[pipe["element"] + 2 * k], floats[pipe["element"] + 2 * k + 1]
-                follow(gain, rate, w, y[at : at + n], dydt[at : at + n], taken)
-                at += n
-            for k in range(n):
-                dydt[o + k] -= 0.5 * taken[k]
-                dydt[o + n + k] -= 0.5 * taken[k]
+            give_way(pipe, floats, w, y, dydt, scratch[n : 2 * n])
