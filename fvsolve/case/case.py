@@ -10,7 +10,10 @@ from typing import Any
 
 from fvsolve.case import basins, bodies, ranges, riding_networks, text
 from fvsolve.case.claims import Compare, Expect
+from fvsolve.case.extent import of_profiles
+from fvsolve.case.limits import DesignLimit
 from fvsolve.case.probe import Probe
+from fvsolve.case.routes import Route
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import LAWS, Fluid
@@ -50,6 +53,8 @@ class Case(Shown):
     output: Output
     expect: dict[str, Expect]
     compare: dict[str, Compare]
+    routes: dict[str, Route]
+    limits: dict[str, DesignLimit]
     exact: ExactSpec | None
     copies: dict[str, Path]
     raw: dict[str, Any] = field(repr=False)  # as the file says it, overrides included
@@ -57,6 +62,7 @@ class Case(Shown):
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is masses on its body
     read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (what stands there, the same read)
+    told: list[Notice] = field(default_factory=list, repr=False)  # of what was placed
     found: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses where their forces balance
 
     picture = "fvsolve.draw.objects:case_figure"
@@ -82,7 +88,17 @@ class Case(Shown):
     def probes(self) -> list[Probe]:
         """All that must be recorded: probes of the output, then those that only expect or compare name."""
         named = [*self.output.probes]
-        named += [one.probe for one in [*self.expect.values(), *self.compare.values()]]
+        named += [one.probe for one in [*self.expect.values(), *self.compare.values()] if one.probe is not None]
+        return list({probe.text: probe for probe in named}.values())
+
+    @cached_property
+    def watched(self) -> list[Probe]:
+        """What is followed beside the probes for its extremes alone: points of profiles, and what limits and claims
+        extent."""
+        named = [*of_profiles(self.links)]
+        extents = [one.extent for one in [*self.limits.values(), *self.expect.values()] if one.extent is not None]
+        for extent in extents:
+            named += extent.probes(self.links)
         return list({probe.text: probe for probe in named}.values())
 
     @property
@@ -156,7 +172,7 @@ class Case(Shown):
     @cached_property
     def notes(self) -> list[Notice]:
         """What it says beyond what practice knows."""
-        return ranges.notices(self)
+        return [*self.told, *ranges.notices(self)]
 
     @cached_property
     def elevations_stated(self) -> bool:
@@ -226,6 +242,8 @@ class Case(Shown):
             "output": self.output.table(),
             "expect": {name: one.table() for name, one in self.expect.items()},
             "compare": {name: one.table() for name, one in self.compare.items()},
+            "routes": {name: one.table() for name, one in self.routes.items()},
+            "limits": {name: one.table() for name, one in self.limits.items()},
             "exact": self.exact.table() if self.exact else {},
         }
         return {key: value for key, value in said.items() if value not in ("", {})}

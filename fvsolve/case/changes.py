@@ -10,8 +10,11 @@ from fvsolve.case import defaults
 from fvsolve.case.case import Case
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys
 from fvsolve.case.defaults import link_said
+from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import TOP
+from fvsolve.case.placing import own_keys
 from fvsolve.case.raw import dotted
+from fvsolve.case.routes import Route
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
@@ -54,7 +57,8 @@ def classed(case: Case, keys: tuple[Any, ...]) -> str:
 def declared(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
     """What a key may be, as its part declares it; of a key below one that says all, what that one may be."""
     found: Value | None = Keys(known(raw))
-    for key in keys:
+    keys = own_keys(raw, keys)
+    for key in (*keys[:2], *keys[4:]) if keys[2:3] == ("pieces",) else keys:
         outer = found
         try:
             found = outer.below(key)
@@ -85,6 +89,7 @@ def known(raw: dict[str, Any]) -> dict[str, Value]:
         found[group] = Keys({name: Keys({"type": Value(), **kinds[one["type"]].values()}) for name, one in parts})
     found["defaults"] = Keys({kind: Keys(defaults.values(kind)) for kind in defaults.KINDS})
     said = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
+    said |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
     return found | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(one))) for group, one in said.items()}
 
 

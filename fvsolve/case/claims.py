@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fvsolve.case.extent import Extent, read_extent
 from fvsolve.case.probe import Kinds, Probe, read_probe
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.series import copy_name, find_file, read_columns
@@ -16,18 +18,21 @@ from fvsolve.parts.table import read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Misfit, Number, Quantity, Setting, Text, nonnegative
 from fvsolve.units import show
 
-FUNCTIONS = ("max", "min", "mean", "final", "at")
+FUNCTIONS = ("max", "min", "mean", "final", "at", "greatest", "least")
+WHOLE = ("greatest", "least")
 _CLAIM = re.compile(r"\s*(\w+)\s*\(\s*([^()]+?)\s*\)\s*")
 _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
 class Expect:
-    """A claim: a function (max, min, mean, final, at) of a probe is `value` [SI], within tolerance."""
+    """A claim: a function (max, min, mean, final, at) of a probe, or the greatest or least of a whole part or route, is
+    `value` [SI], within tolerance."""
 
     text: str
     function: str
-    probe: Probe
+    probe: Probe | None
+    extent: Extent | None
     time: float | None
     value: float
     rtol: float
@@ -59,12 +64,13 @@ class Compare:
         return {"file": self.file, "time": self.time, "value": self.value, "shift": self.shift}
 
 
-def read_expect(claim: str, given: Any, kinds: Kinds, setting: Setting) -> Expect | None:
+def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: Setting) -> Expect | None:
     """One line of `[expect]`; None where the part of its probe is at fault itself. Raises ValueError."""
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
-        raise ValueError(f"no such claim; wanted max, min, mean or final(PROBE), or at(PROBE, TIME){hint}")
+        wanted = "max, min, mean or final(PROBE), at(PROBE, TIME), or greatest or least(PART.QUANTITY)"
+        raise ValueError(f"no such claim; wanted {wanted}{hint}")
     function, probe_text = match.groups()
     when = None
     if function == "at":  # the last comma: a point in a basin has one of its own
@@ -77,15 +83,23 @@ def read_expect(claim: str, given: Any, kinds: Kinds, setting: Setting) -> Expec
     if when is not None:
         given_time = float(when) if _BARE.fullmatch(when) else when.strip("\"'")
         time = Quantity("time").read(given_time, setting)
-    probe = read_probe(probe_text, kinds)
-    if probe is None:
+    probe, extent = None, None
+    if function in WHOLE and "@" not in probe_text:
+        on, dot, quantity = probe_text.rpartition(".")
+        if not dot:
+            raise ValueError(f"wanted {function}(PART.QUANTITY)")
+        extent = read_extent(on, quantity, kinds, routes)
+    else:
+        probe = read_probe(probe_text, kinds)
+    if probe is None and extent is None:
         return None
+    dimension = (probe or extent).dimension
     if not isinstance(given, dict):
         raise ValueError(f"{show(given)} is no table; wanted one such as {{ value = 1.0, rtol = 1e-2 }}")
-    found = read_keys(given, expect_keys(probe.dimension), setting)
+    found = read_keys(given, expect_keys(dimension), setting)
     if "rtol" not in given and "atol" not in given:
         raise Misfit([((), "no tolerance; wanted rtol, atol or both")])
-    return Expect(claim, function, probe, time, **found)
+    return Expect(claim, function, probe, extent, time, **found)
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:

@@ -42,6 +42,12 @@ def link_said(table: Mapping[str, Any], name: str) -> dict[str, Any]:
     return filled(table, table["links"][name])
 
 
+def spread(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The same table without defaults, every link as it is with them."""
+    links = {name: filled(table, one) if isinstance(one, dict) else one for name, one in table["links"].items()}
+    return {**{key: value for key, value in table.items() if key != "defaults"}, "links": links}
+
+
 def place(table: Mapping[str, Any], keys: tuple) -> tuple:
     """Where the key of a part stands: among its own, or the defaults."""
     if len(keys) < 3 or keys[0] != "links":

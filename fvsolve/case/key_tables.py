@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.load import TOP
+from fvsolve.case.routes import Route
 from fvsolve.case.sections import FluidSpec, Line, Numerics, Output
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
@@ -33,7 +34,7 @@ from fvsolve.units import DIMENSIONS, show
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar,
-    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "joint": Joint, "attitude": Attitude,
+    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # whose keys -> the part that has them in full
 SHARED = {Node: "", Rider: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}

@@ -11,15 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, bodies, check, defaults, scalars, shipped, size, text
+from fvsolve.case import basins, bodies, check, defaults, heights, placing, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
+from fvsolve.case.extent import ALL
+from fvsolve.case.limits import NAMED, VAPOR, DesignLimit, read_limit
 from fvsolve.case.moved import moved
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
+from fvsolve.case.routes import Route, legs, spread
+from fvsolve.case.routes import misfits as route_misfits
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.doors import TABLE, door
-from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
+from fvsolve.errors import CaseError, Fault, FluidError, Notice, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
 from fvsolve.parts.body.part import Body, BodyPoint
@@ -50,7 +54,7 @@ GROUPS = {
 ALONE = ("basin", "body")  # nodes that need no link
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "exact",
+    "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
@@ -106,10 +110,14 @@ class _Reader:
 
     def __init__(self, raw: Raw, settings: Mapping[str, Any], before: Case | None = None):
         self.raw, self.before = raw, before
+        settings = placing.settings(raw.table, settings)
         self.refused: list[Fault] = override(raw, settings, _alternatives())  # settings that cannot be made
         self.faults = self.refused[:]
         self.setting = Setting(folder=raw.folder)
         self.read: dict[tuple, tuple[Any, Any]] = {}  # place -> (what stands there, what it was read as)
+        self.origin: dict[tuple, tuple] = {}  # (group, name) of what a cut pipe came to -> of what the file has
+        self.pieces: dict[str, list[str]] = {}  # of cut pipes
+        self.said = raw.table  # before pipes are cut
         self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
 
     def case(self) -> Case:
@@ -119,16 +127,18 @@ class _Reader:
         top = self.top()
         if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
             self.before = None  # all that is gauge is other
-        if self.before is not None and self.before.raw.get("defaults") is not self.raw.table.get("defaults"):
+        if self.before is not None and self.before.raw.get("defaults") is not self.said.get("defaults"):
             self.before = None  # every pipe may be other
         fluid, properties = self.kept(("fluid",), self.raw.table.get("fluid"), self.fluid)
+        numerics = self.table("numerics", Numerics)
         self.setting.signals = self.group("signals")
         self.add(defaults.misfits(self.raw.table, self.setting))
+        whole, told = self.raw.table, self.cut(properties, numerics)
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
+        parts["nodes"] = heights.lent(**parts)
         meshes = self.meshes(parts["nodes"])
         self.unused_signals()
-        numerics = self.table("numerics", Numerics)
         kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
         has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
@@ -151,8 +161,14 @@ class _Reader:
                 kinds["nodes"][name] = basins.Pool(pool.own.fields | own, meshes[name])
                 kinds["nodes"] |= {f"{name}.{patch}": basins.place_kind(pool, patch)
                                    for patch in basins.patch_names(meshes[name])}  # fmt: skip
+        routes = self.routes(parts["links"])
+        kinds["routes"] = {
+            name: route and (legs(route, parts["links"]), parts["links"]) for name, route in routes.items()
+        }
+        kinds["pipes"] = {name: link for name, link in parts["links"].items() if isinstance(link, Pipe)}
         output = self.output(numerics, kinds)
-        expect, compare = self.expect(kinds), self.compare(kinds)
+        expect, compare = self.expect(kinds, routes), self.compare(kinds)
+        limits = self.limits(kinds, routes, parts["links"], properties)
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0
@@ -185,10 +201,13 @@ class _Reader:
             output=output,
             expect=expect,
             compare=compare,
+            routes=routes,
+            limits=limits,
             exact=named,
             copies=dict(self.setting.files),
-            raw=self.raw.table,
+            raw=whole,
             folder=self.raw.folder,
+            told=told,
             meshes=meshes,
             lumped=self.lumped,
             read=self.read,
@@ -210,6 +229,30 @@ class _Reader:
         self.add(found)
         self.stop()
         return made
+
+    def cut(self, properties: Any, numerics: Numerics | None) -> list[Notice]:
+        """Cut pipes at what is placed on them by chainage; what is to be told of it."""
+        table = self.raw.table
+        if not placing.placed(table):
+            return []
+        self.add(placing.faults(table))
+        self.stop()
+        pipes, table = {}, defaults.spread(table)
+        for name, given in table["links"].items():
+            if placing.is_pipe(given):
+                try:
+                    pipes[name] = self.part(Pipe, {key: one for key, one in given.items() if key != "pieces"})
+                except ValueError as error:
+                    self.misfit(("links", name), error)
+        self.stop()
+        if properties is None or numerics is None:
+            self.stop()
+        counts = default_cells(pipes, properties, numerics.cell_time)
+        exact = {name for name, pipe in pipes.items() if (pipe.line or numerics.line) == "delay"}
+        made = placing.cut(table, pipes, counts, exact, self.fault)
+        self.stop()
+        self.raw, self.origin, self.pieces = replace(self.raw, table=made.table), made.origin, made.pieces
+        return made.told
 
     def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
         """What a place was read as in the case before, if the very same stands there; else what `make` reads.
@@ -234,7 +277,8 @@ class _Reader:
     def fault(self, keys: tuple, message: str) -> None:
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
-        keys = defaults.place(self.raw.table, keys)
+        keys = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
+        keys = defaults.place(self.said, keys)
         place = text.path(keys)
         if self.raw.is_override(keys):
             self.faults.append(Fault(place, message, override=True))
@@ -458,11 +502,44 @@ class _Reader:
             changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS
         return output.model_copy(update=changes)
 
-    def expect(self, kinds: dict) -> dict[str, Expect]:
+    def routes(self, links: dict[str, Any]) -> dict[str, Route | None]:
+        """Routes by name; None in the place of what is at fault itself."""
+        made: dict[str, Route | None] = {}
+        named = self.group("links")
+        for name, given in self.group("routes").items():
+            made[name] = None
+            if name in self.group("nodes") or name in named or name in ALL:
+                self.fault(("routes", name), f"{show(name)} is the name of something else; wanted one of its own")
+                continue
+            try:
+                made[name] = spread(Route.model_validate(given, context=self.setting), self.pieces, links)
+            except ValueError as error:
+                self.misfit(("routes", name), error)
+        faulty = list(route_misfits(made, links, named))
+        self.add(faulty)
+        return {name: None if any(keys[1] == name for keys, _ in faulty) else one for name, one in made.items()}
+
+    def limits(
+        self, kinds: dict, routes: dict, links: dict[str, Any], properties: Any
+    ) -> dict[str, DesignLimit | None]:
+        """Limits by name."""
+        made = {}
+        for name, given in self.group("limits").items():
+            try:
+                made[name] = read_limit(name, given, kinds, routes, links, self.setting)
+            except ValueError as error:
+                self.misfit(("limits", name), error)
+            said = given.get("least") if isinstance(given, dict) else None
+            boils = isinstance(said, str) and NAMED.get(said.casefold()) == VAPOR
+            if boils and properties is not None and properties.vapor_pressure is None:
+                self.fault(("limits", name, "least"), "the fluid states no vapor_pressure; give it under [fluid]")
+        return made
+
+    def expect(self, kinds: dict, routes: dict) -> dict[str, Expect]:
         made = {}
         for claim, given in self.group("expect").items():
             try:
-                made[claim] = read_expect(claim, given, kinds, self.setting)
+                made[claim] = read_expect(claim, given, kinds, routes, self.setting)
             except ValueError as error:
                 self.misfit(("expect", claim), error)
         return made

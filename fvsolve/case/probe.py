@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Link, Node, Scalar
 from fvsolve.units import show
@@ -24,7 +26,7 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 @dataclass(frozen=True)
 class Probe:
     """What is recorded: text of the case, part and quantity; along a pipe the fraction from `from`, in a basin the
-    point [m]."""
+    point [m]; straight : read along a straight line between cells, not by the scheme's polynomial."""
 
     text: str
     part: str  # "nodes" | "links"
@@ -34,6 +36,7 @@ class Probe:
     dimension: str
     point: tuple[float, float] | None = None
     unit: str = ""  # of a scalar, a label
+    straight: bool = False
 
 
 Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | Scalar | None"]]
@@ -51,6 +54,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     part, name, quantity, place = match.groups()
     parts = [part] if part else [part for part in ("nodes", "links") if name in kinds[part]]
     parts = [part for part in parts if name in kinds[part]]
+    if not parts and part != "nodes" and name in kinds.get("routes", {}):
+        return of_route(given.strip(), name, quantity, place, kinds)
     if not parts and kinds["nodes"].get(name.partition(".")[0], name) is None:
         return None  # a patch of a basin that is at fault
     if not parts:
@@ -70,6 +75,46 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if len(found) > 1:
         raise ValueError(f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}")
     return found[0]
+
+
+def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
+    """A place along a route, by a share of its length or a chainage; None where the route is at fault itself."""
+    if kinds["routes"][name] is None:
+        return None
+    legs, links = kinds["routes"][name]
+    kind = type(links[legs[0].pipe])
+    along = kind.along | _carried(kind, kinds, "along")
+    if quantity not in along:
+        raise ValueError(f"{name} is a route, without {show(quantity)}; it has {', '.join(along)}")
+    if place is None and quantity not in kind.quantities:
+        raise ValueError(f'{name} is a route: say where, for example "{name}.{quantity}@0.5"')
+    begin, end = legs[0].begin, legs[-1].end
+    at = begin + share_of(place or "0", end - begin, begin) * (end - begin)
+    leg = next((one for one in legs if at <= one.end), legs[-1])
+    if leg.backwards and quantity in ("flow", "velocity"):
+        raise ValueError(f"{name} runs against {leg.pipe} there; wanted {leg.pipe}.{quantity}@x, whose sign is its own")
+    share = min(max((at - leg.begin) / (leg.end - leg.begin), 0.0), 1.0)
+    share = 1.0 - share if leg.backwards else share
+    scalar = kinds["scalars"].get(quantity)
+    return Probe(text, "links", leg.pipe, quantity, share, along[quantity], unit="" if scalar is None else scalar.unit)
+
+
+def share_of(place: str, length: float | None, begin: float) -> float:
+    """A place as a share of a length [m] that begins at a chainage [m]; ValueError where it is none."""
+    try:
+        found = float(place)
+        said = f'"@{place}" is no fraction of the length; wanted 0 to 1'
+    except ValueError:
+        try:
+            found = math.nan if length is None else (units.parse(place, "length") - begin) / length
+        except ValueError:
+            raise ValueError(
+                f'"@{place}" is no fraction of the length; wanted 0 to 1, or a chainage with its unit'
+            ) from None
+        said = "" if length is None else f'"@{place}" is not within {begin:.10g} m to {begin + length:.10g} m'
+    if not -1e-12 <= found <= 1.0 + 1e-12:
+        raise ValueError(said or f'"@{place}" is no fraction of the length; wanted 0 to 1')
+    return min(max(found, 0.0), 1.0)
 
 
 def default_probes(kinds: Kinds) -> list[Probe]:
@@ -98,12 +143,21 @@ def _probe(text: str, part: str, name: str, quantity: str, place: str | None, ki
         return Probe(text, part, name, quantity, None, fields[quantity], point, unit)
     along = getattr(kind, "along", {}) | _carried(kind, kinds, "along")
     quantities = kind.quantities | _carried(kind, kinds, "quantities")
-    fraction, dimension = _quantity(kind, along, quantities, name, quantity, place)
+    pipe = kinds.get("pipes", {}).get(name) if part == "links" else None
+    begin = 0.0 if pipe is None or pipe.profile is None else float(pipe.profile.chainage[0])
+    fraction, dimension = _quantity(kind, along, quantities, name, quantity, place, pipe and pipe.length, begin)
     return Probe(text, part, name, quantity, fraction, dimension, unit=unit)
 
 
 def _quantity(
-    kind: Any, along: dict[str, str], own: dict[str, str], name: str, quantity: str, place: str | None
+    kind: Any,
+    along: dict[str, str],
+    own: dict[str, str],
+    name: str,
+    quantity: str,
+    place: str | None,
+    length: float | None,
+    begin: float,
 ) -> tuple[float | None, str]:
     known = {**along, **own, **getattr(kind, "fields", {})}
     article = "an" if kind.kind[0] in "aeiou" else "a"
@@ -116,10 +170,4 @@ def _quantity(
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:
         raise ValueError(f"{name} is {article} {kind.kind}: {quantity} has no place along it; leave @{place} out")
-    try:
-        fraction = float(place)
-    except ValueError:
-        fraction = -1.0
-    if not 0.0 <= fraction <= 1.0:
-        raise ValueError(f'"@{place}" is no fraction of the length; wanted 0 to 1')
-    return fraction, known[quantity]
+    return share_of(place, length, begin), known[quantity]

@@ -8,7 +8,9 @@ from json import dumps, loads
 from typing import Any
 
 from fvsolve.case import defaults
+from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import ALONE, GROUPS, KEYS, TOP
+from fvsolve.case.routes import Route
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
@@ -46,6 +48,9 @@ def whole() -> dict[str, Any]:
     scalar = _hoisted(Scalar, definitions)
     properties["scalars"] = {"type": "object", "additionalProperties": scalar}
     properties["signals"] = {"type": "object", "additionalProperties": Scheduled("number").json()}
+    properties["routes"] = {"type": "object", "additionalProperties": _hoisted(Route, definitions)}
+    limit = keys_json(limit_keys("pressure", "pressure"))
+    properties["limits"] = {"type": "object", "additionalProperties": limit}
     properties["expect"] = properties["compare"] = {
         "type": "object",
         "additionalProperties": {"type": "object"},

@@ -60,6 +60,8 @@ def result(one) -> None:
         _line(console, f"{name} ledger: {_ledger(ledger)}")
     for claim in said["expectations"]:
         _line(console, _claim(claim), "green" if claim["ok"] else "bold red")
+    for verdict in said["verdicts"]:
+        _line(console, _verdict(verdict, said), "green" if verdict["ok"] else "bold red")
     for measured in said["comparisons"]:
         _line(console, _comparison(measured))
     _notices(console, said["warnings"])
@@ -76,10 +78,10 @@ def files(one) -> None:
 
 
 def exit_code(one) -> int:
-    """0, or 1 where the run stopped early or a claim fails, or 130 where it was interrupted."""
+    """0, or 1 where the run stopped early, a claim fails or a limit does not hold, or 130 where it was interrupted."""
     if one.reason.startswith("interrupted"):
         return 130
-    return 0 if one.ok and all(claim.ok for claim in one.expectations) else 1
+    return 0 if one.ok and all(claim.ok for claim in [*one.expectations, *one.verdicts]) else 1
 
 
 def checks(case, found: dict, every: bool = False) -> None:
@@ -282,6 +284,17 @@ def _claim(one: dict) -> str:
         f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
         f"{_number(one['tolerance'])}: found {_number(one['found'])}"
     )
+
+
+def _verdict(one: dict, said: dict) -> str:
+    where = one["place"] + ("" if one["chainage"] is None else f" at {_number(one['chainage'])} m")
+    when = "" if one["time"] is None else f", {_number(one['time'])} s"
+    beside = "at least" if one["bound"] == "least" else "at most"
+    found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where}{when})"
+    held = "holds" if one["ok"] else "FAILS"
+    if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
+        held = f"OPEN, as the run is not ok ({said['reason']})"
+    return f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {_number(one['margin'])}"
 
 
 def _comparison(one: dict) -> str:

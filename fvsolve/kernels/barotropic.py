@@ -13,6 +13,7 @@ from fvsolve.kernels.density import (
     local_speed,
     pressure_of_mass,
 )
+from fvsolve.kernels.density.profile import lean
 from fvsolve.kernels.friction import drag
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.pipes import GAUSS, both_faces
@@ -71,6 +72,8 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             dr[k] = 0.5 * (c * mass_rate + flow_rate)
             dl[k] = 0.5 * (c * mass_rate - flow_rate)
         left_flow, left_flux, left_mass = dflow, flux, dm
+    if pipe["rise"] >= 0:
+        lean(st, profile, pipe, r, l, dr, dl)
     low = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, least))
     high = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, greatest))
     return (quickest / least + max(low, high)) / dx * pipe["quicker"]

@@ -9,6 +9,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.barotropic import wall_force
 from fvsolve.kernels.density import force_of_mass, local_speed, pressure_of_mass
 from fvsolve.kernels.density.mixture import relative_volume
+from fvsolve.kernels.density.profile import lean
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import RATE, UPWIND
@@ -113,6 +114,8 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             dr[k], dl[k] = 0.5 * (c * mass_rate + flow_rate), 0.5 * (c * mass_rate - flow_rate)
             highest, quickest = max(highest, p[i]), max(quickest, abs(v[i]))
         left_flow, left_flux = dflow, flux
+    if pipe["rise"] >= 0:
+        lean(st, profile, pipe, r, l, dr, dl)
     return (quickest + local_speed(st, floats, pipe, highest)) / dx * pipe["quicker"]
 
 

@@ -7,6 +7,7 @@ V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses 
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import enthalpy, pressure_of_mass, thrust
+from fvsolve.kernels.density.profile import rise_to
 from fvsolve.kernels.energy import (
     BRACE,
     COLUMN,
@@ -85,7 +86,7 @@ def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
             m, flow = held(st, profile, pipe, i, g, (a + b) / c), pipe["flow"] + (a - b)
             v = flow / m
             h = enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - base
-            h += st["gravity"] * (z + pipe["slope"] * (i + 0.5 + PLACES[g]) * dx)
+            h += st["gravity"] * (z + rise_to(profile, pipe, (i + 0.5 + PLACES[g]) * dx))
             pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
             friction += SHARES[g] * v * pull * (reference / m)
             rate += SHARES[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
@@ -105,7 +106,7 @@ def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
             m, flow = held(st, profile, pipe, i, g, (a + b) / c), pipe["flow"] + (a - b)
             p0, p = pressure_of_mass(st, floats, pipe, m0), pressure_of_mass(st, floats, pipe, m)
             h0, h = enthalpy(st, floats, p0) - base, enthalpy(st, floats, p) - base
-            height = st["gravity"] * (z + pipe["slope"] * (i + 0.5 + PLACES[g]) * dx)
+            height = st["gravity"] * (z + rise_to(profile, pipe, (i + 0.5 + PLACES[g]) * dx))
             kinetic += SHARES[g] * (0.5 * flow * flow / m - 0.5 * pipe["flow"] * pipe["flow"] / m0)
             squeezed = (m * h - m0 * h0) - (thrust(st, floats, pipe, p) - thrust(st, floats, pipe, p0))
             elastic += SHARES[g] * (squeezed + height * (m - m0))

@@ -175,6 +175,9 @@ def record_nodes(t, y, out, handle, values):
     marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
     for k in range(values.size):
         widen(extremes, k, t, values[k])
+        which = tables.probes[k]["mark"]
+        if which >= 0 and values[k] < vapor and marks[which] != marks[which]:
+            marks[which] = t
     for i in range(nodes.size):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:

@@ -100,7 +100,8 @@ PIPE = np.dtype(  # what delay lines read comes first, in as few cache lines as 
         ("reynolds", "f8"),  # Reynolds number per mass flow [s/kg]
         ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
-        ("slope", "f8"),  # rise per length
+        ("slope", "f8"),  # rise per length, 0 of one with a profile
+        ("rise", "i8"),  # offset in `profile` of its rise from its `from` end at faces and centres [m]; -1: straight
         ("terms", "i8"),  # exponentials of its unsteady friction; 0 for none
         ("term", "i8"),  # offset in `floats` of pairs: drag per flow that is yet to follow [1/s], rate of following
         ("memory", "i8"),  # offset in y of the flows that follow, a row of cells for each term [kg/s]
@@ -468,6 +469,7 @@ PROBE = np.dtype(
         ("head", "i8"),  # laws log and table: 1 a head, 2 a velocity
         ("mass", "f8"),  # laws log and table: mass per length of the profile there [kg/m]
         ("scalar", "i8"),
+        ("mark", "i8"),  # the pipe that boils where this pressure is below vapour pressure; -1: none
     ],
     align=True,
 )

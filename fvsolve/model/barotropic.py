@@ -104,7 +104,9 @@ class BarotropicStart(Start):
             m, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.pressure(i))
             start += 0.5 * (flow / m) ** 2
         faces, centers = np.zeros(mesh.cells + 1), np.zeros(mesh.cells)
-        b_to = profile_along(self.st, self.floats, row, float(start), z, flow, faces, centers)
+        b_to = profile_along(
+            self.st, self.floats, self.draft.tables.profile, row, float(start), z, flow, faces, centers
+        )
         self.ends = faces[0], faces[-1]
         return faces, centers, b_to
 
@@ -155,8 +157,7 @@ class BarotropicStart(Start):
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         row, mesh = self.pipes[k], self.draft.meshes[k]
-        z = self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
-        return self.pressure_of_mass(row, self.mass_at(k, fraction)), z
+        return self.pressure_of_mass(row, self.mass_at(k, fraction)), self.height(row, mesh, fraction)
 
     def mass_at(self, k: int, fraction: float) -> float:
         """Mass per length of the profile at a fraction of pipe k, linear between faces and centres."""
@@ -167,7 +168,17 @@ class BarotropicStart(Start):
             profile[row["face"] : row["face"] + n + 1],
             profile[row["center"] : row["center"] + n],
         )
-        return float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), both))
+        m = float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), both))
+        return m if row["rise"] < 0 else self.leant(row, mesh, fraction, m)
+
+    def leant(self, row, mesh, fraction: float, m: float) -> float:
+        """Mass per length of a place between faces and centres, which may lie above or below their straight line."""
+        rises = self.draft.tables.profile[row["rise"] : row["rise"] + 2 * mesh.cells + 1]
+        straight = np.interp(fraction, np.linspace(0.0, 1.0, rises.size), rises)
+        higher = mesh.profile.at(fraction * mesh.length) - mesh.profile.elevation[0] - straight
+        p = self.pressure_of_mass(row, m)
+        p -= self.law.density(p) * self.case.gravity * higher
+        return float(kernels.mass_of_pressure(self.st, self.floats, row, float(p))[0])
 
     def fill_columns(self) -> None:
         for row, flow in zip(self.columns, self.column_flow, strict=True):

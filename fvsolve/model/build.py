@@ -85,6 +85,7 @@ def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
     lower_scalars(draft)
     draft.check()
     pack(draft, np.zeros(profile_size(draft)))
+    fill_rises(draft)
     return draft
 
 
@@ -115,15 +116,29 @@ def fill_links(draft: Draft) -> None:
 
 
 def profile_size(draft: Draft) -> int:
-    """Place of every pipe's profile: a threshold a cell; under `log` and `table` masses and fluxes behind it."""
+    """Place of every pipe's profile: a threshold a cell; under other laws than `linear` masses, fluxes and the rise of
+    what is not straight behind it."""
     at = draft.cells
     if draft.case.law.linear:
         return 2 * at if draft.case.scalars else at
-    for row in draft.pipe_table:
+    for row, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
         n = row["cells"]
         row["face"], row["flux"], row["center"] = at, at + n + 1, at + 2 * n + 2
         at += 3 * n + 2
+        if mesh.profile is not None:
+            row["rise"] = at
+            at += 2 * n + 1
     return int(at)
+
+
+def fill_rises(draft: Draft) -> None:
+    """How far pipes with a profile rise from their `from` end, at faces and centres [m]."""
+    for row, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
+        if row["rise"] >= 0:
+            heights = mesh.profile.at(np.linspace(0.0, mesh.length, 2 * mesh.cells + 1))
+            low, high = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
+            heights[0], heights[-1] = low, high
+            draft.tables.profile[row["rise"] :][: heights.size] = heights - low
 
 
 def pack(draft: Draft, profile: np.ndarray) -> None:
@@ -240,5 +255,5 @@ def model_of(draft: Draft) -> Model:
         draft.mass_names, draft.body_names, draft.bushing_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        draft.basins,
+        draft.basins, case.watched, draft.watched_start,
     )  # fmt: skip

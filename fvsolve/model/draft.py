@@ -113,6 +113,7 @@ class Draft:
     shut: dict[int, list[str]] = field(default_factory=dict)  # and those that no open link joins to anything
     tables: Any = None  # all of them, as kernels read them
     shapes: Any = None  # of what runs write
+    watched_start: np.ndarray = field(default_factory=lambda: np.zeros(0))  # see `Model`
     profiles: dict[int, np.ndarray] = field(default_factory=dict)  # pipe -> pressure of the profile at centres [Pa]
     steady: dict[str, Any] = field(default_factory=dict)
 

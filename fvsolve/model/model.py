@@ -23,12 +23,14 @@ from fvsolve.units import show
 if TYPE_CHECKING:
     from fvsolve.basins.lower_basin import BasinRows
     from fvsolve.case import Case
+    from fvsolve.case.probe import Probe
     from fvsolve.model.state_names import StateNames
+    from fvsolve.parts.pipe.profile import Profile
 
 
 @dataclass(frozen=True)
 class PipeMesh:
-    """Cells of one pipe, from its `from` end: x centres, edges [m] and elevation of centres [m]."""
+    """Cells of one pipe, from its `from` end: x centres, edges [m], elevation of centres [m]; its profile, if any."""
 
     name: str
     from_: str
@@ -40,6 +42,14 @@ class PipeMesh:
     x: np.ndarray
     edges: np.ndarray
     elevation: np.ndarray
+    profile: Profile | None
+    ends: tuple[float, float]  # elevations of its ends [m]
+
+    def height(self, distance: Any) -> Any:
+        """Elevation at distances from its `from` end [m]."""
+        if self.profile is None:
+            return self.ends[0] + (self.ends[1] - self.ends[0]) * (distance / self.length)
+        return self.profile.at(distance)
 
 
 @dataclass(repr=False)
@@ -140,6 +150,8 @@ class Model(Shown):
     start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
     events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
     basins: list[BasinRows]  # as their table has them
+    watched: list[Probe]  # beside the probes, for their extremes alone
+    watched_start: np.ndarray  # what those of pressure along pipes are in the profile [Pa], nan of others
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
     packed: list = field(default_factory=list, init=False)  # its draft before the start, where others are made of it
 

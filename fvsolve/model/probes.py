@@ -13,9 +13,10 @@ from fvsolve.model.reading import along
 
 def lower_probes(draft) -> np.ndarray:
     """The probe table of a scene; pressures of the profile are filled in later by `probe_offsets`."""
-    case, table = draft.case, np.zeros(len(draft.case.probes), rec.PROBE)
+    case, table = draft.case, np.zeros(len(observed(draft.case)), rec.PROBE)
     parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
-    for row, probe in zip(table, draft.case.probes, strict=True):
+    for row, probe in zip(table, observed(case), strict=True):
+        row["mark"] = -1
         if probe.point is not None:
             lower_point(draft, row, probe)
         elif probe.quantity in draft.case.scalars:
@@ -26,6 +27,11 @@ def lower_probes(draft) -> np.ndarray:
             part = parts[probe.part][probe.name]
             lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
     return table
+
+
+def observed(case) -> list:
+    """All that is read after every step: probes, then what is watched for extremes alone."""
+    return [*case.probes, *case.watched]
 
 
 def scalar_probe(draft, row, probe) -> None:
@@ -76,8 +82,13 @@ def lower_surface(draft, row, probe) -> None:
 
 
 def probe_offsets(draft, start) -> None:
-    """Scale and offset of every probe, once the profile is known."""
-    for row, probe in zip(draft.probe_table, draft.case.probes, strict=True):
+    """Scale and offset of every probe, and pressures of what is watched along pipes, once the profile is known."""
+    few = len(draft.case.probes)
+    draft.watched_start = np.full(len(draft.probe_table) - few, np.nan)
+    for k, (row, probe) in enumerate(zip(draft.probe_table[few:], draft.case.watched, strict=True)):
+        if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
+            draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
+    for row, probe in zip(draft.probe_table, observed(draft.case), strict=True):
         if row["kind"] >= rec.CELL_FIELD:  # their profile is known to basins
             continue
         if draft.case.law.linear:

@@ -37,7 +37,7 @@ class Slate:
 
     clock : until when schedules are as in the segment, and the step that is given; see `records.CLOCK`
     armed : 1.0 where an event has happened and still holds; marks : first times of what a model cannot follow [s]
-    envelope, extremes : least and greatest of all cells and of all probes, each above its time
+    envelope, extremes : least and greatest of all cells, and of all probes and what is watched, each above its time
     bands : of every basin, the first of the rows, of a mesh of the cells, that are stepped here and one beyond the
     last; joint : see `kernels.joint`, empty where all are; sums : see `kernels.sums`
     """
@@ -147,6 +147,6 @@ class Slate:
 
     def observe(self, t: float, y: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Values of all probes at (t, y), with `out` as `evaluate` gave it : float64[probes] [SI]."""
-        values = np.zeros(len(self.model.probes))
+        values = np.zeros(len(self.model.tables.probes))
         self.model.functions.observe(t, y, out, self.handle, values)
-        return values
+        return values[: len(self.model.probes)]

@@ -365,10 +365,16 @@ class Start:
         row["drag"] = change * row["area"] / mesh.length
         return True
 
+    def height(self, row, mesh, fraction: float) -> float:
+        """Elevation of a pipe [m] at a fraction of its length."""
+        if mesh.profile is not None:
+            return float(mesh.profile.at(fraction * mesh.length))
+        return self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
+
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""
         row, mesh = self.pipes[k], self.draft.meshes[k]
-        z = self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
+        z = self.height(row, mesh, fraction)
         potential = self.answer.potential[row["from_node"]] - row["drag"] / row["area"] * fraction * mesh.length
         return potential - self.weight * z, z
 

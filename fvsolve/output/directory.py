@@ -10,16 +10,17 @@ from pathlib import Path
 from fvsolve.case.size import LEAST_TEXT, on_disk, size
 from fvsolve.errors import RunError
 from fvsolve.output.column import probe_columns, time_column
-from fvsolve.output.envelope import read_envelope, with_start, write_envelope
+from fvsolve.output.envelope import in_units, read_envelope, with_start, write_envelope
 from fvsolve.output.fields import FieldSeries
 from fvsolve.output.history import HistoryFile, read_table
 from fvsolve.output.lines import LineSeries, clear_lines
 from fvsolve.output.lock import let_go, locked
 from fvsolve.output.pieces import Shares
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
+from fvsolve.output.routes import write_routes
 from fvsolve.output.summary import read_summary
 
-OWN = ("restart.npz", "history.csv", "envelope.csv", "fields.pvd", "case.toml")
+OWN = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
 ENDED = "summary.json"
 PICTURES = ("history.png", "envelope.png")
 
@@ -110,8 +111,11 @@ class RunDirectory:
         with self.writing():
             self.history.close()
             if summary.envelope:
-                envelope = with_start(summary.envelope, self.model)
-                write_envelope(self.folder / "envelope.csv", envelope, self.model.case)
+                case = self.model.case
+                envelope = in_units(with_start(summary, self.model), case)
+                write_envelope(self.folder / "envelope.csv", envelope, case)
+                if case.routes:
+                    write_routes(self.folder / "routes.csv", envelope, case)
 
     def close(self) -> None:
         """Let go of open files and of the directory, also when a run broke off."""

@@ -28,26 +28,39 @@ def envelope_columns(case) -> list[UnitColumn]:
     return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
 
 
-def with_start(envelope: dict, model) -> dict:
-    """The envelope of a solver with the heads that the run began from, `initial_head` [m]."""
+def with_start(summary, model) -> dict:
+    """The envelope of a solver, cells and what is watched between them by distance, with the heads that the run began
+    from, `initial_head` [m]."""
     found = {}
     for k, pipe in enumerate(model.pipes):
-        pressure = model.cell_pressure(k, np.zeros(pipe.cells))
-        found[pipe.name] = {**envelope[pipe.name], "initial_head": model.head(pressure, pipe.elevation)}
+        one = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
+        if (points := summary.points.get(pipe.name)) is not None:
+            one = {key: np.concatenate([values, points[key]]) for key, values in one.items()}
+            order = np.argsort(one["distance"], kind="stable")
+            one = {key: values[order] for key, values in one.items()}
+        one["initial_head"] = model.head(one.pop("initial_pressure"), one["elevation"])
+        found[pipe.name] = one
     return found
+
+
+def in_units(envelope: dict, case) -> dict:
+    """An envelope in SI in the units of envelope.csv."""
+    columns = envelope_columns(case)
+    return {pipe: {one.name: np.asarray(one.from_si(np.asarray(arrays[one.name], float))) for one in columns}
+            for pipe, arrays in envelope.items()}  # fmt: skip
 
 
 def write_envelope(path: Path, envelope: dict, case) -> None:
     """One row per cell: pipe, distance from `from`, elevation, extremes and their times.
 
-    `envelope` maps a pipe to `float64[cells]` arrays in SI named as in `QUANTITIES`.
+    `envelope` maps a pipe to `float64[cells]` arrays named as in `QUANTITIES`, in units of the columns.
     """
     columns = envelope_columns(case)
     with open(path, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pipe", *(one.header for one in columns)])
         for pipe, arrays in envelope.items():
-            values = [one.from_si(np.asarray(arrays[one.name], float)).tolist() for one in columns]
+            values = [arrays[one.name].tolist() for one in columns]
             table.writerows([pipe, *map(repr, row)] for row in zip(*values, strict=True))
 
 

@@ -168,7 +168,11 @@ def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
         start, end = places[pipe.from_], places[pipe.to]
         low, high = model.elevation[pipe.from_], model.elevation[pipe.to]
         inner = layout.path(start, end, fractions, bends[pipe.name])
-        points.append(np.column_stack([inner, low + fractions * (high - low)]))
+        z = low + fractions * (high - low)
+        if pipe.profile is not None:
+            z = pipe.profile.at(pipe.edges[1:-1])
+            inner = inner if pipe.profile.plan is None else pipe.profile.seen(pipe.edges[1:-1])
+        points.append(np.column_stack([inner, z]))
         chain = [index[pipe.from_], *range(count, count + pipe.cells - 1), index[pipe.to]]
         lines.append(np.column_stack([chain[:-1], chain[1:]]))
         count += pipe.cells - 1

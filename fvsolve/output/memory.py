@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.output.column import converted, probe_columns, time_column
-from fvsolve.output.envelope import envelope_columns, with_start
+from fvsolve.output.envelope import in_units, with_start
 
 
 class MemorySink:
@@ -20,7 +20,7 @@ class MemorySink:
         self.time = time_column(model.case)
         self.columns = probe_columns(model)
         self._blocks: list[np.ndarray] = []
-        self._envelope: dict = {}
+        self._summary = None
 
     def begin(self, model, state) -> None:
         """Nothing to open."""
@@ -39,7 +39,7 @@ class MemorySink:
 
     def end(self, summary) -> None:
         """Keep the envelope."""
-        self._envelope = summary.envelope
+        self._summary = summary
 
     def close(self) -> None:
         """Nothing is open."""
@@ -55,10 +55,6 @@ class MemorySink:
 
     def envelope(self) -> dict:
         """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
-        if not self._envelope:  # of a run that never ended
+        if not self._summary:  # of a run that never ended
             return {}
-        columns = envelope_columns(self.model.case)
-        return {
-            pipe: {one.name: one.from_si(np.array(arrays[one.name])) for one in columns}
-            for pipe, arrays in with_start(self._envelope, self.model).items()
-        }
+        return in_units(with_start(self._summary, self.model), self.model.case)

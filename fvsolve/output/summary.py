@@ -15,7 +15,7 @@ from fvsolve.output.envelope import envelope_columns
 # What a reader looks for.
 NEEDED = (
     "title", "case", "reason", "ok", "t", "marks", "probes", "time_unit", "envelope_units", "ambient_pressure",
-    "extremes", "ledgers", "expectations", "comparisons", "versions", "warnings", "files",
+    "extremes", "ledgers", "expectations", "comparisons", "verdicts", "versions", "warnings", "files",
 )  # fmt: skip
 
 

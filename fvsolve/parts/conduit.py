@@ -26,6 +26,7 @@ from fvsolve.parts.value import (
 from fvsolve.units import show
 
 BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela are 13.7 m wide
+LENGTH = Quantity("length", positive, "along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
 DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, COUNTED)
 LOSS = Number(nonnegative, "loss coefficient on its velocity, spread along it")
 
@@ -71,9 +72,7 @@ class Conduit(TwoPort):
         'wave_speed, or wall = { youngs_modulus = "210 GPa", thickness = "8 mm" }',
     )
 
-    length: Annotated[
-        float, Quantity("length", positive, "along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
-    ]
+    length: Annotated[float, LENGTH]
     diameter: Annotated[float, DIAMETER] = None  # nominal stands in for it
     nominal: Annotated[str | None, Text('"DN100", "NPS 4" or "NPS 1-1/2", in place of diameter', COUNTED)] = None
     schedule: Annotated[

@@ -149,7 +149,7 @@ def _result(model, summary, sink, begun: float) -> Result:
     said = described(summary, model)
     result = Result(said, sink.table, sink.envelope, sink.folder)
     result.case = model.case
-    said |= claims(model, summary.extremes, result)
+    said |= claims(model, summary, result)
     said["versions"] = identity(model.case)
     if sink.folder is not None:
         said["files"] = sink.files()

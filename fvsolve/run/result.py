@@ -46,6 +46,29 @@ class Expectation(NamedTuple):
     ok: bool
 
 
+class LimitVerdict(NamedTuple):
+    """A limit of the case: the place that is nearest to it, or beyond it most; lengths in m, times in s, else `unit`.
+
+    margin : how far from the limit, negative beyond it; bound : "least" or "greatest"; until : when the run ended
+    worst : the same of the worst places of each part
+    """
+
+    name: str
+    ok: bool
+    place: str
+    chainage: float | None
+    elevation: float | None
+    time: float | None
+    bound: str
+    value: float | None
+    limit: float | None
+    margin: float | None
+    unit: str
+    quantity: str
+    until: float
+    worst: list[dict]
+
+
 class Comparison(NamedTuple):
     """A measured series held against its probe: differences and peaks in `unit`, times in s."""
 
@@ -67,8 +90,9 @@ class Result(Shown):
     """Probes over time and what is to be said about them, in the units of `[output]`.
 
     `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
-    `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.expectations`, `.comparisons`;
-    all but the arrays as plain data in `result.summary`. `result.directory` is where it is on disk, or None.
+    `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.routes`, `.expectations`,
+    `.verdicts`, `.comparisons`; all but the arrays as plain data in `result.summary`. `result.directory` is where it is
+    on disk, or None.
     """
 
     def __init__(
@@ -122,6 +146,11 @@ class Result(Shown):
         return [Expectation(**one) for one in self.summary["expectations"]]
 
     @property
+    def verdicts(self) -> list[LimitVerdict]:
+        """What `[limits]` ask for, whether it holds, and where and when it is nearest to failing."""
+        return [LimitVerdict(**one) for one in self.summary["verdicts"]]
+
+    @property
     def comparisons(self) -> list[Comparison]:
         """How far each measured series is from its probe."""
         return [Comparison(**one) for one in self.summary["comparisons"]]
@@ -141,6 +170,13 @@ class Result(Shown):
             for array in arrays.values():
                 array.flags.writeable = False
         return found
+
+    @cached_property
+    def routes(self) -> dict:
+        """Route -> chainage, pipe, distance, elevation, least and greatest pressure and head, times, along it."""
+        from fvsolve.output.routes import along_routes
+
+        return along_routes(self.envelope, self.case)
 
     @property
     def probes(self) -> list[str]:

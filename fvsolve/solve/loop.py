@@ -56,11 +56,15 @@ class Loop:
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.within = within(model)
-        stepper.out, stepper.out_row, stepper.values = model.new_out(), model.new_out(), np.zeros(len(model.probes))
+        stepper.out, stepper.out_row, stepper.values = (
+            model.new_out(),
+            model.new_out(),
+            np.zeros(len(model.tables.probes)),
+        )
         self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
         events = self.armed.size
         stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
-        stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.probes)))
+        stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
         self.memory, self.orders, self.flags, self.out = stepper.memory, stepper.orders, stepper.flags, stepper.out
         self.orders[slots.STEP_MAX] = (
             min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT

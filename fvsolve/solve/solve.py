@@ -23,6 +23,8 @@ from fvsolve.solve.summary import (
     find_envelope,
     find_extremes,
     find_marks,
+    find_points,
+    find_watched,
     mass_ledger,
     run_downs,
 )
@@ -178,19 +180,20 @@ class Run:
         """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
         out = self.loop.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.slate.handle, self.loop.stepper.values)
-        self.sink.rows(np.array([t]), self.loop.stepper.values[None, :].copy())
+        self.sink.rows(np.array([t]), self.loop.stepper.values[None, : len(self.model.probes)].copy())
         return out
 
     def flush(self) -> None:
         if self.loop.flags[slots.ROWS]:
             rows = self.loop.take_rows()
-            self.sink.rows(rows[:, 0], rows[:, 1:])
+            self.sink.rows(rows[:, 0], rows[:, 1 : 1 + len(self.model.probes)])
             self.widen(rows)
 
     def widen(self, rows: np.ndarray) -> None:
         """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
-        least, t_least, greatest, t_greatest = self.slate.extremes
-        t, values = rows[:, 0], rows[:, 1:]
+        few = len(self.model.probes)
+        least, t_least, greatest, t_greatest = self.slate.extremes[:, :few]
+        t, values = rows[:, 0], rows[:, 1 : 1 + few]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
         lower = (found := values[at, each]) < least
         if lower.any():
@@ -401,8 +404,9 @@ class Run:
         ok = reason == "finished" and all(one.ok for one in warnings)
         summary = Summary(
             reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
-            find_envelope(self.slate), loop.stepper.counts(), self.methods(), model.all_cells, self.seconds,
-            self.processor, self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
+            find_envelope(self.slate), find_points(self.slate), find_watched(self.slate),
+            loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
+            self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
             find_cavities(self.slate), warnings, self.threads,
         )  # fmt: skip
         self.sink.end(summary)

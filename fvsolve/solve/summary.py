@@ -56,6 +56,8 @@ class Summary:
     ledgers: dict[str, dict[str, Any]] = field(default_factory=dict)
     extremes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     envelope: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    points: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)  # likewise, between the cells of pipes
+    watched: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)  # extremes of what is no probe
     counts: dict[str, int] = field(default_factory=dict)  # steps, rejections, calls of rhs, what Newton did
     methods: list[dict[str, Any]] = field(default_factory=list)  # which one from when on, and why
     cells: int = 0
@@ -165,18 +167,47 @@ def find_extremes(slate: Slate) -> dict[str, tuple[float, float, float, float]]:
     return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(slate.model.probes)}
 
 
+def find_watched(slate: Slate) -> dict[str, tuple[float, float, float, float]]:
+    """The same of what is watched beside the probes."""
+    table, few = slate.extremes, len(slate.model.probes)
+    return {probe.text: tuple(map(float, table[:, few + k])) for k, probe in enumerate(slate.model.watched)}
+
+
+def find_points(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
+    """What `find_envelope` says of cells, and the pressure at the start, of watched places along pipes: their ends and
+    the points of profiles."""
+    model, few, found = slate.model, len(slate.model.probes), {}
+    rows = [k for k, probe in enumerate(model.watched) if np.isfinite(model.watched_start[k])]
+    for pipe in model.pipes if rows else ():
+        own = [k for k in rows if model.watched[k].name == pipe.name]
+        if not own:
+            continue
+        distance = np.array([model.watched[k].fraction * pipe.length for k in own])
+        low, t_low, high, t_high = slate.extremes[:, few + np.array(own)]
+        found[pipe.name] = described(model, pipe, distance, pipe.height(distance), (low, t_low, high, t_high))
+        found[pipe.name]["initial_pressure"] = model.watched_start[own]
+    return found
+
+
 def find_envelope(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
     """Pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with their times [s]."""
     model, envelope, found = slate.model, slate.envelope, {}
     for k, pipe in enumerate(model.pipes):
         cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
         least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))
-        found[pipe.name] = {
-            "distance": pipe.x, "elevation": pipe.elevation, "least_pressure": least, "t_least": envelope[1, cells],
-            "greatest_pressure": greatest, "t_greatest": envelope[3, cells],
-            "least_head": model.head(least, pipe.elevation), "greatest_head": model.head(greatest, pipe.elevation),
-        }  # fmt: skip
+        extremes = least, envelope[1, cells], greatest, envelope[3, cells]
+        found[pipe.name] = described(model, pipe, pipe.x, pipe.elevation, extremes)
     return found
+
+
+def described(model: Model, pipe, distance, elevation, extremes) -> dict[str, np.ndarray]:
+    """Extremes of pressure along a pipe, least and greatest each with its times, as an envelope has them."""
+    least, t_least, greatest, t_greatest = extremes
+    return {
+        "distance": distance, "elevation": elevation, "least_pressure": least, "t_least": t_least,
+        "greatest_pressure": greatest, "t_greatest": t_greatest,
+        "least_head": model.head(least, elevation), "greatest_head": model.head(greatest, elevation),
+    }  # fmt: skip
 
 
 def relative(remainder: float, largest: float) -> float:

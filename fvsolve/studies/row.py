@@ -84,19 +84,26 @@ def row_of(model, summary, sink) -> dict[str, Any]:
         said |= {f"max({name}) {unit}": one.from_si(greatest), f"t_max({name}) [s]": t_greatest}
         said[f"final({name}) {unit}"] = last[1 + k]
         row |= {key: None if blown else plain(float(x)) for key, x in said.items()}
-    claimed = expectations(model, summary, sink)
+    claimed = claimed_of(model, summary, sink)
     row["expectations"] = all(claim["ok"] for claim in claimed) if claimed else None
+    row["verdicts"] = all(one["ok"] for one in verdicts(model, summary)) if model.case.limits else None
     return row | {"steps": summary.steps, "seconds": plain(float(summary.seconds))}
 
 
-def expectations(model, summary, sink) -> list[dict[str, Any]]:
+def claimed_of(model, summary, sink) -> list[dict[str, Any]]:
     """What the case claims and whether it holds, as a run says it."""
     from fvsolve.run import Result
-    from fvsolve.run.claims import expectation
+    from fvsolve.run.claims import expectations
 
     columns = {one.name: one for one in sink.columns}
     probes = {name: {"dimension": one.dimension, "unit": one.unit} for name, one in columns.items()}
     about = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
     result = Result(about, sink.table, sink.envelope)
-    return [expectation(text, expect, columns[expect.probe.text], summary.extremes, result)
-            for text, expect in model.case.expect.items()]  # fmt: skip
+    return expectations(model, summary, result)
+
+
+def verdicts(model, summary) -> list[dict[str, Any]]:
+    """Whether its limits hold, as a run says it."""
+    from fvsolve.run.verdicts import verdicts
+
+    return verdicts(model, summary)

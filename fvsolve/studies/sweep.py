@@ -28,7 +28,7 @@ from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.units import show
 
 FIRST = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
-LAST = ("expectations", "steps", "seconds")
+LAST = ("expectations", "verdicts", "steps", "seconds")
 KEPT = {"row": 5}  # counts up when a row holds something else: older ones on disk are not reused
 WORDS = ("title", "description", "source")  # of a case, which change no row
 

@@ -400,7 +400,11 @@ def test_what_the_schema_refers_to_is_what_it_says_unshared():
 def test_a_parts_key_is_documented_with_its_unit():
     made = schema()
     pipe = next(one for one in made["properties"]["links"]["additionalProperties"]["anyOf"] if one["title"] == "Pipe")
-    assert pipe["required"] == ["type", "from", "to", "length"]  # a diameter or a nominal size, as it likes
+    assert pipe["required"] == [
+        "type",
+        "from",
+        "to",
+    ]  # a length or a profile, a diameter or a nominal size, as it likes
     assert pipe["properties"]["length"]["description"] == "along its axis [m]"
     assert made["required"] == ["fluid", "nodes", "numerics"]
 

@@ -124,3 +124,15 @@ def test_a_fault_is_named_where_it_stands_and_once(file, changed, place, said):
 def test_the_schema_knows_them():
     found = schema()["properties"]["defaults"]["properties"]["pipe"]
     assert "cells" in found["properties"] and "from" not in found["properties"] and "required" not in found
+
+
+def test_pieces_of_a_pipe_that_is_cut_have_them_once(file):
+    """A loss among defaults is shared by the pieces, not given to each."""
+    placed = '[nodes.end]\ntype = "junction"\n[nodes.gauge]\ntype = "junction"\non = "one"\nat = "400 m"'
+    case = load(file(('[nodes.end]\ntype = "junction"', placed), ("cells = 30", "cells = 30\nminor_loss = 2.0")))
+    pieces = [case.links["one-1"], case.links["one-2"]]
+    assert [one.cells for one in pieces] == [12, 18] and sum(one.minor_loss for one in pieces) == pytest.approx(2.0)
+    assert all(one.wall.thickness == 7e-3 for one in pieces)
+    with pytest.raises(CaseError) as caught:
+        load(file(('[nodes.end]\ntype = "junction"', placed), ("7 mm", "7 kg")))
+    assert [one.place for one in caught.value.faults] == ["defaults.pipe.wall.thickness"]

@@ -157,7 +157,7 @@ BAD = {
         add("numerics", "zzz = 3"),
         "numerics.zzz: unknown key; keys are accuracy, below_vapor, ",
     ),
-    "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: length is missing"),
+    "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: wanted one of length, profile"),
     "unknown type": (
         swap('"valve"', '"vavle"'),
         'line 33: links.valve.type: no type "vavle"; types are bushing, check-valve, cylinder, damper, ',

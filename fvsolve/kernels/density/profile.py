@@ -1,7 +1,28 @@
 """The profile of a pipe that its drag holds. Knows one pipe; knows no node."""
 
-from fvsolve.jit import njit
+from fvsolve.jit import inner, njit
 from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressure_of_enthalpy
+
+
+@inner
+def rise_to(profile, pipe, x):
+    """How far a pipe rises [m] from its `from` end over a distance x along it."""
+    if pipe["rise"] < 0:
+        return pipe["slope"] * x
+    share = x / (0.5 * pipe["dx"])
+    j = min(int(share), 2 * pipe["cells"] - 1)
+    before, after = profile[pipe["rise"] + j], profile[pipe["rise"] + j + 1]
+    return before + (after - before) * (share - j)
+
+
+@njit
+def lean(st, profile, pipe, r, l, dr, dl):
+    """Weight along a pipe with a profile, - m' g dz/dx, into d/dt of both waves of its cells."""
+    at, weight = pipe["rise"], st["gravity"] / (pipe["dx"] * pipe["speed"])
+    for i in range(r.size):
+        force = -weight * (profile[at + 2 * i + 2] - profile[at + 2 * i]) * (r[i] + l[i])
+        dr[i] += 0.5 * force
+        dl[i] -= 0.5 * force
 
 
 @njit
@@ -20,7 +41,7 @@ def mass_of_head(st, floats, pipe, bernoulli, flow):
 
 
 @njit
-def profile_along(st, floats, pipe, start, z, flow, faces, centers):
+def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
     """Profile of a pipe that its drag holds: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
 
     start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Fills mass per length at faces and
@@ -33,12 +54,12 @@ def profile_along(st, floats, pipe, start, z, flow, faces, centers):
     for i in range(2 * centers.size):
         x = i * half
         k1 = -pull / (m * m)
-        middle = g * (z + pipe["slope"] * (x + 0.5 * half))
+        middle = g * (z + rise_to(profile, pipe, x + 0.5 * half))
         m = mass_of_head(st, floats, pipe, b + 0.5 * half * k1 - middle, flow)
         k2 = -pull / (m * m)
         m = mass_of_head(st, floats, pipe, b + 0.5 * half * k2 - middle, flow)
         k3 = -pull / (m * m)
-        end = g * (z + pipe["slope"] * (x + half))
+        end = g * (z + rise_to(profile, pipe, x + half))
         m = mass_of_head(st, floats, pipe, b + half * k3 - end, flow)
         b += half * (k1 + 2.0 * k2 + 2.0 * k3 - pull / (m * m)) / 6.0
         m = mass_of_head(st, floats, pipe, b - end, flow)

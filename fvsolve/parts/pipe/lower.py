@@ -32,7 +32,9 @@ class PipeRows(Lowering, kind="pipe"):
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
         row["cell"], draft.cells = draft.cells, draft.cells + n
         z = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
-        row["slope"] = (z[1] - z[0]) / link.length
+        row["rise"] = -1
+        if link.profile is None:
+            row["slope"] = (z[1] - z[0]) / link.length
         row["noise"] = (1e-9 * draft.fluid.density * area * speed) ** 2
         row["compliance"] = draft.hydraulics.compliance(name, speed, draft.fault)
         draft.hydraulics.friction(name, link, row, draft.fault)
@@ -45,10 +47,11 @@ class PipeRows(Lowering, kind="pipe"):
             row["y"] = draft.states(names, 0.5e5 * row["admittance"])
             add_creep(draft, name, link, row)
         x = (np.arange(n) + 0.5) * (link.length / n)
+        along_it = z[0] + row["slope"] * x if link.profile is None else link.profile.at(x)
         draft.meshes.append(
             PipeMesh(
                 name, link.from_, link.to, link.length, link.diameter, n, speed, x,
-                np.linspace(0.0, link.length, n + 1), z[0] + row["slope"] * x,
+                np.linspace(0.0, link.length, n + 1), along_it, link.profile, (float(z[0]), float(z[1])),
             )
         )  # fmt: skip
 
@@ -59,4 +62,6 @@ class PipeRows(Lowering, kind="pipe"):
             row["weights"] = len(draft.floats)
             draft.floats.append(probe.fraction)
         else:
-            along(draft, row, probe.fraction)
+            along(draft, row, probe.fraction, 1 if probe.straight else None)
+        if probe.straight and probe.quantity == "pressure" and not draft.case.law.cavitates:
+            row["mark"] = row["index"]

@@ -8,8 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.conduit import Conduit
-from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrStiff, wants_poisson, yielding
+from fvsolve.parts.conduit import LENGTH, Conduit
+from fvsolve.parts.pipe.profile import Profile, ProfileValue
+from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrStiff, wall_faults, yielding
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Inside
 from fvsolve.parts.value import (
@@ -26,10 +27,12 @@ from fvsolve.parts.value import (
     between,
     positive,
 )
-from fvsolve.units import show
 
 MOST_CELLS = 10**8
 CATALOGUE = frozenset(("material", "class", "lining"))  # keys that stand for others, beside names of sizes
+SPANNED = 1e-6  # of its length, by which chainage may differ from it
+MET = 1e-6  # in elevation, by which a profile may miss its nodes [m]
+ENDS = {"from": "begins", "to": "ends"}
 LINES = ("cells", "delay", "auto")  # how waves in a pipe are followed
 
 
@@ -41,7 +44,7 @@ SOFT = (  # modulus [Pa], wall over bore below which no pipe of it stands: of th
 
 
 class Pipe(Conduit, kind="pipe"):
-    """A pipe of constant slope: mass and momentum along it, wave speed sqrt(K / rho).
+    """A pipe, straight or along a profile: mass and momentum along it, wave speed sqrt(K / rho).
 
     Ports: from, to; each end offers its outgoing characteristic. Stored energy, p from ambient: rho A
     integral of (v^2 / 2 + p^2 / (2 rho K) + g z) dx [J]. Dissipated power: friction and minor loss, pressure
@@ -58,6 +61,10 @@ class Pipe(Conduit, kind="pipe"):
         "flow": "flow",
     }  # fmt: skip
 
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.needs, ("length", "profile"))
+
+    length: Annotated[float, LENGTH] = None  # that of profile stands in for it
+    profile: Annotated[Profile | None, ProfileValue()] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     material: Annotated[str | None, OfCatalogue()] = None
@@ -104,26 +111,33 @@ class Pipe(Conduit, kind="pipe"):
         except Misfit as error:
             faults = error.faults
             found = {key: one for key, one in given.items() if key not in ("nominal", "schedule", "class")}
-        try:
-            found = super().in_numbers(found, setting)
-        except Misfit as error:
-            faults = faults + error.faults
+        for read in (super().in_numbers, along_profile):
+            try:
+                found = read(found, setting)
+            except Misfit as error:
+                faults = faults + error.faults
         if faults:
             raise Misfit(faults)
         return found
 
     def faults(self, name: str, around: Around) -> Faults:
-        wall = self.wall
-        if not isinstance(wall, Wall):
+        yield from wall_faults(self)
+        yield from self.profile_faults(around)
+
+    def profile_faults(self, around: Around) -> Faults:
+        """What is wrong of its profile beside its nodes."""
+        if self.profile is None:
             return
-        if wall.poisson_ratio is None and wants_poisson(self.restraint, self.diameter, wall):
-            why = f"no source of that of {self.material} was read" if self.material else "it has none"
-            text = (
-                f"{show(self.restraint)} wants Poisson's ratio of the wall, and {why}; give it in wall as poisson_ratio"
-            )
-            yield ("restraint",), text
-        if wall.creep is not None and self.lining is not None:
-            yield ("wall", "creep"), "is not known of a lined wall; keep one of creep and lining"
+        if abs(self.profile.length - self.length) > SPANNED * self.length:
+            text = f"chainage spans {self.profile.length:.10g} m, and length is {self.length:.10g} m"
+            yield ("profile",), f"{text}; leave it out"
+        for place, end, z in zip(("from", "to"), (self.from_, self.to), self.profile.elevation[[0, -1]], strict=True):
+            node = around.nodes.get(end)
+            if getattr(node, "on", None) is not None:
+                yield ("profile",), f"{end} rides on {node.on}, and a pipe on a body is straight"
+            stated = getattr(node, "elevation", None)
+            if stated is not None and abs(stated - z) > MET:
+                yield ("profile",), f"{end} lies at {stated:.10g} m, and it {ENDS[place]} at {z:.10g} m"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from super().unusual()
@@ -136,3 +150,16 @@ class Pipe(Conduit, kind="pipe"):
                         f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
                 yield ("wall", "youngs_modulus"), wall.youngs_modulus, limit, text
                 return
+
+
+def along_profile(given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    """The length of a profile where none is stated; Misfit where it is none."""
+    if "profile" not in given:
+        return given
+    try:
+        profile = ProfileValue().read(given["profile"], setting)
+    except Misfit as error:
+        raise Misfit([(("profile", *below), text) for below, text in error.faults]) from None
+    except ValueError as error:
+        raise Misfit([(("profile",), str(error))]) from None
+    return {"length": profile.length, **given, "profile": profile}

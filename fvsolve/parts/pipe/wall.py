@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean
@@ -154,3 +155,16 @@ def softness(pipe: Any) -> float:
     if pipe.restraint is None:
         return pipe.diameter / stiffness
     return restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / stiffness
+
+
+def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
+    """What is wrong of a pipe's wall beside its restraint and lining: (keys, text)."""
+    wall = pipe.wall
+    if not isinstance(wall, Wall):
+        return
+    if wall.poisson_ratio is None and wants_poisson(pipe.restraint, pipe.diameter, wall):
+        why = f"no source of that of {pipe.material} was read" if pipe.material else "it has none"
+        text = f"{show(pipe.restraint)} wants Poisson's ratio of the wall, and {why}; give it in wall as poisson_ratio"
+        yield ("restraint",), text
+    if wall.creep is not None and pipe.lining is not None:
+        yield ("wall", "creep"), "is not known of a lined wall; keep one of creep and lining"

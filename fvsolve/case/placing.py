@@ -1,0 +1,249 @@
+"""Parts placed along a pipe by chainage: the pipe is cut into pieces between them. Knows chainages; knows no flow.
+
+`on = "main", at = "1.84 km"` of a node: the pipe runs through it. Of a link without `from` and `to`: it lies in the
+pipe. Of one with `to` alone, or with one port: it leaves the pipe there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve import units
+from fvsolve.case.raw import dotted
+from fvsolve.errors import Notice, did_you_mean, listing
+from fvsolve.parts import KINDS, Pipe
+from fvsolve.units import show
+
+WHERE = ("on", "at")
+MADE = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces")  # keys that a piece has its own
+Say = Callable[[tuple, str], None]
+
+
+@dataclass
+class Placed:
+    """A part on a pipe, as the file has it, and at which distance from the pipe's `from` end [m]."""
+
+    group: str
+    name: str
+    said: dict[str, Any]
+    distance: float = 0.0
+
+    @property
+    def inline(self) -> bool:
+        """Whether it is a link that lies in the pipe."""
+        return self.group == "links" and "to" in KINDS["links"][self.said["type"]].joins and "to" not in self.said
+
+    @property
+    def joins(self) -> tuple[str, str]:
+        """The places at which the pipe ends and goes on."""
+        if self.group == "nodes":
+            return self.name, self.name
+        return (f"{self.name}-in", f"{self.name}-out") if self.inline else (f"{self.name}-at", f"{self.name}-at")
+
+
+@dataclass
+class Cutting:
+    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, and notices."""
+
+    table: dict[str, Any]
+    pieces: dict[str, list[str]] = field(default_factory=dict)
+    origin: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
+    told: list[Notice] = field(default_factory=list)
+
+
+def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
+    """(group, name, part) of what says a chainage, or that it is on a pipe."""
+    links = table.get("links")
+    pipes = [name for name, one in links.items() if is_pipe(one)] if isinstance(links, dict) else []
+    found = []
+    for group in ("nodes", "links"):
+        parts = table.get(group)
+        for name, part in parts.items() if isinstance(parts, dict) else ():
+            if not isinstance(part, dict) or isinstance(part.get("at"), (list, tuple)):
+                continue
+            kind = KINDS[group].get(str(part.get("type")))
+            own = group == "links" and kind is not None and "at" in kind.keys()
+            if not own and ("at" in part or part.get("on") in pipes):
+                found.append((group, name, part))
+    return found
+
+
+def is_pipe(part: Any) -> bool:
+    return isinstance(part, dict) and part.get("type") == "pipe"
+
+
+def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
+    """Whole pipe -> names of its pieces, as `cut` will make them."""
+    many: dict[str, int] = {}
+    for _, _, part in placed(table):
+        if isinstance(part.get("on"), str):
+            many[part["on"]] = many.get(part["on"], 1) + 1
+    return {name: [f"{name}-{k + 1}" for k in range(n)] for name, n in many.items()}
+
+
+def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by dotted keys, those of pieces where a table that is not cut yet has them."""
+    return {".".join(own) if (own := own_keys(table, keys := dotted(str(key)))) != keys else key: value
+            for key, value in given.items()}  # fmt: skip
+
+
+def own_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ...]:
+    """Where a key of a piece stands in the table of a case that is not cut yet."""
+    match = re.fullmatch(r"(.+)-\d+", keys[1]) if len(keys) > 2 and keys[0] == "links" else None
+    if match and keys[1] not in table.get("links", {}) and keys[1] in pieces_of(table).get(match[1], ()):
+        return ("links", match[1], "pieces", *keys[1:])
+    return keys
+
+
+def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
+    """What is wrong with the words of placed parts, apart from their chainage."""
+    links = table.get("links", {})
+    pipes = [name for name, one in links.items() if is_pipe(one)]
+    for group, name, part in placed(table):
+        on, key = part.get("on"), (group, name)
+        kind = KINDS[group].get(str(part.get("type")))
+        if "on" not in part:
+            yield key, f"at says {show(part['at'])}; on is missing, the pipe that it counts along"
+        elif on not in pipes:
+            near = did_you_mean(str(on), pipes) or f"; pipes are {listing(pipes) or 'none'}"
+            yield (*key, "on"), f"no pipe named {show(on)}{near}"
+        elif "at" not in part:
+            yield key, f"at is missing, where along {on} it stands"
+        if kind is None:
+            continue
+        if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
+            yield (*key, "on"), f"a {kind.kind} does not stand in a pipe; wanted a place of the fluid"
+        if group == "links" and not set(kind.joins) <= {"from", "to"}:
+            yield (*key, "on"), f"a {kind.kind} has other ports than from and to; place a junction, and join that"
+        elif group == "links" and kind is Pipe:
+            yield (*key, "on"), "a pipe has length; place a junction, and join that"
+        elif "from" in part:
+            yield (*key, "from"), "it is on a pipe, which is where it starts from; leave from, or on and at, out"
+
+
+def cut(table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], exact: set[str], say: Say) -> Cutting:
+    """The table with pipes cut at what is placed on them.
+
+    wholes : pipes as they are read; cells : of each; exact : those that are cut where it is said, between no cells;
+    say : takes the keys and the text of a fault
+    """
+    made = Cutting({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))})
+    by_pipe: dict[str, list[Placed]] = {}
+    for group, name, part in placed(table):
+        one = Placed(group, name, part)
+        if read_distance(one, wholes[part["on"]], say):
+            by_pipe.setdefault(part["on"], []).append(one)
+        rest = {key: value for key, value in part.items() if key not in WHERE}
+        if group == "nodes":
+            made.table["nodes"][name] = rest
+        else:
+            first, last = one.joins
+            made.table["links"][name] = {**rest, "from": first, **({"to": last} if one.inline else {})}
+    links = made.table["links"]
+    made.table["links"] = {}
+    for name, part in table["links"].items():
+        if name in by_pipe:
+            cut_one(made, name, part, wholes[name], by_pipe[name], cells[name], name in exact, say)
+        else:
+            made.table["links"][name] = links.get(name, part)
+    return made
+
+
+def read_distance(one: Placed, pipe: Pipe, say: Say) -> bool:
+    """Fill in how far along its pipe a part stands; False where that is at fault."""
+    key, given, on = (one.group, one.name, "at"), one.said["at"], one.said["on"]
+    try:
+        chainage = units.parse(given, "length")
+    except ValueError as error:
+        say(key, str(error))
+        return False
+    begin = 0.0 if pipe.profile is None else float(pipe.profile.chainage[0])
+    one.distance = chainage - begin
+    if not 0.0 < one.distance < pipe.length:
+        span = f"{on} runs from {begin:.10g} m to {begin + pipe.length:.10g} m"
+        end = pipe.from_ if abs(one.distance) < 1e-9 else pipe.to if abs(one.distance - pipe.length) < 1e-9 else ""
+        say(key, f"{show(given)} is not within: {span}" if not end else f"{show(given)} is its end, which is {end}")
+        return False
+    return True
+
+
+def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, exact: bool, say: Say):
+    """Put the pieces of one pipe and what they need into the table."""
+    parts.sort(key=lambda one: one.distance)
+    for one, other in zip(parts, parts[1:], strict=False):
+        if one.distance == other.distance:
+            say((other.group, other.name, "at"), f"{one.name} stands there; join it to that, or place it elsewhere")
+    asked = np.array([one.distance for one in parts])
+    if exact:
+        cuts = asked
+        edges = np.concatenate([[0.0], cuts, [whole.length]])
+        counts = np.maximum(1, np.round(np.diff(edges) / whole.length * cells)).astype(int)
+    else:
+        if cells <= len(parts):
+            text = f"{cells} cells for {len(parts)} parts on it; wanted {len(parts) + 1} at least"
+            return say(("links", name, "cells"), text)
+        faces = between(asked / whole.length * cells, cells)
+        cuts = faces / cells * whole.length
+        edges, counts = np.concatenate([[0.0], cuts, [whole.length]]), np.diff(np.concatenate([[0], faces, [cells]]))
+    names = made.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
+    begin = 0.0 if whole.profile is None else float(whole.profile.chainage[0])
+    for one, at in zip(parts, cuts.tolist(), strict=True):
+        if abs(at - one.distance) > 1e-9 * whole.length:
+            text = (f"{one.name}: moved by {abs(at - one.distance):.4g} m to chainage {begin + at:.10g} m of {name}, "
+                    "where two of its cells meet")  # fmt: skip
+            made.told.append(Notice("cells", f"{one.group}.{one.name}", text, "at", at - one.distance))
+    lay(made, name, given, whole, parts, edges, counts.tolist())
+    made.table["routes"][name] = {"pipes": names, "start": begin}
+
+
+def between(places: np.ndarray, cells: int) -> np.ndarray:
+    """Numbers of the faces between cells that are nearest to places in cells, rising : int[n]."""
+    faces = np.round(places).astype(int)
+    for k in range(faces.size):
+        faces[k] = max(faces[k], faces[k - 1] + 1 if k else 1)
+    for k in reversed(range(faces.size)):
+        faces[k] = min(faces[k], faces[k + 1] - 1 if k + 1 < faces.size else cells - 1)
+    return faces
+
+
+def lay(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]):
+    """Write the pieces of a pipe, the nodes between, and how high these lie."""
+    links, nodes = made.table["links"], made.table["nodes"]
+    rest = {key: value for key, value in given.items() if key not in MADE}
+    joins = [one.joins for one in parts]
+    starts, ends = [whole.from_, *(last for _, last in joins)], [*(first for first, _ in joins), whole.to]
+    for k, (low, high) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):
+        piece = {**rest, "from": starts[k], "to": ends[k], "length": high - low, "cells": counts[k]}
+        if whole.minor_loss:
+            piece["minor_loss"] = whole.minor_loss * (high - low) / whole.length
+        if whole.profile is not None:
+            part = whole.profile.part(low, high)
+            piece["profile"] = part.said
+            piece["length"] = part.length
+        own = f"{name}-{k + 1}"
+        links[own] = piece | given.get("pieces", {}).get(own, {})
+        made.origin["links", own] = ("links", name)
+    heights = [height(nodes.get(end)) for end in (whole.from_, whole.to)]
+    for one, at, (first, last) in zip(parts, edges[1:-1].tolist(), joins, strict=True):
+        z = {}
+        if whole.profile is None and None not in heights:
+            z = {"elevation": heights[0] + (heights[1] - heights[0]) * at / whole.length}
+        for place in dict.fromkeys((first, last)):
+            if one.group == "nodes":
+                nodes[place] = z | nodes[place]
+            else:
+                nodes[place] = {"type": "junction", **z}
+                made.origin["nodes", place] = ("links", one.name)
+
+
+def height(node: Any) -> float | None:
+    """Elevation that a node of the file states [m]; None where it states none that can be read."""
+    try:
+        return float(units.parse(node["elevation"], "length"))
+    except (KeyError, TypeError, ValueError):
+        return None

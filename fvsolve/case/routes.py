@@ -1,0 +1,156 @@
+"""Routes: pipes strung into one chainage. Knows which links meet; knows no flow."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import VALUE, Misfit, Quantity, Setting, Value
+from fvsolve.units import show
+
+
+class PipeNames(Value):
+    """A list of names of pipes, in the order in which they follow each other."""
+
+    about = "pipes in their order; the next begins where one ends, or behind links without length between"
+    takes = "list of names"
+    changes = VALUE
+
+    def read(self, given: Any, setting: Setting) -> tuple[str, ...]:
+        if not isinstance(given, (list, tuple)) or not given:
+            raise ValueError(f'{show(given)} is no list; wanted one such as ["suction", "main"]')
+        faults = [((k,), f"{show(one)} is no name") for k, one in enumerate(given) if not isinstance(one, str)]
+        faults += [((k,), f"{show(one)} stands twice") for k, one in enumerate(given) if one in given[:k]]
+        if faults:
+            raise Misfit(faults)
+        return tuple(given)
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"type": "string"}, "minItems": 1}
+
+
+class Route(Table):
+    """`[routes.NAME]`: pipes strung into one chainage."""
+
+    pipes: Annotated[tuple[str, ...], PipeNames()]
+    start: Annotated[
+        float | None,
+        Quantity("length", about="chainage where it begins [m]; that of its first pipe, or 0 if left out",
+                 changes=VALUE),
+    ] = None  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A pipe on a route: chainage where the route enters it and where it leaves [m], and whether it runs against it."""
+
+    pipe: str
+    begin: float
+    end: float
+    backwards: bool
+
+    def chainage(self, distance: Any) -> Any:
+        """Of places at distances from the pipe's `from` end [m]."""
+        return self.end - distance if self.backwards else self.begin + distance
+
+
+def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
+    """A route with the pieces of cut pipes in their place, in the order in which it runs through them."""
+    cut = [name for name in route.pipes if name in pieces]
+    options = []
+    for turned in itertools.product((1, -1), repeat=len(cut)):
+        ways_of = dict(zip(cut, turned, strict=True))
+        whole = [pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes]
+        options.append(route.model_copy(update={"pipes": tuple(itertools.chain(*whole))}))
+        if not cut or (all(pipe in links for pipe in options[-1].pipes) and broken(options[-1], links) is None):
+            return options[-1]
+    return options[0]
+
+
+def misfits(routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any]) -> Iterator[tuple]:
+    """Faults of routes: what is no pipe, and pipes that do not follow each other; named : links, those at fault too."""
+    for name, route in routes.items():
+        if route is None:
+            continue
+        unknown = False
+        pipes = [one for one, link in links.items() if link.kind == "pipe"]
+        for k, pipe in enumerate(route.pipes):
+            if pipe in pipes or (pipe in named and pipe not in links):
+                unknown = unknown or pipe not in pipes
+                continue
+            unknown = True
+            if pipe in links:
+                yield ("routes", name, "pipes", k), f"{show(pipe)} is no pipe but a {links[pipe].kind}; leave it out"
+            else:
+                near = did_you_mean(pipe, pipes) or f"; pipes are {listing(pipes)}"
+                yield ("routes", name, "pipes", k), f"no pipe named {show(pipe)}{near}"
+        if unknown:
+            continue
+        k = broken(route, links)
+        if k is not None:
+            pairs = [(pipe, links[pipe]) for pipe in route.pipes[k - 1 : k + 1]]
+            ends = " and ".join(f"{pipe} joins {one.from_} and {one.to}" for pipe, one in pairs)
+            text = f"{route.pipes[k]} does not follow: {ends}, and no link without length lies between"
+            yield ("routes", name, "pipes", k), text
+
+
+def joined(links: dict[str, Any]) -> dict[str, str]:
+    """Place -> one that stands for all that links without length join it to."""
+    root: dict[str, str] = {}
+
+    def find(name: str) -> str:
+        while root.setdefault(name, name) != name:
+            name = root[name]
+        return name
+
+    for link in links.values():
+        if link.kind != "pipe" and set(link.joins) == {"from", "to"}:
+            first, second = find(link.ports["from"]), find(link.ports["to"])
+            root[first] = second
+    return {name: find(name) for name in list(root)}
+
+
+def ways(route: Route, links: dict[str, Any]) -> list[list[tuple[int, bool]]]:
+    """Of every pipe of a route: how it can be run, each with the way before it that leads there."""
+    one = joined(links)
+    ends = [[one.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
+    found: list[list[tuple[int, bool]]] = [[(-1, False), (-1, True)]]
+    for k in range(1, len(ends)):
+        now = []
+        for backwards in (False, True):
+            into = ends[k][1 if backwards else 0]
+            before = [j for j, (_, turned) in enumerate(found[-1]) if ends[k - 1][0 if turned else 1] == into]
+            now += [(before[0], backwards)] if before else []
+        found.append(now)
+        if not now:
+            break
+    return found
+
+
+def broken(route: Route, links: dict[str, Any]) -> int | None:
+    """Number of the first pipe of a route that does not follow the one before it."""
+    found = ways(route, links)
+    return None if found[-1] else len(found) - 1
+
+
+def legs(route: Route, links: dict[str, Any]) -> list[Leg]:
+    """The pipes of a route with their chainages."""
+    found = ways(route, links)
+    turned, at = [], 0
+    for options in reversed(found):
+        before, backwards = options[at]
+        turned.append(backwards)
+        at = before
+    begin, made = route.start, []
+    for pipe, backwards in zip(route.pipes, reversed(turned), strict=True):
+        link = links[pipe]
+        if begin is None:
+            begin = 0.0 if link.profile is None or backwards else float(link.profile.chainage[0])
+        end = begin + link.length
+        made.append(Leg(pipe, begin, end, backwards))
+        begin = end
+    return made

@@ -1,0 +1,244 @@
+"""Limits find what was planted, in any unit, direction and order, and say where and when."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
+
+import fvsolve
+
+LENGTH, DIAMETER, SPEED = 1000.0, 0.3, 1000.0
+SHUT, VELOCITY, HEAD = 0.1, 0.5, 100.0
+JUMP = RHO * SPEED * VELOCITY
+
+
+def shut(turned: bool = False, **more) -> dict:
+    """A lake and a frictionless pipe of two halves, shut at once: pressure +- JUMP, exact at Courant 1."""
+    q = VELOCITY * area(DIAMETER)
+    nodes = {"lake": lake(HEAD, elevation=0.0), "middle": junction(elevation=10.0),
+             "gate": junction(step(SHUT, q, 0.0), elevation=20.0)}  # fmt: skip
+    ends = [("lake", "middle"), ("middle", "gate")]
+    pipes = [pipe(*(pair[::-1] if turned else pair), LENGTH / 2, DIAMETER, SPEED, 10) for pair in ends]
+    links = dict(zip(("low", "high"), pipes, strict=True))
+    for one in links.values():
+        one["initial_flow"] = -q if turned else q
+    numerics = more.pop("numerics", {"scheme": "upwind", "method": "euler", "courant": 1.0})
+    return scene(nodes, links, 4.0, numerics, ["gate.pressure"], **more)
+
+
+def judged(case: dict) -> dict:
+    return {one.name: one for one in fvsolve.run(case).verdicts}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) -> None:
+    routes = {"line": {"pipes": ["low", "high"], "start": "5 km"}}
+    limits = {"top": {"on": "line", "greatest": "14 bar"}, "vacuum": {"on": "pipes", "least": "vacuum"}}
+    found = judged(shut(turned, routes=routes, limits=limits))
+    top = found["top"]
+    highest = AMBIENT + RHO * GRAVITY * HEAD + JUMP  # at the bottom, but behind the lake's own end, which knows no rise
+    assert not top.ok and top.place == "low" and top.unit == "Pa" and top.bound == "greatest"
+    assert top.chainage == pytest.approx(5025.0)  # the first cell
+    z = 20.0 * 25.0 / LENGTH
+    assert top.value == pytest.approx(highest - RHO * GRAVITY * z, rel=1e-12)
+    assert top.margin == pytest.approx(14e5 - top.value, rel=1e-9) and top.limit == pytest.approx(14e5)
+    assert top.time == pytest.approx(SHUT + (LENGTH - 25.0) / SPEED, abs=0.051)
+    assert found["vacuum"].ok and found["vacuum"].place == "high"
+    least = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
+    assert found["vacuum"].value == pytest.approx(least, rel=1e-12)
+    assert found["vacuum"].chainage == pytest.approx(6000.0)  # the very end, no cell's middle
+    assert found["vacuum"].elevation == pytest.approx(20.0)
+
+
+def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:
+    level = HEAD + JUMP / (RHO * GRAVITY) - 20.0 - 1.0  # a metre below what the gate meets
+    gauge = RHO * GRAVITY * level
+    limits = {
+        "absolute": {"on": "gate", "greatest": gauge + AMBIENT},
+        "gauge": {"on": ["gate"], "quantity": "gauge_pressure", "greatest": f"{gauge / 1e5!r} bar"},
+        "barg": {"on": "nodes.gate", "quantity": "pressure", "greatest": f"{gauge / 1e5!r} barg"},
+        "above the pipe": {"on": "gate", "quantity": "pressure_head", "greatest": f"{level / 0.3048!r} ft"},
+        "head": {"on": "gate", "quantity": "head", "greatest": level + 20.0},
+        "nodes": {"on": ["middle", "gate", "gate"], "quantity": "head", "greatest": level + 20.0},
+        "pipe": {"on": "high", "quantity": "pressure_head", "greatest": level},
+    }
+    named = {name.replace(" ", "-"): one for name, one in limits.items()}
+    found = judged(shut(limits=named))
+    for name, one in found.items():
+        assert not one.ok, name
+        metres = one.margin if one.unit == "m" else one.margin / (RHO * GRAVITY)
+        if name not in ("pipe", "nodes"):
+            assert metres == pytest.approx(-1.0, rel=1e-9), name
+    shown = judged(shut(limits=named, output={"units": {"pressure": "barg", "head": "ft", "gauge_pressure": "psi"}}))
+    assert shown["absolute"].unit == "barg" and shown["absolute"].limit == pytest.approx(gauge / 1e5)
+    assert shown["above-the-pipe"].margin == pytest.approx(-1.0 / 0.3048)
+    assert shown["gauge"].value == pytest.approx(found["gauge"].value / 6894.757293168)
+
+
+def test_velocity_is_limited_in_both_directions_and_flow_in_one() -> None:
+    limits = {"fast": {"on": "pipes", "quantity": "velocity", "greatest": 0.49},
+              "slow": {"on": "pipes", "quantity": "velocity", "greatest": 0.51},
+              "back": {"on": "low", "quantity": "flow", "least": -0.3 * area(DIAMETER)}}  # fmt: skip
+    ahead, back = judged(shut(limits=limits)), judged(shut(turned=True, limits=limits))
+    for found in (ahead, back):
+        assert (found["fast"].ok, found["slow"].ok) == (False, True)
+        assert found["fast"].value == pytest.approx(0.5)
+    assert ahead["back"].value == pytest.approx(-0.5 * area(DIAMETER))
+    assert not ahead["back"].ok and not back["back"].ok
+
+
+def test_a_limit_that_is_just_met_holds_and_every_one_of_two_bounds_counts() -> None:
+    top = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) + JUMP
+    low = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
+    for least, greatest, ok, bound in ((low, top, True, None), (low + 1.0, top + 9.0, False, "least"),
+                                       (low - 9.0, top - 1.0, False, "greatest"),
+                                       (low + 1.0, top - 2.0, False, "greatest")):  # fmt: skip
+        one = judged(shut(limits={"gate": {"on": "gate", "least": least, "greatest": greatest}}))["gate"]
+        assert one.ok == ok
+        assert bound in (None, one.bound)
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_no_row_is_needed_to_find_it(method: str, law: str) -> None:
+    """A limit looks at every step: one row at the end has the verdict of a thousand."""
+    limits = {"top": {"on": "high", "greatest": 1.0e6}, "valve": {"on": "gate", "quantity": "head", "least": 30.0}}
+    verdicts = []
+    for every in (4.0, 0.004):
+        case = shut(limits=limits)
+        case["output"]["every"] = every
+        case["fluid"]["law"] = law
+        case["numerics"] = {"end": 4.0, "scheme": "muscl", "method": method, "step": 0.02}
+        verdicts.append(judged(case))
+    one, other = verdicts
+    assert one["top"].value == other["top"].value
+    assert one["valve"].value == other["valve"].value
+
+
+def test_delay_lines_are_limited_at_the_same_places() -> None:
+    limits = {
+        "top": {"on": "pipes", "greatest": 14e5},
+        "fast": {"on": "pipes", "quantity": "velocity", "greatest": 0.49},
+    }
+    exact = {"scheme": "upwind", "method": "euler", "step": 0.05}
+    cells, lines = (judged(shut(limits=limits, numerics={"line": one, **exact})) for one in ("cells", "delay"))
+    for name in limits:
+        assert cells[name].value == pytest.approx(lines[name].value, rel=1e-9)
+        assert cells[name].ok == lines[name].ok is False
+
+
+def test_a_run_that_stops_passes_no_limit(fvs, tmp_path) -> None:
+    case = shut(limits={"top": {"on": "pipes", "greatest": "100 bar"}})
+    case["numerics"]["below_vapor"] = "stop"
+    case["nodes"]["lake"] = lake(30.0, elevation=0.0)
+    found = fvsolve.run(case)
+    assert not found.ok and not found.verdicts[0].ok
+    assert found.verdicts[0].until < 4.0
+
+
+def test_the_command_line_fails_where_a_limit_does(fvs, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    case = fvsolve.load(shut(limits={"top": {"on": "pipes", "greatest": "14 bar"}}))
+    (tmp_path / "scene.toml").write_text(case.resolved())
+    status, text, _ = fvs("run", "scene.toml", "--out", "out")
+    assert status == 1 and "FAILS: top" in text
+    said = json.loads((tmp_path / "out" / "summary.json").read_text())
+    keys = {"name", "ok", "place", "chainage", "elevation", "time", "value", "limit", "margin", "unit"}
+    assert keys <= set(said["verdicts"][0])
+    assert said["ok"] and not said["verdicts"][0]["ok"]
+    assert fvs("run", "scene.toml", "--out", "out2", "--set", "limits.top.greatest='16 bar'")[0] == 0
+    assert fvsolve.open_run("out2").verdicts[0].ok
+
+
+def test_expect_reaches_whole_pipes_and_routes() -> None:
+    top = AMBIENT + RHO * GRAVITY * HEAD + JUMP
+    low = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
+    tight = {"rtol": 1e-9}
+    expect = {"greatest(low.pressure)": {"value": top, "rtol": 1e-2}, "least(pipes.pressure)": {"value": low, **tight},
+              "least(line.pressure)": {"value": low, **tight}, "greatest(gate.pressure)": {"value": 1.5e6, "rtol": 1.0},
+              "greatest(high.velocity)": {"value": 0.5, "rtol": 1e-9},
+              "greatest(high.pressure@0.5)": {"value": top, "rtol": 0.1}}  # fmt: skip
+    found = fvsolve.run(shut(expect=expect, routes={"line": {"pipes": ["low", "high"]}}))
+    assert all(one.ok for one in found.expectations), found.expectations
+
+
+@pytest.mark.parametrize(
+    ("limit", "place", "told"),
+    [
+        ({"on": "hihg", "greatest": 1e6}, "on", 'did you mean "high"'),
+        ({"on": "high"}, "", "nothing is limited; wanted one of least, greatest, share_of_class"),
+        ({"greatest": 1e6}, "", "on is missing"),
+        ({"on": "high", "greatest": "3 m/s"}, "greatest", "is a velocity; wanted a pressure"),
+        ({"on": "high", "quantity": "gas_volume", "greatest": 1.0}, "quantity", "high without"),
+        ({"on": "high", "least": 2e6, "greatest": 1e6}, "least", "is not below greatest"),
+        ({"on": "high", "quantity": "velocity", "least": "vacuum"}, "least", "is a pressure; wanted a velocity"),
+        ({"on": "high", "least": "vaccum"}, "least", 'did you mean "vacuum"'),
+        ({"on": "high", "share_of_class": 1.0}, "share_of_class", "without a class"),
+        ({"on": [], "greatest": 1e6}, "on", "names nothing"),
+        ({"on": "nodes", "quantity": "level", "greatest": 2.0}, "quantity", "no node has"),
+        ({"on": "high", "top": 2.0, "greatest": 1e6}, "top", "unknown key"),
+        (3.0, "", "is no table"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named(limit, place: str, told: str) -> None:
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(shut(limits={"one": limit}))
+    assert told in str(error.value)
+    assert f"limits.one{'.' if place else ''}{place}" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("route", "told"),
+    [
+        ({"pipes": ["low", "hihg"]}, 'did you mean "high"'),
+        ({"pipes": ["low", "low"]}, "stands twice"),
+        ({"pipes": []}, "is no list"),
+        ({"pipes": ["low", "far"]}, "far does not follow: low joins lake and middle and far joins gate and end"),
+        ({"pipes": ["low"], "start": "3 s"}, "is a time; wanted a length"),
+        ({"pipes": ["tap"]}, '"tap" is no pipe but a valve'),
+    ],
+)
+def test_routes_that_do_not_hang_together_are_named(route: dict, told: str) -> None:
+    case = shut()
+    case["nodes"] |= {"end": junction(elevation=20.0), "sea": reservoir(2e5, elevation=20.0)}
+    case["links"] |= {"far": pipe("gate", "end", 10.0, DIAMETER, SPEED, 1), "tap": valve("end", "sea", 1e-3)}
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case | {"routes": {"line": route}})
+    assert told in str(error.value)
+    assert "routes.line" in str(error.value)
+
+
+def test_a_route_runs_through_pumps_and_valves_and_against_its_pipes() -> None:
+    case = shut()
+    case["nodes"] |= {"far": junction(elevation=20.0), "end": junction(elevation=25.0)}
+    case["links"] |= {"tap": valve("gate", "far", 1.0), "last": pipe("end", "far", 40.0, DIAMETER, SPEED, 2)}
+    case["routes"] = {"line": {"pipes": ["low", "high", "last"]}, "home": {"pipes": ["last", "high", "low"]}}
+    case["limits"] = {"end": {"on": "line", "quantity": "head", "greatest": 0.0}}
+    from fvsolve.case.routes import legs
+
+    found = fvsolve.load(case)
+    assert [(leg.begin, leg.end, leg.backwards) for leg in legs(found.routes["line"], found.links)] == [
+        (0.0, 500.0, False), (500.0, 1000.0, False), (1000.0, 1040.0, True)]  # fmt: skip
+    assert [leg.backwards for leg in legs(found.routes["home"], found.links)] == [False, True, True]
+    assert np.isfinite(judged(case)["end"].chainage)
+    assert fvsolve.load(found.table()) == found
+
+
+def test_a_route_is_one_table_with_a_running_chainage(tmp_path) -> None:
+    case = shut(
+        turned=True, routes={"line": {"pipes": ["low", "high"], "start": "5 km"}}, output={"units": {"head": "ft"}}
+    )
+    found = fvsolve.run(case, out=tmp_path / "out", pictures=False)
+    one = found.routes["line"]
+    assert np.array_equal(one["chainage"], 5000.0 + 25.0 + 50.0 * np.arange(20))
+    assert list(one["pipe"]) == ["low"] * 10 + ["high"] * 10
+    assert np.array_equal(one["least_head"][:10], found.envelope["low"]["least_head"][::-1])
+    with open(tmp_path / "out" / "routes.csv", encoding="utf-8") as file:
+        header, *rows = [line.strip().split(",") for line in file]
+    assert header[:4] == ["route", "chainage [m]", "pipe", "distance [m]"] and "least_head [ft]" in header
+    assert [float(row[1]) for row in rows] == one["chainage"].tolist() and rows[0][:1] == ["line"]
+    assert "routes.csv" in found.summary["files"]
+    assert np.array_equal(fvsolve.open_run(tmp_path / "out").routes["line"]["chainage"], one["chainage"])

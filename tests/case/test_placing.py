@@ -1,0 +1,192 @@
+"""What is placed by chainage stands where a pipe cut by hand has it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.scenes import area, junction, lake, pipe, reservoir, scene, step, valve
+
+import fvsolve
+from fvsolve.case.changes import changes
+from fvsolve.studies import sweep
+
+DIAMETER, SPEED, CELLS = 0.4, 1000.0, 60
+ROUGH = {"model": "quasi-steady", "roughness": 2e-4}
+HILL = {"chainage": [1000.0, 1750.0, 2200.0, 2300.0, 4000.0], "elevation": [30.0, 42.0, 65.0, 31.0, 20.0]}
+LENGTH = 3000.0
+
+
+def line(nodes: dict, links: dict, **more) -> dict:
+    """A lake, what joins it to a gate, and a valve that throttles."""
+    nodes = {"lake": lake(110.0, elevation=30.0), "gate": junction(elevation=20.0),
+             "sea": reservoir(2e5, elevation=20.0)} | nodes  # fmt: skip
+    links = links | {"tap": valve("gate", "sea", 0.02 * area(DIAMETER), step(0.5, 1.0, 0.2))}
+    return scene(nodes, links, 6.0, {"scheme": "weno5", "method": "rk4", "step": 0.02},
+                 ["gate.pressure", "tap.flow"], every=0.1, **more)  # fmt: skip
+
+
+def main(**more) -> dict:
+    return pipe("lake", "gate", LENGTH, DIAMETER, SPEED, CELLS, friction=ROUGH, profile=HILL, minor_loss=3.0) | more
+
+
+def part(start: str, end: str, low: float, high: float) -> dict:
+    """The same pipe between two chainages, as one would write it."""
+    inner = [x for x in HILL["chainage"] if low < x < high]
+    z = np.interp([low, *inner, high], HILL["chainage"], HILL["elevation"]).tolist()
+    share = (high - low) / LENGTH
+    return main(length=high - low, cells=round(CELLS * share), minor_loss=3.0 * share,
+                profile={"chainage": [low, *inner, high], "elevation": z}) | {"from": start, "to": end}  # fmt: skip
+
+
+VENT = {"type": "air-valve", "inlet": 0.05, "outlet": 0.05}
+HOLE = {"type": "leak", "coefficient": 2e-6}
+GATE = {"type": "valve", "loss_coefficient": 5.0, "diameter": DIAMETER}
+SAFE = {"type": "relief-valve", "to": "sea", "set_pressure": 12e5, "Kv": 100.0, "overpressure": 1e5}
+
+
+def by_hand() -> dict:
+    cuts = [1000.0, 1500.0, 2200.0, 2950.0, 3500.0, 4000.0]
+    names = [("lake", "a"), ("b", "top"), ("top", "c"), ("c", "d"), ("d", "gate")]
+    pipes = {f"p{k}": part(*names[k], cuts[k], cuts[k + 1]) for k in range(5)}
+    z = dict(zip("abcd", np.interp([1500.0, 1500.0, 2950.0, 3500.0], HILL["chainage"], HILL["elevation"]), strict=True))
+    nodes = {name: junction(elevation=float(one)) for name, one in z.items()} | {"top": VENT | {"elevation": 65.0}}
+    links = pipes | {
+        "half": GATE | {"from": "a", "to": "b"},
+        "hole": HOLE | {"from": "c"},
+        "safe": SAFE | {"from": "d"},
+    }
+    return line(nodes, links)
+
+
+def placed(turned: bool = False, **more) -> dict:
+    at = {"half": 1500.0, "top": "2.2 km", "hole": "2950 m", "safe": 3500}
+    one = main()
+    if turned:
+        mirrored = {
+            "chainage": (5000.0 - np.array(HILL["chainage"][::-1])).tolist(),
+            "elevation": HILL["elevation"][::-1],
+        }
+        at = {"half": 3500.0, "top": 2800.0, "hole": 2050.0, "safe": 1500.0}
+        one |= {"from": "gate", "to": "lake", "profile": mirrored}
+    said = {name: {"on": "main", "at": at[name]} for name in at}
+    nodes = {"top": VENT | said["top"]}
+    links = {"safe": SAFE | said["safe"], "hole": HOLE | said["hole"], "main": one, "half": GATE | said["half"]}
+    return line(nodes, links, **more)
+
+
+def test_it_is_the_pipe_that_is_cut_by_hand() -> None:
+    one, other = fvsolve.run(placed()), fvsolve.run(by_hand())
+    for probe in one.probes:
+        assert np.allclose(one[probe], other[probe], rtol=1e-10), probe
+    assert [leg for leg in one.routes] == ["main"]
+    assert np.all(np.diff(one.routes["main"]["chainage"]) >= 0.0)
+    assert one.routes["main"]["chainage"][[0, -1]] == pytest.approx([1000.0, 4000.0])
+
+
+def test_drawn_the_other_way_it_is_the_same() -> None:
+    one, other = fvsolve.run(placed()), fvsolve.run(placed(turned=True))
+    assert np.allclose(one["gate.pressure"], other["gate.pressure"], rtol=1e-9)
+
+
+def test_the_resolved_case_is_the_same_case(tmp_path) -> None:
+    case = fvsolve.load(placed(limits={"top": {"on": "main", "greatest": "20 bar"}}))
+    again = fvsolve.load(case.table())
+    assert again == case
+    one, other = fvsolve.run(case), fvsolve.run(again)
+    assert np.array_equal(one["gate.pressure"], other["gate.pressure"])
+    assert one.verdicts[0][:10] == other.verdicts[0][:10] and one.verdicts[0].chainage > 1000.0
+
+
+def test_keys_of_the_whole_and_of_its_pieces_can_be_set() -> None:
+    case = fvsolve.load(placed())
+    wide = fvsolve.load(case, {"links.main.diameter": 0.5, "links.main-2.cells": 30})
+    assert [wide.links[f"main-{k}"].diameter for k in range(1, 6)] == [0.5] * 5
+    assert (wide.links["main-2"].cells, wide.links["main-1"].cells) == (30, 10)
+    again = fvsolve.load(wide, {"links.hole.at": "2.8 km"})
+    assert again.links["main-2"].cells == 30 and again.links["main-4"].length == pytest.approx(700.0)
+    assert changes(case, "links.main-2.diameter") == changes(case, "links.main.diameter") == "profile"
+    found = sweep(placed(), {"links.main.diameter": [0.4, 0.5]}, set={"numerics.end": 0.5})
+    assert [row["ok"] for row in found.rows] == [True, True]
+
+
+def test_no_stub_sets_the_step_and_it_is_said() -> None:
+    near = placed()
+    near["links"]["half"]["at"] = 1000.5  # half a metre behind the lake
+    near["links"]["hole"]["at"] = 2951.0
+    case = fvsolve.load(near)
+    assert min(link.length / link.cells for link in case.links.values() if link.kind == "pipe") >= 49.999
+    told = {one.place: one for one in case.notes if one.kind == "cells"}
+    assert told["links.half"].value == pytest.approx(49.5) and told["links.hole"].value == pytest.approx(-1.0)
+    assert "moved by 49.5 m to chainage 1050 m" in told["links.half"].text
+    line_of = fvsolve.load(near, {"numerics.line": "delay"})
+    assert line_of.links["main-1"].length == pytest.approx(0.5)
+    assert not [one for one in line_of.notes if one.kind == "cells"]
+
+
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_a_junction_that_gives_nothing_changes_nothing(law: str) -> None:
+    plain = line({}, {"main": main()})
+    cut = line({"spot": {"type": "junction", "on": "main", "at": 2500.0}}, {"main": main()})
+    for case in (plain, cut):
+        case["fluid"]["law"] = law
+        case["numerics"] |= {"scheme": "upwind", "step": 0.01}
+    one, other = fvsolve.run(plain), fvsolve.run(cut)
+    off = np.max(np.abs(one["gate.pressure"] - other["gate.pressure"])) / np.ptp(one["gate.pressure"])
+    assert off <= (1e-12 if law == "linear" else 1e-5)
+
+
+def test_without_a_profile_it_lies_on_the_straight_line() -> None:
+    said = main()
+    del said["profile"]
+    case = fvsolve.load(line({"spot": {"type": "junction", "on": "main", "at": "750 m"}}, {"main": said}))
+    assert case.nodes["spot"].elevation == pytest.approx(27.5)
+    flat = line({"spot": {"type": "junction", "on": "main", "at": "750 m"}}, {"main": said})
+    for node in flat["nodes"].values():
+        node.pop("elevation", None)
+    assert fvsolve.load(flat).nodes["spot"].elevation is None
+
+
+def test_probes_count_along_the_whole_pipe() -> None:
+    probes = ["main.pressure@0.5", "main.pressure@2500 m", "main.flow", "main-3.head@2.3 km", "main.velocity@1"]
+    found = fvsolve.run(placed(output={"probes": probes, "every": 0.1}))
+    assert np.array_equal(found["main.pressure@0.5"], found["main.pressure@2500 m"])
+    whole = fvsolve.run(line({}, {"main": main()}, output={"probes": probes[:2] + ["main.flow@1 km"], "every": 0.1}))
+    assert np.array_equal(whole["main.pressure@0.5"], whole["main.pressure@2500 m"])
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("half", "at", "900 m"), "links.half.at: \"900 m\" is not within: main runs from 1000 m to 4000 m"),
+        (("half", "at", 1000), "links.half.at: 1000 is its end, which is lake"),
+        (("half", "at", 4000), "links.half.at: 4000 is its end, which is gate"),
+        (("half", "at", "3 kg"), "is a mass; wanted a length"),
+        (("half", "on", "mian"), 'links.half.on: no pipe named "mian"; did you mean "main"?'),
+        (("half", "on", None), "links.half: at says 1500.0; on is missing"),
+        (("half", "at", None), "links.half: at is missing, where along main it stands"),
+        (("half", "from", "lake"), "links.half.from: it is on a pipe, which is where it starts from"),
+        (("hole", "at", 1500.0), "links.half.at: hole stands there; join it to that, or place it elsewhere"),
+        (("main", "cells", 4), "links.main.cells: 4 cells for 4 parts on it; wanted 5 at least"),
+        (("main", "diameter", -1.0), "links.main.diameter: -1.0 is out of range"),
+        (("main", "friction", {"model": "steady"}), "links.main.friction"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_once(change, told: str) -> None:
+    case = placed()
+    name, key, value = change
+    case["links"][name][key] = value
+    if value is None:
+        del case["links"][name][key]
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case)
+    assert told in str(error.value)
+    assert len(error.value.faults) == 1
+
+
+def test_what_cannot_stand_in_a_pipe_is_named() -> None:
+    case = line({"m": {"type": "mass", "mass": 1.0, "on": "main", "at": 2000.0}}, {"main": main()})
+    with pytest.raises(fvsolve.CaseError, match="a mass does not stand in a pipe"):
+        fvsolve.load(case)
+    case = line({}, {"main": main(), "second": main() | {"on": "main", "at": 2000.0}})
+    with pytest.raises(fvsolve.CaseError, match="a pipe has length"):
+        fvsolve.load(case)
