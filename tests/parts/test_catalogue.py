@@ -6,6 +6,7 @@ import pytest
 from pytest import approx
 from truth.scenes import junction, lake, pipe, scene
 
+import fvsolve
 from fvsolve import load
 from fvsolve.errors import CaseError
 from fvsolve.parts.pipe.classes import ductile, rated
@@ -143,3 +144,9 @@ def test_what_was_not_read_is_refused_and_asked_for():
         with pytest.raises(CaseError, match=said.replace("(", r"\(")) as caught:
             read(**more)
         assert len(caught.value.faults) <= 2
+
+
+def test_a_limit_takes_its_share_of_what_the_class_bears():
+    settings = {"limits.class": {"on": "pipes", "share_of_class": 0.5}, "numerics.end": 5.0, "expect": {}}
+    [found] = fvsolve.run("plastic-main", settings).verdicts
+    assert found.limit == approx(8.0) and not found.ok and found.place == "lower"  # bar, half of PN16
