@@ -137,7 +137,7 @@ def test_what_was_not_read_is_refused_and_asked_for():
         ({"class": "C20", "nominal": "DN300", "material": "ductile-iron"}, "there are C100, C40, C50, C64"),
         ({"class": "X9", "nominal": "DN300"}, 'no class named "X9"'),
         ({"class": "PN16", "nominal": "DN110", "material": "PVC-U"}, "wanted such a material, or the SDR"),
-        ({"class": "SDR11", "nominal": "DN110", "material": "PE100", "restraint": "joints"}, "wants Poisson's ratio"),
+        ({"class": "SDR11", "nominal": "DN110", "material": "PE80", "restraint": "joints"}, "wants Poisson's ratio"),
         ({"diameter": 0.3, "restraint": "ancored"}, 'no restraint named "ancored"'),
         ({"diameter": 0.3, "wave_speed": 1e3, "restraint": 1.0}, "wave_speed and restraint are given; keep one"),
     ]:

@@ -17,6 +17,7 @@ SOURCES = {
     "aquaflo": "Aquaflo, Ductile iron pipe, properties",
     "doran": "Doran, Newnes Construction Materials Pocket Book 1994, 100 s at 1 % strain, as in maintainability.com.sg",
     "firat": "Firat, PE pipe technical informations, ISO 527 and ISO 1183, least values",
+    "pe100plus": "PE100+ Association, PE100 pipe properties and types",
     "adpf": "ADPF, properties of FRP pipes, ASTM D2290",
 }
 
@@ -49,6 +50,8 @@ PVC-U                 rho  1380   1450   doran, elmer
 PE80                  E    0.7    0.7    firat
 PE80                  rho  950    950    firat
 PE100                 E    1.0    1.3    firat, maff
+PE100                 nu   0.45   0.45   pe100plus
+PE100                 k    0.00152 0.00152 pe100plus      of Colebrook and White
 PE100                 rho  950    950    firat
 GRP                   E    14.7   24     maff, adpf       filament wound, along the hoop
 GRP                   k    0.0015 0.04   adpf             without joints, with them
