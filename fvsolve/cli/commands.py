@@ -23,6 +23,9 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="replace an earlier run")] = False,
     threads: Annotated[int, typer.Option(metavar="N", help="that share out rows of basins")] = 1,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="numbers alone")] = False,
+    error: Annotated[
+        bool, typer.Option("--error", help="how far peaks are off, by runs of half and twice the resolution")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Solve cases and write their run directories."""
@@ -43,7 +46,7 @@ def run(
         for name, place in places.items():
             with ranks.leading(ranks.world()):
                 model = model_of(load_case(name, set))
-            results.append(_run(model, place, force, resume, threads, None if no_pictures else painter, as_json))
+            results.append(_run(model, place, force, resume, threads, None if no_pictures else painter, as_json, error))
             if results[-1].reason.startswith("interrupted"):
                 break
     if as_json:
@@ -52,7 +55,7 @@ def run(
     sys.exit(max(report.exit_code(one) for one in results))
 
 
-def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool):
+def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool):
     """Solve one case and say what came out, then draw it."""
     from fvsolve.cli import report
     from fvsolve.cli.progress import watched
@@ -64,6 +67,8 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     with closing(sink_of(model, place, force, resume, threads)) as sink:
         with watched(model.case) as progress:
             result = solved(model, sink, progress, threads)
+        if error:
+            _judge(result, model.case)
         if not quiet:
             report.result(result)
             sys.stdout.flush()
@@ -72,6 +77,15 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     if not quiet:
         report.files(result)
     return result
+
+
+def _judge(result, case) -> None:
+    """How far the peaks of a run are off, into its summary."""
+    from fvsolve.output.summary import write_summary
+    from fvsolve.studies.peaks import peak_errors
+
+    peak_errors(result, case, lambda what: print(f"{case.name} again: {what}", file=sys.stderr, flush=True))
+    write_summary(result.directory / "summary.json", result.summary)
 
 
 @app.command()

@@ -65,6 +65,8 @@ def result(one) -> None:
     for measured in said["comparisons"]:
         _line(console, _comparison(measured))
     _notices(console, said["warnings"])
+    if "resolution" in said:
+        _line(console, said["resolution"]["words"])
     when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
     _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
 
@@ -257,8 +259,14 @@ def differences(found: dict) -> None:
 
 def _extremes(console, one) -> None:
     rows = [[name, one.units[name], *map(_number, found)] for name, found in one.extremes.items()]
+    heads = ["probe", "unit", "least", "at [s]", "greatest", "at [s]"]
+    if "peaks" in one.summary:
+        heads = ["probe", "unit", "least", "+-", "at [s]", "greatest", "+-", "at [s]"]
+        for row, peak in zip(rows, one.summary["peaks"].values(), strict=True):
+            row[3:3] = [_off(peak["least"])]
+            row[6:6] = [_off(peak["greatest"])]
     if rows:
-        _table(["probe", "unit", "least", "at [s]", "greatest", "at [s]"], rows[:ROWS], console)
+        _table(heads, rows[:ROWS], console)
     if len(rows) > ROWS:
         where = f"in {one.directory / 'summary.json'}" if one.directory else "in Result.extremes"
         _line(console, f"... {len(rows) - ROWS} more {where}")
@@ -286,6 +294,11 @@ def _claim(one: dict) -> str:
     )
 
 
+def _off(peak: dict) -> str:
+    """How far a peak may be off; "?" where that is not known."""
+    return "?" if peak["error"] is None else f"{peak['error']:.2g}"
+
+
 def _verdict(one: dict, said: dict) -> str:
     where = one["place"] + ("" if one["chainage"] is None else f" at {_number(one['chainage'])} m")
     when = "" if one["time"] is None else f", {_number(one['time'])} s"
@@ -294,7 +307,11 @@ def _verdict(one: dict, said: dict) -> str:
     held = "holds" if one["ok"] else "FAILS"
     if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
         held = f"OPEN, as the run is not ok ({said['reason']})"
-    return f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {_number(one['margin'])}"
+    said = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {_number(one['margin'])}"
+    if one["error"] is None or one["margin"] is None:
+        return said
+    doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
+    return f"{said} within {one['error']:.2g}{doubt}"
 
 
 def _comparison(one: dict) -> str:

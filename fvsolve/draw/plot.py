@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 
 from fvsolve.draw import style
+from fvsolve.draw.told import told
 
 PANELS = 6  # quantities drawn at most
-LINES = 8  # probes drawn per panel at most
+LINES = 8  # curves drawn per panel at most
+STILLS = 4  # constant probes named at most
+BROAD = 26  # letters of a line of a legend
 PIPES = 6  # pipes drawn at most, the longest
 POINTS = 4000  # rows drawn as they are; of longer tables least and greatest per bin
 
 
 @style.as_it_stands
 def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
-    """Probes over time, one panel per quantity and unit.
+    """Probes over time, one panel per quantity and unit; none twice, and what stands still is but named.
 
     `t : float64[k]` in `time_unit`, `values : float64[k, n]`, `probes` their (name, unit); `measured` maps a
     probe to (times, values), dotted; from the first of `marks`, (time, cause), on
     the ground is shaded: not to be trusted.
     """
-    panels: dict[tuple[str, str], list[int]] = {}
-    for i, (name, unit) in enumerate(probes):
-        panels.setdefault((quantity(name), unit), []).append(i)
-    drawn = list(panels.items())[:PANELS]
+    probes = list(probes)
+    panels, still = told(values, probes, measured or {})
+    drawn = panels[:PANELS]
     figure = style.figure(0.7 + 2.1 * max(len(drawn), 1) + (0.5 if len(drawn) == 1 else 0.0))
     rows = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, ((name, unit), picked) in zip(rows, drawn, strict=False):
-        _panel(axes, t, values, probes, picked, measured or {})
-        axes.set_ylabel(f"{name.replace('_', ' ')} [{unit}]", fontsize=8.5, color=style.INK)
+    for axes, panel in zip(rows, drawn, strict=False):
+        _panel(axes, t, values, probes, panel.lines, measured or {}, still if axes is rows[-1] else [])
+        axes.set_ylabel(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", fontsize=8.5, color=style.INK)
     for axes in rows:
         _shade(axes, t, marks, first=axes is rows[0])
     rows[-1].set_xlabel(f"time [{time_unit}]", fontsize=8.5, color=style.INK)
@@ -72,10 +76,10 @@ def quantity(probe: str) -> str:
     return probe.partition("@")[0].rpartition(".")[2]
 
 
-def thinned(t, values):
+def thinned(t, values, points=POINTS):
     """Long series as least and greatest per bin of rows, so that no peak is lost and pictures stay small."""
-    bins = POINTS // 2
-    if len(t) <= POINTS:
+    bins = points // 2
+    if len(t) <= points:
         return t, values
     edges = np.linspace(0, len(t), bins + 1).astype(int)
     low = np.array([a + np.argmin(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
@@ -84,17 +88,19 @@ def thinned(t, values):
     return t[picked], values[picked]
 
 
-def _panel(axes, t, values, probes, picked, measured) -> None:
+def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.dress(axes)
-    for i, one in enumerate(picked[:LINES]):
-        name, colour = probes[one][0], style.COLOURS[i % len(style.COLOURS)]
-        place, _, fraction = name.partition("@")
-        label = place.rpartition(".")[0] + (f" at {fraction}" if fraction else "")
-        axes.plot(*thinned(t, values[:, one]), color=colour, linewidth=1.0, label=label)
+    for i, one in enumerate(lines[:LINES]):
+        name, colour = probes[one.column][0], style.COLOURS[i % len(style.COLOURS)]
+        axes.plot(*thinned(t, values[:, one.column]), color=colour, linewidth=1.0, label=_lines(one.label))
         if name in measured:
-            axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{label}, measured")
-    if len(picked) > LINES:
-        axes.plot([], [], " ", label=f"... {len(picked) - LINES} more in the table")
+            axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{one.label}, measured")
+    if len(lines) > LINES:
+        axes.plot([], [], " ", label=f"... {len(lines) - LINES} more in the table")
+    if still:
+        named = [f"{name} {value:.6g} {unit}" for name, unit, value in still[:STILLS]]
+        named += [f"... {len(still) - STILLS} more"] if len(still) > STILLS else []
+        axes.plot([], [], " ", label="\n".join(["constant:", *named]))
     low, high = axes.get_ylim()
     if high - low < 1e-9 * max(abs(low), abs(high)):  # a line at rest, not its round-off magnified
         middle, half = 0.5 * (low + high), max(abs(low), abs(high)) * 1e-3
@@ -102,6 +108,11 @@ def _panel(axes, t, values, probes, picked, measured) -> None:
     if len(t) > 1:
         axes.set_xlim(t[0], t[-1])
     style.legend(axes)
+
+
+def _lines(label: str) -> str:
+    """A label in lines that leave the picture its width."""
+    return textwrap.fill(label, BROAD, break_long_words=False)
 
 
 def _shade(axes, t, marks, first: bool) -> None:

@@ -23,6 +23,8 @@ from fvsolve.output.summary import read_summary
 OWN = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
 ENDED = "summary.json"
 PICTURES = ("history.png", "envelope.png")
+# Of `fvsolve report` and `plot`: another run's must not stand beside this one's numbers.
+REPORTS = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
 
 
 class RunDirectory:
@@ -68,6 +70,7 @@ class RunDirectory:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
         for name in (ENDED, *PICTURES):
             (self.folder / name).unlink(missing_ok=True)
+        _clear_reports(self.folder)
         if self.restart is None:
             self._start()
             self._write_case()
@@ -198,9 +201,14 @@ def clear(folder: Path) -> None:
     clear_lines(folder)
 
 
+def _clear_reports(folder: Path) -> None:
+    for path in [*(folder / name for name in REPORTS), *folder.glob("section-*.png")]:
+        path.unlink(missing_ok=True)
+
+
 def _refuse_names(case) -> None:
     for name, path in case.copies.items():
-        if name in (ENDED, *OWN, *PICTURES):
+        if name in (ENDED, *OWN, *PICTURES, *REPORTS):
             raise RunError(f"{path} has the name of a file that every run writes; give it another name")
 
 

@@ -233,3 +233,14 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
         return [(float(one.attrib["timestep"]), path.parent / one.attrib["file"]) for one in root.iter("DataSet")]
     except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
+
+
+def read_pipes(path: Path, quantity: str) -> np.ndarray:
+    """A quantity of all cells of pipes in a frame, SI : float64[cells]; RunError where it cannot be read."""
+    from meshio import vtu  # meshio.read prints and exits where it cannot
+
+    try:
+        return vtu.read(str(path)).cell_data_dict[quantity]["line"]
+    except Exception as error:  # whatever it and its parsers make of a damaged file
+        said = f"{type(error).__name__}: {error}"
+        raise RunError(f"{path} cannot be read ({said}); run again with --force") from None

@@ -151,6 +151,7 @@ def _result(model, summary, sink, begun: float) -> Result:
     result.case = model.case
     said |= claims(model, summary, result)
     said["versions"] = identity(model.case)
+    said["ended"] = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     if sink.folder is not None:
         said["files"] = sink.files()
         said["seconds_total"] = time.perf_counter() - begun

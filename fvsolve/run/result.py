@@ -50,6 +50,7 @@ class LimitVerdict(NamedTuple):
     """A limit of the case: the place that is nearest to it, or beyond it most; lengths in m, times in s, else `unit`.
 
     margin : how far from the limit, negative beyond it; bound : "least" or "greatest"; until : when the run ended
+    error : how far `value` may be off, None where nobody asked
     worst : the same of the worst places of each part
     """
 
@@ -66,6 +67,7 @@ class LimitVerdict(NamedTuple):
     unit: str
     quantity: str
     until: float
+    error: float | None
     worst: list[dict]
 
 

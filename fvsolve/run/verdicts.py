@@ -47,8 +47,14 @@ def verdict(model, summary, limit, chainage: Chainages) -> dict[str, Any]:
     slack = ROUNDING * (abs(first.limit) + SIZES.get(extent.quantity, 0.0))
     return {
         "name": limit.name, "ok": bool(summary.ok and first.margin >= -slack), **rows[0],
-        "quantity": extent.quantity, "until": float(summary.t), "worst": rows[:WORST],
+        "quantity": extent.quantity, "until": float(summary.t), "error": None, "worst": worst(rows),
     }  # fmt: skip
+
+
+def worst(rows: list[dict]) -> list[dict]:
+    """The worst places, of each bound one at least."""
+    first = {row["bound"]: row for row in reversed(rows)}
+    return [*rows[:WORST], *(row for row in first.values() if row not in rows[:WORST])]
 
 
 def nearest(model, limit, part: Met):

@@ -16,7 +16,7 @@ from fvsolve.steppers.tableau import method_named
 
 LOOP, SOLVE = import_module("fvsolve.solve.loop"), import_module("fvsolve.solve.solve")
 RUBBED = {"friction": {"model": "steady", "factor": 0.018}}
-CLOCK = ("seconds", "seconds_setup", "seconds_total", "cost")
+CLOCK = ("ended", "seconds", "seconds_setup", "seconds_total", "cost")
 
 
 def fork(end=4.0, every=0.05, fields=3, **numerics) -> dict:

@@ -28,7 +28,7 @@ from fvsolve.solve.solve import Run
 import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.02
 print(fvsolve.run(sys.argv[1], out=sys.argv[2], resume=True).reason)
 """
-WORK = ("rhs", "seconds", "seconds_setup", "seconds_total", "cost")  # what it took, not what came out
+WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")  # what it took, not what came out
 
 
 def long_run(**numerics) -> dict:

@@ -1,0 +1,70 @@
+"""The command `study`. Knows the terminal; leaves the runs to `studies`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fvsolve.cli.app import Json, app, print_json
+from fvsolve.cli.studying import Dask, Jobs, Out, told
+
+
+@app.command()
+def study(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a study file: case, events, protections")],
+    out: Out = None,
+    jobs: Jobs = 1,
+    dask: Dask = None,
+    force: Annotated[bool, typer.Option("--force", help="replace earlier runs")] = False,
+    as_json: Json = False,
+) -> None:
+    """Run every event with every protection of a design, and say which limits hold."""
+    from fvsolve.studies import design
+
+    with told() as progress:
+        found = design.study(file, out, jobs, dask, force, progress)
+    if as_json:
+        print_json(found.plain() | {"directory": str(found.folder)})
+    else:
+        _show(found)
+    sys.exit(0 if found.ok else 1)
+
+
+def _show(found) -> None:
+    from fvsolve.cli import terminal
+    from fvsolve.studies.design import name_of, passed
+
+    console = terminal.console()
+    if found.design.title:
+        terminal.line(console, found.design.title, "bold")
+    limits = {one["name"]: f"{one['name']} [{one['unit']}]" for row in found.rows for one in row["verdicts"]}
+    rows = []
+    for row in found.rows:
+        verdicts = {one["name"]: one for one in row["verdicts"]}
+        cells = [_cell(verdicts.get(name)) for name in limits]
+        rows.append([name_of(row), "holds" if passed(row) else "FAILS", *cells])
+    terminal.table(["run", "", *(f"margin of {name}" for name in limits.values())], rows, console)
+    for row in found.rows:
+        if not row["ok"]:
+            terminal.line(console, f"{name_of(row)}: {row['reason']}", "bold red")
+        for one in row["verdicts"]:
+            if not one["ok"]:
+                at = "" if one["chainage"] is None else f" at {one['chainage']:.6g} m"
+                when = "" if one["time"] is None else f", {one['time']:.6g} s"
+                value = "-" if one["value"] is None else f"{one['value']:.6g}"
+                text = f"{name_of(row)}: {one['name']}: {value} {one['unit']} ({one['place']}{at}{when})"
+                terminal.line(console, text, "red")
+    names = [name or "the case as it is" for name in found.holds]
+    terminal.line(console, f"all limits hold in all events: {', '.join(names) or 'under no protection'}",
+                  "green" if names else "bold red")  # fmt: skip
+    terminal.line(console, f"{found.folder}: study.json, study.csv and a run directory for each")
+
+
+def _cell(verdict) -> str:
+    if verdict is None or verdict["margin"] is None:
+        return "-"
+    error = "" if verdict["error"] is None else f" +- {verdict['error']:.2g}"
+    return f"{verdict['margin']:.5g}{error}"

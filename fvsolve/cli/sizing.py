@@ -1,0 +1,64 @@
+"""The command `size`. Knows the terminal; leaves the search to `studies`."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
+from fvsolve.cli.studying import told
+from fvsolve.cli.sweep import RANGE, values_of
+from fvsolve.errors import FvsolveError
+
+
+@app.command()
+def size(
+    case: One,
+    vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="what is sized, and between which ends")],
+    goal: Annotated[str, typer.Option(metavar="least|greatest", help="which value that holds all limits")] = "least",
+    tie: Annotated[
+        list[str], typer.Option(metavar='"KEY = formula"', help="another key as a formula of x, the value in SI")
+    ] = [],  # noqa: B006
+    rtol: Annotated[float, typer.Option(help="how closely it is bracketed, of itself")] = 0.01,
+    set: Set = [],  # noqa: B006
+    as_json: Json = False,
+) -> None:
+    """The value of a key at which all limits of a case hold, by bracketing."""
+    from fvsolve.studies import sizing
+
+    key, listed = values_of(vary, "--vary", RANGE)
+    if len(listed) != 2:
+        raise FvsolveError(f"--vary {vary}: wanted {RANGE}")
+    ties = sizing.tied(tie)
+    made = load_case(case, set)
+    with told(kept=False) as progress:
+        found = sizing.size(made, key, *listed, goal, ties, None, rtol,
+                            lambda done, what: progress(done, sizing.MOST_RUNS, what))  # fmt: skip
+    if as_json:
+        print_json(found.plain())
+    else:
+        _show(found)
+    sys.exit(0 if found.value is not None else 1)
+
+
+def _show(found) -> None:
+    from fvsolve.cli import terminal
+
+    console = terminal.console()
+    rows = [[f"{one.value:.6g}", "holds" if one.ok else "FAILS", "-" if one.margin is None else f"{one.margin:.4g}",
+             one.limit if one.reason == "finished" else one.reason] for one in found.runs]  # fmt: skip
+    terminal.table([f"{found.key} [{found.unit or 'SI'}]", "", "least margin over limit", "of"], rows, console)
+    for text in found.ties:
+        terminal.line(console, f"with {text}")
+    if found.value is None:
+        near = found.nearest
+        text = (f"no value between {found.runs[0].value:.6g} and {found.runs[1].value:.6g} {found.unit} that was tried "
+                f"holds all limits; {near.value:.6g} comes nearest, by {near.limit}")  # fmt: skip
+        terminal.line(console, text, "bold red")
+        return
+    where = "at the end of the range" if found.bracket is None else (
+        f"{min(found.bracket):.6g} to {max(found.bracket):.6g} {found.unit} bracket it")  # fmt: skip
+    said = f"{found.goal} value that holds all limits: {found.value:.6g} {found.unit}; {where}; {len(found.runs)} runs"
+    terminal.line(console, said, "green")

@@ -1,0 +1,87 @@
+"""A long section and phase planes as pictures. Knows columns of numbers and matplotlib; knows no run and no files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.draw import style
+from fvsolve.draw.plot import thinned
+
+LINES = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
+         "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
+LIMIT = {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))}
+LONGEST = 22  # letters over a chainage
+
+
+@style.as_it_stands
+def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=(), labels=(), title=""):
+    """Heads along one chainage with the pipe, lines of vapour, classes and limits; shaded where liquid parted.
+
+    chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]; posts : chainages
+    beyond : (chainage, head, name) where a limit is passed
+    labels : (chainage, names, whether more than a joint)
+    """
+    figure = style.figure(4.6)
+    axes = figure.subplots()
+    style.dress(axes)
+    for a, b in parted:
+        axes.axvspan(a, b, color=style.COLOURS[3], alpha=0.15, linewidth=0)
+    high, low = along["greatest_head"], along["least_head"]
+    axes.fill_between(chainage, low, high, color=style.COLOURS[0], alpha=0.08, linewidth=0)
+    axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="greatest head")
+    axes.plot(chainage, low, color=style.COLOURS[1], linewidth=1.4, label="least head")
+    axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
+              label="initial head")  # fmt: skip
+    axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
+    for name, line in lines.items():
+        axes.plot(chainage, line, label=name, **LINES.get(name, LIMIT))
+    if parted:
+        axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
+    if beyond:
+        at, heads, _ = zip(*beyond, strict=True)
+        axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
+                  label="limit passed")  # fmt: skip
+    axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
+    _places(axes, posts, labels)
+    axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
+    axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8, labelcolor=style.INK)
+    style.title(figure, title)
+    return figure
+
+
+@style.as_it_stands
+def phase_figure(pairs, title=""):
+    """One probe over another, a panel for each of `pairs` of (name, unit, float64[k]); a dot is where it begins."""
+    across = min(len(pairs), 2)
+    down = -(-len(pairs) // across)
+    figure = style.figure(0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH)
+    grid = figure.subplots(down, across, squeeze=False)
+    for axes, (x, y) in zip(grid.flat, pairs, strict=False):
+        style.dress(axes)
+        axes.margins(0.05)
+        axes.plot(*_path(x[2], y[2]), color=style.COLOURS[0], linewidth=1.0)
+        axes.plot(x[2][:1], y[2][:1], "o", color=style.COLOURS[1], markersize=5)
+        axes.set_xlabel(f"{x[0]} [{x[1]}]", fontsize=8.5, color=style.INK)
+        axes.set_ylabel(f"{y[0]} [{y[1]}]", fontsize=8.5, color=style.INK)
+    for axes in list(grid.flat)[len(pairs) :]:
+        axes.set_visible(False)
+    style.title(figure, title)
+    return figure
+
+
+def _places(axes, posts, labels) -> None:
+    """A thin line at each place, names over some."""
+    for x in posts:
+        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
+    for x, names, stands in labels:
+        text = names if len(names) <= LONGEST else f"{names[: LONGEST - 1]}\u2026"
+        axes.annotate(text, (x, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 4), rotation=40, fontsize=7.5,
+                      textcoords="offset points", color=style.INK if stands else style.MUTED)  # fmt: skip
+
+
+def _path(x, y) -> tuple:
+    """A long path with the extremes of both of each bin of rows."""
+    rows = np.arange(len(x), dtype=float)
+    kept = np.union1d(thinned(rows, x)[0], thinned(rows, y)[0]).astype(int)
+    return x[kept], y[kept]

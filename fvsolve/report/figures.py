@@ -1,0 +1,178 @@
+"""Figures of the page as plotly.js takes them, traces and layout as plain data. Knows arrays and colours.
+
+plotly.js reads a little markup in names and titles, so every word of a case goes through `as_it_stands`.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
+from fvsolve.errors import visible
+from fvsolve.report.histories import HistoryPanel
+from fvsolve.report.motion import Motion
+from fvsolve.report.section import Section
+
+HIGH, LOW, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
+LINES = {"vapour line": {"colour": VAPOUR, "width": 1.4, "dash": "dot"},
+         "class line": {"colour": CLASS, "width": 1.8, "dash": "dashdot"}}  # fmt: skip
+LIMIT = {"colour": CLASS, "width": 1.3, "dash": "longdash"}
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
+LONGEST = 22  # letters over a chainage
+FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
+
+
+def section_figure(one: Section, moving: Motion | None, unit: str, along: str, bins: int) -> dict[str, Any]:
+    """A long section: heads, pipe, vapour and class line, spans where liquid parted, devices; the line that moves."""
+    k = one.picked(bins)
+    x, lines = numbers(one.chainage[k], "f4"), {name: numbers(values[k], "f4") for name, values in one.along.items()}
+    data = [
+        _line("greatest head", x, lines["greatest_head"], HIGH, width=2),
+        _line("least head", x, lines["least_head"], LOW, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
+        _line("initial head", x, lines["initial_head"], INK, width=1.2, dash="dash"),
+        _line("pipe", x, lines["elevation"], MUTED, width=3.5),
+    ]
+    for name, line in one.lines.items():
+        data.append(_line(name, x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+    if one.parted:
+        data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
+                     "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
+    if one.beyond:
+        at, heads, names = zip(*one.beyond, strict=True)
+        data.append({"type": "scatter", "mode": "markers", "name": "limit passed", "x": at, "y": heads,
+                     "cliponaxis": False, "text": [as_it_stands(name) for name in names],
+                     "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}}})  # fmt: skip
+    shapes = [_span(a, b, VAPOUR, 0.18) for a, b in one.parted]
+    if moving is not None:
+        data.append(_line("head now", numbers(moving.chainage, "f4"), numbers(moving.heads[0], "f4"), NOW, width=2.6))
+    shapes += [_post(device.chainage) for device in one.devices]
+    layout = _layout(f"head [{unit}]", f"chainage [{along}]", 460)
+    names = _names(one)
+    above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    layout |= {"shapes": shapes, "annotations": names, "margin": {"l": 62, "r": 14, "t": above, "b": 50}}
+    layout["xaxis"]["range"] = [one.way.begin, one.way.end]
+    made: dict[str, Any] = {"data": data, "layout": layout}
+    if moving is not None:
+        made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
+                          "heads": [[float(f"{v:.6g}") for v in row] for row in moving.heads.tolist()]}  # fmt: skip
+    return made
+
+
+def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
+    """The same section of several runs: pipe, vapour line and limits once, heads of each by its colour."""
+    first = max((one for _, one in several), key=lambda one: len(one.devices))
+    k = first.picked()
+    x = numbers(first.chainage[k], "f4")
+    data = [_line("pipe", x, numbers(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
+    for name, line in first.lines.items():
+        data.append(_line(name, x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+    for n, (name, one) in enumerate(several):
+        colour, k = COLOURS[n % len(COLOURS)], one.picked()
+        x, group = numbers(one.chainage[k], "f4"), {"legendgroup": f"run {n}"}
+        high, low = (numbers(one.along[key][k], "f4") for key in ("greatest_head", "least_head"))
+        data.append(_line(name or "the case", x, high, colour, width=2, **group))
+        data.append(_line("", x, low, colour, width=2, dash="dash", showlegend=False, **group))
+    names = _names(first)
+    above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    layout = _layout(f"head [{unit}]", f"chainage [{along}]", 440)
+    layout |= {"annotations": names, "shapes": [_post(device.chainage) for device in first.devices],
+               "margin": {"l": 62, "r": 14, "t": above, "b": 50}}  # fmt: skip
+    layout["xaxis"]["range"] = [first.way.begin, first.way.end]
+    return {"data": data, "layout": layout}
+
+
+def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
+    """Series of one quantity; from `doubt` on the ground is shaded."""
+    data, names = [], [line.name for line in panel.lines if not line.measured]
+    for line in panel.lines:
+        place = names.index(line.name)
+        colour = COLOURS[place % len(COLOURS)]
+        trace = _line(
+            line.name, numbers(line.t), numbers(line.values), colour, dash=DASHES[place // len(COLOURS) % len(DASHES)]
+        )
+        if line.measured:
+            trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
+        data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
+    layout = _layout(
+        f"{panel.quantity.replace('_', ' ')} [{panel.unit}]",
+        f"time [{time_unit}]",
+        280 + 7 * max(len(panel.lines) - 4, 0),
+    )
+    layout["legend"] |= {"y": 1.01, "yanchor": "bottom"}
+    ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
+    if ends:
+        layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]
+    if doubt is not None and ends:
+        layout["shapes"] = [_span(doubt, layout["xaxis"]["range"][1], DOUBT, 0.08)]
+    layout |= {"yaxis": layout["yaxis"] | _still(panel)}
+    return {"data": data, "layout": layout}
+
+
+def as_it_stands(text: str) -> str:
+    """Words of a case for plotly.js, none of them markup, and no dollar the begin of a formula."""
+    return html.escape(visible(str(text)), quote=False).replace("$", "&#36;")
+
+
+def numbers(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:
+    """Numbers as plotly.js reads arrays: f8 to the last bit, f4 to seven digits."""
+    packed = np.ascontiguousarray(values, f"<{kind}").tobytes()
+    return {"dtype": kind, "bdata": base64.b64encode(packed).decode()}
+
+
+def _line(name: str, x, y, colour: str, width: float = 1.5, dash: str = "solid", **more: Any) -> dict[str, Any]:
+    return {"type": "scatter", "mode": "lines", "name": as_it_stands(name), "x": x, "y": y,
+            "line": {"color": colour, "width": width, "dash": dash}, **more}  # fmt: skip
+
+
+def _layout(y: str, x: str, height: int) -> dict[str, Any]:
+    axis = {"showline": True, "linecolor": MUTED, "gridcolor": HAIR, "zeroline": False, "ticks": "outside",
+            "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
+            "separatethousands": True}  # fmt: skip
+    return {
+        "height": height, "margin": {"l": 62, "r": 14, "t": 12, "b": 50},
+        "paper_bgcolor": "#fff", "plot_bgcolor": "#fff",
+        "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
+        "hoverlabel": {"namelength": -1, "font": {"size": 11}}, "dragmode": "zoom", "showlegend": True,
+        "legend": {"orientation": "h", "traceorder": "normal",
+                   "x": 0, "y": -0.2, "yref": "paper", "yanchor": "top", "font": {"size": 11.5}},
+        "xaxis": axis | {"title": {"text": as_it_stands(x), "standoff": 8}},
+        "yaxis": axis | {"title": {"text": as_it_stands(y), "standoff": 8}},
+    }  # fmt: skip
+
+
+def _span(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
+    return {"type": "rect", "xref": "x", "yref": "paper", "x0": a, "x1": b, "y0": 0, "y1": 1, "fillcolor": colour,
+            "opacity": opacity, "line": {"width": 0}, "layer": "below"}  # fmt: skip
+
+
+def _post(x: float) -> dict[str, Any]:
+    return {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1.015,
+            "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
+
+
+def _names(one: Section) -> list[dict[str, Any]]:
+    """What stands over the chainages of a section."""
+    late = one.way.begin + 0.9 * one.way.length
+    return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
+             "xanchor": "right" if x > late else "left", "yanchor": "bottom",
+             "text": as_it_stands(_cut(names)), "hovertext": as_it_stands(names),
+             "font": {"size": 11, "color": INK if stands else MUTED}} for x, names, stands in one.labels()]  # fmt: skip
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}\u2026"
+
+
+def _still(panel: HistoryPanel) -> dict[str, Any]:
+    """A range for series at rest, whose round-off would else be magnified."""
+    values = np.concatenate([line.values for line in panel.lines if line.seen] or [np.zeros(0)])
+    values = values[np.isfinite(values)]
+    if not values.size or np.ptp(values) >= 1e-9 * np.abs(values).max():
+        return {}
+    middle, half = float(values.mean()), float(np.abs(values).max()) * 1e-3 or 1.0
+    return {"range": [middle - half, middle + half]}

@@ -1,0 +1,24 @@
+"""Columns of the envelope, and pressures as heads in their unit. Knows units and a case's law; knows no section."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fvsolve.output.column import UnitColumn
+from fvsolve.output.envelope import QUANTITIES
+
+
+def in_units(result, name: str) -> UnitColumn:
+    """The column of a quantity of the envelope."""
+    unit, ambient = result.summary["envelope_units"][name], result.summary["ambient_pressure"]
+    return UnitColumn(name, QUANTITIES[name], unit, ambient)
+
+
+def head_of(result, pressure: float | np.ndarray, elevation: np.ndarray) -> np.ndarray:
+    """The head of a pressure [Pa] at elevations, both in the unit of heads."""
+    height = in_units(result, "elevation")
+    law: Callable[..., Any] = result.case.law.head
+    return in_units(result, "greatest_head").from_si(law(pressure, height.to_si(elevation)))

@@ -1,0 +1,132 @@
+"""Which pipes make a long section, and which way round. Knows the network of a case; draws nothing.
+
+The one place that chooses: the routes of the case, then the longest ways through pipes on none of them that meet end to
+end, or at the two junctions of a link without length, each pipe in one.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+from fvsolve.case.routes import Leg, joined
+from fvsolve.case.routes import legs as legs_of
+
+MOST = 6  # sections of a run, unless it has more routes
+
+
+class SectionWay(NamedTuple):
+    """A section: its name, its legs in order, and the places where they meet with their chainages [m]."""
+
+    name: str
+    legs: list[Leg]
+    places: list[tuple[str, float]]
+
+    @property
+    def begin(self) -> float:
+        """Chainage where it begins [m]."""
+        return self.legs[0].begin
+
+    @property
+    def end(self) -> float:
+        """Chainage where it ends [m]."""
+        return self.legs[-1].end
+
+    @property
+    def length(self) -> float:
+        """From end to end [m]."""
+        return self.end - self.begin
+
+
+def ways(result) -> list[SectionWay]:
+    """The sections of a run, its routes first, then the longest; none of a case without pipes."""
+    links = result.case.links
+    found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
+    found = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(found)}.values())[::-1]  # each but once
+    strung = {leg.pipe for way in found for leg in way.legs}
+    one = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
+    free = [name for name in result.envelope if name in links and name not in strung]
+    pipes = {name: (*(one.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
+             for name in free}  # fmt: skip
+    others = []
+    while pipes and len(found) + len(others) < MOST:
+        chain = _longest(pipes)
+        for pipe, _, _ in chain:
+            del pipes[pipe]
+        others.append(_chained(chain, result))
+    return [*found, *sorted(others, key=lambda one: -one.length)]
+
+
+def _in_line(link, case) -> bool:
+    """Whether a section may run through a link: it has no length, and joins two junctions."""
+    return all(getattr(case.nodes.get(place), "kind", "") == "junction" for place in link.ports.values())
+
+
+def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
+    """A chain with its chainages, turned so that the head falls along it at the start."""
+    first, last = chain[0], chain[-1]
+    begins = _start_head(result, first[0], last=first[1])
+    ends = _start_head(result, last[0], last=not last[1])
+    if ends > begins + 1e-9 * abs(begins) or (
+        ends >= begins and sum(turned for _, turned, _ in chain) * 2 > len(chain)
+    ):
+        chain = [(pipe, not turned, length) for pipe, turned, length in reversed(chain)]
+    at, legs = 0.0, []
+    for pipe, turned, length in chain:
+        legs.append(Leg(pipe, at, at + length, turned))
+        at += length
+    way = _way("", legs, result.case.links)
+    names = [leg.pipe for leg in legs]
+    name = " \u2013 ".join(names) if len(names) < 4 else f"{way.places[0][0]} to {way.places[-1][0]}"
+    return way._replace(name=name)
+
+
+def _way(name: str, legs: list[Leg], links: dict) -> SectionWay:
+    """A section with the places where its pipes begin and end; what stands between two of them has both."""
+    places = []
+    for leg in legs:
+        ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
+        places += ends[::-1] if leg.backwards else ends
+    return SectionWay(name, legs, list(dict.fromkeys((place, float(at)) for place, at in places)))
+
+
+def _start_head(result, pipe: str, last: bool) -> float:
+    return float(result.envelope[pipe]["initial_head"][-1 if last else 0])
+
+
+def _longest(pipes: dict) -> list[tuple[str, bool, float]]:
+    """The way between two places that are farthest apart along pipes: (pipe, turned, length) in order.
+
+    Found by going twice to the farthest place, from an end of the longest pipe; exact where there are no loops.
+    """
+    around: dict[str, list] = {}
+    for name, (a, b, length) in pipes.items():
+        around.setdefault(a, []).append((b, name, False, length))
+        around.setdefault(b, []).append((a, name, True, length))
+    longest = max(pipes, key=lambda name: pipes[name][2])
+    if pipes[longest][0] == pipes[longest][1]:  # its ends are joined by a link without length
+        return [(longest, False, pipes[longest][2])]
+    far = _farthest(around, pipes[longest][0])[0]
+    end, came = _farthest(around, far)
+    chain = []
+    while end != far:
+        end, name, turned, length = came[end]
+        chain.append((name, turned, length))
+    return chain[::-1]
+
+
+def _farthest(around: dict, start: str) -> tuple[str, dict]:
+    """The place farthest from `start`, and by which pipe each place was reached (Dijkstra 1959)."""
+    distance, came, queue, end = {start: 0.0}, {}, [(0.0, start)], start
+    done = set()
+    while queue:
+        so_far, place = heapq.heappop(queue)
+        if place in done:
+            continue
+        done.add(place)
+        end = place
+        for other, name, turned, length in around[place]:
+            if other != place and so_far + length < distance.get(other, float("inf")):
+                distance[other], came[other] = so_far + length, (place, name, turned, length)
+                heapq.heappush(queue, (so_far + length, other))
+    return end, came

@@ -1,0 +1,142 @@
+"""A long section as an engineer draws it: arrays along one chainage, in the units of [output]. Draws nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.output.routes import strung
+from fvsolve.report.heads import head_of, in_units
+from fvsolve.report.legs import SectionWay
+from fvsolve.report.limits import limit_lines
+
+ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
+         "t_least", "t_greatest")  # fmt: skip
+APART = 0.035  # of the length: names nearer to each other than this would cover each other
+BINS = 150  # of a long line at most: of each the greatest and the least head and elevation stand, and where
+
+
+class Standing(NamedTuple):
+    """What stands at a place of a section."""
+
+    chainage: float
+    place: str
+    parts: tuple[str, ...]  # "pump (pump)"
+
+
+@dataclass(frozen=True)
+class Section:
+    """One way with what was met along it.
+
+    chainage : float64[n]; pipe : str[n]; along : quantity -> float64[n]; lines : name -> float64[n], heads at which
+    liquid boils, that a class allows, that limits state, nan where there is none; parted : spans of chainage where the
+    vapour pressure was reached; beyond : (chainage, head, name) of what passes a limit
+    """
+
+    way: SectionWay
+    chainage: np.ndarray
+    pipe: np.ndarray
+    along: dict[str, np.ndarray]
+    lines: dict[str, np.ndarray]
+    parted: list[tuple[float, float]]
+    beyond: list[tuple[float, float, str]]
+    devices: list[Standing]
+
+    def picked(self, bins: int = BINS) -> np.ndarray:
+        """Numbers of the points to be drawn: all, or of a long line the extremes of each bin."""
+        n = len(self.chainage)
+        if n <= 4 * bins:
+            return np.arange(n)
+        edges = np.linspace(0, n, bins + 1).astype(int)
+        most = [
+            ("greatest_head", np.argmax),
+            ("least_head", np.argmin),
+            ("elevation", np.argmax),
+            ("elevation", np.argmin),
+        ]
+        lines = [(self.along[name], end) for name, end in most]
+        kept = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return np.unique([0, *kept, n - 1])
+
+    def labels(self) -> list[tuple[float, str, bool]]:
+        """Chainages with names, and whether more than a joint stands there; none would cover another.
+
+        Devices and ends go before joints; devices that are near share a label.
+        """
+        length, ends = self.way.length, (self.way.begin, self.way.end)
+        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in ends))
+        shown: list[tuple[float, list[str], bool]] = []
+        for device in order:
+            names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
+            near = [one for one in shown if abs(device.chainage - one[0]) < APART * length]
+            if not near:
+                shown.append((device.chainage, names, bool(device.parts)))
+            elif device.parts:
+                near[0][1].extend(name for name in names if name not in near[0][1])
+        return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
+
+
+def section(result, way: SectionWay) -> Section:
+    """The section of a way through a run."""
+    distances = in_units(result, "distance")
+    strung_up = strung(result.envelope, way.legs, distances)
+    chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
+    along = {name: strung_up[name] for name in ALONG}
+    lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
+    if boils is not None:
+        lines["vapour line"] = head_of(result, boils, along["elevation"])
+    lines |= limit_lines(result, pipe, along["elevation"])
+    return Section(way, strung_up["chainage"], pipe, along, lines,
+                   _parted(result, along["least_pressure"], chainage, way), _beyond(result, way, chainage, along),
+                   _devices(result, way))  # fmt: skip
+
+
+def boiling(result) -> float | None:
+    """The pressure [Pa] at which a pipe counts as parted: the vapour pressure, twice it where cavities are followed."""
+    boils = result.summary["fluid"]["vapor_pressure"]
+    return None if boils is None else boils * (2.0 if result.case.law.cavitates else 1.0)
+
+
+def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) -> list[tuple[float, float]]:
+    """Spans of chainage [m] about places whose pressure fell to that of vapour."""
+    limit = boiling(result)
+    if limit is None:
+        return []
+    low = in_units(result, "least_pressure").to_si(least) <= limit * (1.0 + 1e-9)
+    middles = np.concatenate([[way.begin], 0.5 * (chainage[1:] + chainage[:-1]), [way.end]])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], low.astype(int), [0]])))
+    return [(float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
+    """Places of a way where a limit on pressure or head is passed: chainage [m], head there, name of the limit."""
+    found = []
+    for one in result.summary["verdicts"]:
+        for worst in one["worst"] if one["quantity"] in OF_PRESSURE else []:
+            leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
+            if leg is None or worst["margin"] is None or worst["margin"] >= 0.0:
+                continue
+            at = worst["chainage"]
+            if way.name not in result.case.routes:  # of a pipe on none it counts along the pipe
+                profile = result.case.links[leg.pipe].profile
+                at = float(leg.chainage(at - (0.0 if profile is None else profile.chainage[0])))
+            if leg.begin <= at <= leg.end:
+                line = along["least_head" if worst["bound"] == "least" else "greatest_head"]
+                found.append((at, float(line[np.argmin(np.abs(chainage - at))]), one["name"]))
+    return found
+
+
+def _devices(result, way: SectionWay) -> list[Standing]:
+    """What stands at the places of a way: nodes that are more than joints, and links that are no pipes."""
+    case, found = result.case, []
+    for place, chainage in way.places:
+        owner = place.partition(".")[0]
+        kind = case.nodes[place].kind if place in case.nodes else case.nodes[owner].kind if owner in case.nodes else ""
+        parts = [] if kind in ("junction", "") else [f"{place} ({kind})"]
+        parts += [f"{name} ({link.kind})" for name, link in case.links.items()
+                  if link.kind != "pipe" and place in link.ports.values()]  # fmt: skip
+        found.append(Standing(chainage, place, tuple(parts)))
+    return found

@@ -1,0 +1,132 @@
+"""What a reader must know before any number: why a run stopped, what is not to be trusted, whether limits hold."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fvsolve.output.column import column
+from fvsolve.report.tables import ERROR, ReportTable, worded
+
+HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
+BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
+LATER = 6  # marks named behind the first
+
+
+class Word(NamedTuple):
+    """A sentence at the top of the page; `level` is "bad", "doubt" or "good"."""
+
+    level: str
+    head: str
+    text: str
+
+
+def words(result) -> list[Word]:
+    """The sentences at the top: a stop first, then what is wrong, what is in doubt, and the verdict."""
+    said = result.summary
+    found = []
+    if result.reason != "finished":
+        reached = f"It reached t = {said['t']:.6g} s of {result.case.numerics.end:.6g} s"
+        found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; the rest is not known."))
+    found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
+    found += [*_doubt(result), verdict(result)]
+    failed = [one for one in result.expectations if not one.ok]
+    if failed:
+        more = f"; and {len(failed) - 1} more, under Numerics" if len(failed) > 1 else ""
+        found.append(Word("bad", "The case claims what this run does not show.", claim(failed[0]) + more))
+    return found
+
+
+def _doubt(result) -> list[Word]:
+    """From when on results are not to be trusted: the first mark, and where others follow."""
+    marks = sorted(result.marks, key=lambda one: one.time)
+    if not marks:
+        return []
+    later = ", ".join(f"{one.place.partition('.')[2]} at {one.time:.6g} s" for one in marks[1 : 1 + LATER])
+    more = f", and {len(marks) - 1 - LATER} more places" if len(marks) > 1 + LATER else ""
+    text = marks[0].text + (f". Later also {later}{more}" if later else "")
+    return [Word("doubt", f"Results from {marks[0].time:.6g} s on are not to be trusted.", text)]
+
+
+def sound(result) -> bool:
+    """Whether the run came to its end and nothing casts doubt on its numbers."""
+    return result.reason == "finished" and result.ok and not result.marks
+
+
+def verdict(result) -> Word:
+    """Whether the limits of the case hold."""
+    verdicts = result.verdicts
+    if not verdicts:
+        return Word("none", "No limits were stated.", "The case does not say what its parts may bear: this report says "
+                    "what happens, not whether it is allowed.")  # fmt: skip
+    states = [state(one) for one in verdicts]
+    failed = [one.name for one, how in zip(verdicts, states, strict=True) if how == FAILS]
+    if failed:
+        many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
+        return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
+    unsure = [one.name for one, how in zip(verdicts, states, strict=True) if how == OPEN]
+    if unsure:
+        why = "their margins are smaller than the error of the numbers" if result.ok else "the run is not sound"
+        return Word("doubt", f"Whether {'limits hold' if len(unsure) > 1 else 'a limit holds'} is open.",
+                    f"{', '.join(unsure)}: {why}.")  # fmt: skip
+    every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
+    return Word("good", f"{every}.", "") if sound(result) else Word("doubt", f"{every}, as far as to be trusted.", "")
+
+
+def state(one) -> str:
+    """What is to be said of a verdict: open where the margin is smaller than the error of the value, and where no place
+    is beyond the limit in a run that is not ok."""
+    if one.margin is None:
+        return FAILS
+    if one.error is not None and abs(one.margin) < one.error:
+        return OPEN
+    return HOLDS if one.ok else FAILS if one.margin < 0.0 else OPEN
+
+
+def verdicts(result) -> ReportTable | None:
+    """The table of verdicts, those that fail first; None where no limits were stated."""
+    order = (FAILS, OPEN, HOLDS)
+    found = sorted(result.verdicts, key=lambda one: order.index(state(one)))
+    length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
+    asked = any(one.error is not None for one in found)
+    rows = []
+    for one in found:
+        asks = f"{one.quantity.replace('_', ' ')} {BOUNDS[one.bound]} {worded(one.limit)} {one.unit}"
+        rows.append([one.name, asks, state(one), one.value, *[one.error] * asked, one.margin, one.unit, one.place,
+                     _in(length, one.chainage), _in(height, one.elevation), _in(time, one.time)])  # fmt: skip
+    heads = ("limit", "asks for", "verdict", "value", *[ERROR] * asked, "margin", "unit", "worst at")
+    heads += ("chainage", "elevation", "time")
+    bad = frozenset(k for k, one in enumerate(found) if state(one) == FAILS)
+    units = ("",) * (7 + asked) + (length.unit, height.unit, time.unit)
+    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * asked})) if rows else None
+
+
+def worst(result) -> list[ReportTable]:
+    """Of each limit that more than one part has, its worst places."""
+    length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
+    made = []
+    for one in result.verdicts:
+        rows = [[row["place"], _in(length, row["chainage"]), _in(height, row["elevation"]), _in(time, row["time"]),
+                 row["value"], row["limit"], row["margin"]] for row in one.worst]  # fmt: skip
+        bad = frozenset(k for k, row in enumerate(rows) if row[-1] is None or row[-1] < 0.0)
+        units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, one.unit)
+        heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), BOUNDS[one.bound], "margin")
+        made += [ReportTable(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
+    return made
+
+
+def claims(result) -> ReportTable | None:
+    """What the case claims of its own results."""
+    rows = [[one.text, one.claimed, one.found, one.tolerance, one.unit, "holds" if one.ok else "FAILS"]
+            for one in result.expectations]  # fmt: skip
+    bad = frozenset(k for k, one in enumerate(result.expectations) if not one.ok)
+    heads = ("claim", "claimed", "found", "tolerance", "unit", "verdict")
+    return ReportTable("What the case claims", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
+
+
+def claim(one) -> str:
+    """A claim in words."""
+    return f"{one.text}: claimed {one.claimed:.6g}, found {one.found:.6g} {one.unit}"
+
+
+def _in(shown, value):
+    return None if value is None else float(shown.from_si(value))

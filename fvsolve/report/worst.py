@@ -1,0 +1,79 @@
+"""Where and when it is worst: along pipes from the envelope, elsewhere from the probes. Knows no limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.case.routes import Leg
+from fvsolve.report.heads import in_units
+from fvsolve.report.legs import SectionWay
+from fvsolve.report.tables import ERROR, ReportTable
+
+FIRST = 10  # rows of a ranking on the page
+EXTREMES = (  # quantity, its words, which end of it, when
+    ("greatest_pressure", "greatest pressure", np.argmax, "t_greatest"),
+    ("least_pressure", "least pressure", np.argmin, "t_least"),
+    ("greatest_head", "greatest head", np.argmax, "t_greatest"),
+    ("least_head", "least head", np.argmin, "t_least"),
+)
+
+
+def of_all(result, ways: list[SectionWay]) -> ReportTable | None:
+    """The worst of all pipes: each extreme, its pipe, where along it, chainage of the one section, elevation, time."""
+    envelope = result.envelope
+    if not envelope:
+        return None
+    legs = {leg.pipe: leg for way in ways for leg in way.legs}
+    if len(ways) > 1 or all(leg.begin == 0.0 and not leg.backwards for leg in legs.values()):
+        legs = {}  # the chainage says nothing more, or not of which section
+    rows = []
+    for name, words, most, when in EXTREMES:
+        ends = {pipe: int(most(arrays[name])) for pipe, arrays in envelope.items()}
+        pipes = list(ends)
+        pipe = pipes[int(most([envelope[one][name][ends[one]] for one in pipes]))]
+        arrays, k = envelope[pipe], ends[pipe]
+        chainage = [_chainage(result, legs.get(pipe), arrays["distance"][k])] if legs else []
+        rows.append([words, float(arrays[name][k]), in_units(result, name).unit, pipe, float(arrays["distance"][k]),
+                     *chainage, float(arrays["elevation"][k]), float(arrays[when][k])])  # fmt: skip
+    units = [in_units(result, one).unit for one in ("distance", *["distance"] * bool(legs), "elevation", "t_greatest")]
+    heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
+    return ReportTable("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), loose=frozenset({1}))
+
+
+def by_pipe(result) -> list[ReportTable]:
+    """Pipes by their greatest and by their least pressure, the worst first; none where there is but one pipe."""
+    if len(result.envelope) < 2:
+        return []
+    return [_ranked(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
+
+
+def _ranked(result, name: str, words: str, most, when: str) -> ReportTable:
+    rows = []
+    for pipe, arrays in result.envelope.items():
+        k = int(most(arrays[name]))
+        rows.append([pipe, *(float(arrays[one][k]) for one in (name, "distance", "elevation", when))])
+    rows.sort(key=lambda row: row[1], reverse=most is np.argmax)
+    units = ["", *(in_units(result, one).unit for one in (name, "distance", "elevation", when))]
+    heads = ("pipe", words, "from its start", "elevation", "time")
+    return ReportTable(f"{words.capitalize()} by pipe", heads, rows, units, most=FIRST,
+                 more="in envelope.csv and in the workbook (--xlsx)")  # fmt: skip
+
+
+def of_probes(result) -> ReportTable | None:
+    """Least and greatest of each probe over all accepted steps, and when; how far off where it was asked for."""
+    peaks, rows = result.summary.get("peaks", {}), []
+    for name, one in result.extremes.items():
+        off = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
+        rows.append([name, result.units[name], one.least, *off["least"], one.t_least, one.greatest, *off["greatest"],
+                     one.t_greatest])  # fmt: skip
+    heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
+    units = ["s" if column == "time" else "" for column in heads]
+    loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
+    return ReportTable("Probes", ("probe", "unit", *heads), rows, ("", "", *units), loose=loose,
+                 more="in summary.json and in the workbook (--xlsx)") if rows else None  # fmt: skip
+
+
+def _chainage(result, leg: Leg | None, distance: float) -> float | None:
+    """Chainage of a distance from the start of a pipe; None of a pipe that is on no section."""
+    shown = in_units(result, "distance")
+    return None if leg is None else float(shown.from_si(leg.chainage(shown.to_si(distance))))

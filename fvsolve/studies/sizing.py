@@ -1,0 +1,214 @@
+"""The value of a key at which all limits hold, by bracketing. Knows runs with verdicts; knows no physics."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case import Case, load
+from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
+from fvsolve.parts.arithmetic import Arithmetic
+from fvsolve.run import run
+from fvsolve.units import UNITS, show
+
+GOALS = ("least", "greatest")
+LOOKS = 8  # places between two ends of which neither holds, where it is looked for
+MOST_RUNS = 60
+EDGE = 0.1  # of the bracket that a guess keeps from its ends
+_VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+
+
+@dataclass(frozen=True)
+class SizeRun:
+    """One run: the value of the key, whether all limits hold, the least margin over its limit, and of which limit."""
+
+    value: float
+    ok: bool
+    margin: float | None
+    limit: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Size:
+    """What was found: the value that holds, in `unit`, the bracket (what fails, what holds), the runs as they came.
+
+    value is None where the limits cannot be met between the ends; nearest is then the run that came nearest.
+    """
+
+    key: str
+    unit: str
+    goal: str
+    value: float | None
+    bracket: tuple[float, float] | None
+    runs: list[SizeRun] = field(default_factory=list)
+    ties: tuple[str, ...] = ()
+
+    @property
+    def nearest(self) -> SizeRun:
+        """The run with the greatest margin."""
+        return max(self.runs, key=lambda one: -math.inf if one.margin is None else one.margin)
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON says it."""
+        made = {"key": self.key, "unit": self.unit, "goal": self.goal, "value": self.value, "bracket": self.bracket,
+                "ties": list(self.ties), "runs": [vars(one) for one in self.runs]}  # fmt: skip
+        return made if self.value is not None else made | {"nearest": vars(self.nearest)}
+
+
+def amount(given: Any) -> tuple[float, str]:
+    """A number and its unit, "" of a bare one; ValueError where it is none."""
+    if isinstance(given, (int, float)) and not isinstance(given, bool):
+        return float(given), ""
+    match = _VALUE.fullmatch(given) if isinstance(given, str) else None
+    if match is None:
+        raise ValueError(f'{show(given)} is no number; wanted one such as 2 or "2 m3"')
+    return float(match[1]), match[2]
+
+
+def ends(low: Any, high: Any) -> tuple[float, float, str]:
+    """Both ends of a range in one unit; FvsolveError where they have none in common or do not rise."""
+    try:
+        (a, unit_a), (b, unit_b) = amount(low), amount(high)
+    except ValueError as error:
+        raise FvsolveError(str(error)) from None
+    if unit_a != unit_b:
+        one, other = UNITS.get(unit_a), UNITS.get(unit_b)
+        if one is None or other is None or one.dimension != other.dimension or one.gauge != other.gauge:
+            raise FvsolveError(f"{show(low)} and {show(high)} have not one unit; write both in the same")
+        a = float(other.number(one.si(a)))
+    if not a < b:
+        raise FvsolveError(f"{show(low)} is not below {show(high)}; wanted LOW,HIGH")
+    return a, b, unit_b
+
+
+class Sizing:
+    """One search while it lasts."""
+
+    def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None) -> None:
+        self.case, self.key, self.unit, self.progress = case, key, unit, progress
+        self.runs: list[SizeRun] = []
+        self.rules = {}
+        for tied, text in ties.items():
+            try:
+                self.rules[tied] = Arithmetic(text)
+            except ValueError as error:
+                raise FvsolveError(f"--tie {tied}: {error}") from None
+
+    def keys(self, value: float) -> dict[str, Any]:
+        """What is set for a value of the key; formulas take its SI value as x."""
+        unit = UNITS.get(self.unit)
+        x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
+        found: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
+        for tied, rule in self.rules.items():
+            try:
+                found[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
+            except ValueError as error:
+                raise FvsolveError(f"--tie {tied}: {error}") from None
+        return found
+
+    def __call__(self, value: float) -> SizeRun:
+        """The run of a value."""
+        known = next((one for one in self.runs if one.value == value), None)
+        if known is not None:
+            return known
+        if self.progress is not None:
+            self.progress(len(self.runs), f"{self.key} = {value:.6g} {self.unit}".rstrip())
+        try:
+            result = run(load(self.case, {**self.keys(value), "output.fields": 0, "output.lines": {}}))
+        except CaseError as error:
+            if not self.runs:
+                raise
+            self.runs.append(SizeRun(value, False, None, "", f"refused: {error.faults[0].message}"))
+            return self.runs[-1]
+        if result.reason.startswith("interrupted"):
+            raise KeyboardInterrupt
+        worst = min(result.verdicts, key=relative)
+        margin = relative(worst) if result.ok else None
+        ok = result.ok and all(one.ok for one in result.verdicts)
+        self.runs.append(SizeRun(value, ok, margin, worst.name, result.reason))
+        return self.runs[-1]
+
+    def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
+        """(the value that holds and is least or greatest, (what fails, what holds)); None where nothing holds."""
+        best, other = (low, high) if goal == "least" else (high, low)
+        if self(best).ok:
+            return best, None
+        good = other if self(other).ok else self.between()
+        if good is None:
+            return None, None
+        bad = max((one.value for one in self.runs if not one.ok and (one.value - good) * (best - good) > 0.0),
+                  key=lambda x: -abs(x - good))  # fmt: skip
+        while abs(good - bad) > rtol * max(abs(good), abs(bad)) and len(self.runs) < MOST_RUNS:
+            x = self.guess(bad, good)
+            good, bad = (x, bad) if self(x).ok else (good, x)
+        return good, (bad, good)
+
+    def between(self) -> float | None:
+        """A value that holds beside the runs so far, which do not: where the margin is greatest, ever closer."""
+        for _ in range(LOOKS):
+            runs = sorted(self.runs, key=lambda one: one.value)
+            at = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
+            gaps = [(runs[k + 1].value - runs[k].value, k) for k in (at - 1, at) if 0 <= k < len(runs) - 1]
+            k = max(gaps)[1]
+            x = 0.5 * (runs[k].value + runs[k + 1].value)
+            if self(x).ok:
+                return x
+        return None
+
+    def guess(self, bad: float, good: float) -> float:
+        """Where the margin would vanish on a straight line, away from both ends; the middle where that is unknown."""
+        margins = [self(x).margin for x in (bad, good)]
+        share = 0.5
+        if None not in margins and margins[1] > margins[0] and len(self.runs) % 2:
+            share = min(max(-margins[0] / (margins[1] - margins[0]), EDGE), 1.0 - EDGE)
+        return bad + share * (good - bad)
+
+
+def relative(verdict: Any) -> float:
+    """The margin of a verdict over its limit; of a limit that is nothing, over the value or one."""
+    if verdict.margin is None:
+        return -math.inf
+    return verdict.margin / (abs(verdict.limit) or abs(verdict.value) or 1.0)
+
+
+def size(
+    case, key: str, low: Any, high: Any, goal: str = "least", ties: Mapping[str, str] | None = None,
+    set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None,
+) -> Size:  # fmt: skip
+    """The least (or greatest) value of a key between `low` and `high` at which a case holds all its limits.
+
+    Bracketed to `rtol` of itself; between two ends of which neither holds, places are tried where margins are greatest.
+    ties : other keys as formulas of x, the value in SI. Raises FvsolveError where the case has no limits, CaseError for
+    what is no case.
+    """
+    if goal not in GOALS:
+        raise FvsolveError(f"goal = {show(goal)}{did_you_mean(str(goal), GOALS)}; wanted {listing(list(GOALS))}")
+    if not 0.0 < rtol < 1.0:
+        raise FvsolveError(f"rtol = {rtol}; wanted a number between 0 and 1")
+    first, last, unit = ends(low, high)
+    made = load(case, dict(set or {}))
+    if not made.limits:
+        raise FvsolveError(f"{made.name} states no [limits]; a size is what holds them")
+    search = Sizing(made, key, unit, ties or {}, progress)
+    value, bracket = search.search(first, last, goal, rtol)
+    said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
+    return Size(key, unit, goal, value, bracket, search.runs, said)
+
+
+def tied(texts: Sequence[str]) -> dict[str, str]:
+    """`KEY = formula` of each as pairs."""
+    found = {}
+    for text in texts:
+        key, equals, rule = text.partition("=")
+        if not (equals and key.strip() and rule.strip()):
+            raise FvsolveError(
+                f'--tie {text}: wanted "KEY = formula of x", for example "nodes.vessel.gas_volume = x / 2"'
+            )
+        found[key.strip()] = rule.strip()
+    return found

@@ -1,0 +1,231 @@
+"""The page of a run: peaks stay, text is text, it asks no network, it says first what is not to be trusted."""
+
+import base64
+import json
+import re
+import shlex
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from truth.folders import DOCS
+from truth.scenes import junction, lake, pipe, ramp, scene, tank, valve
+
+import fvsolve
+from fvsolve.report.figures import as_it_stands
+from fvsolve.report.legs import ways
+from fvsolve.report.page import page
+from fvsolve.report.report import write_report
+from fvsolve.run.result import Result
+
+WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
+
+VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "elevation": 0.0, "time": 1.25,
+           "bound": "greatest", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
+           "quantity": "gauge_pressure", "until": 3.0, "error": None, "worst": []}  # fmt: skip
+
+
+class Read(HTMLParser):
+    """Tags with attributes, words outside of scripts, and what each script holds."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.tags, self.scripts, self.words, self.inside = [], [], [], ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self.inside = tag
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag):
+        self.inside = ""
+
+    def handle_data(self, data):
+        if self.inside == "script":
+            self.scripts[-1] += data
+        elif self.inside != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+    @property
+    def figures(self) -> dict:
+        return json.loads(self.scripts[0])
+
+
+def values(packed: dict) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(packed["bdata"]), "<" + packed["dtype"])
+
+
+def changed(result, table=None, **summary) -> Result:
+    """The same run with other rows, or other keys of its summary."""
+    return Result(result.summary | summary, lambda: result._table.copy() if table is None else table,
+                  lambda: result.envelope, result.directory)  # fmt: skip
+
+
+def line(end: float, **more) -> dict:
+    """A valve shuts at the end of a main, under a title and words that would be markup."""
+    nodes = {"top": lake("45 m"), "gate": junction(), "outfall": lake("0 m")}
+    links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
+             "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0))}  # fmt: skip
+    case = scene(nodes, links, end, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9},
+                 ["gate.head", "valve.flow", "main.pressure@0.5"], 0.01)  # fmt: skip
+    case["output"] |= {"fields": 12} | more
+    return case | {"title": WICKED, "description": WICKED, "source": WICKED}
+
+
+@pytest.fixture(scope="module")
+def closure(tmp_path_factory):
+    return fvsolve.run(line(3.0), out=tmp_path_factory.mktemp("runs") / "closure", pictures=False)
+
+
+def read(result) -> Read:
+    return Read(page(result, ways(result)))
+
+
+def test_the_peak_of_a_million_rows_is_in_the_page_to_the_last_bit(closure):
+    rng = np.random.default_rng(17)
+    table = np.column_stack([np.linspace(0.0, 3.0, 10**6), rng.normal(size=(10**6, len(closure.probes)))])
+    table[271_828, 1], table[314_159, 1] = np.pi * 1e3, -np.e * 1e3
+    found = page(changed(closure, table), ways(closure))
+    traces = [one for id, figure in Read(found).figures.items() if id.startswith("history") for one in figure["data"]]
+    assert len(found) < 6e6 and len(traces) == len(closure.probes)
+    for k, name in enumerate(closure.probes, 1):
+        t, v = next((values(one["x"]), values(one["y"])) for one in traces if one["name"] == name)
+        assert (v.max(), v.min()) == (table[:, k].max(), table[:, k].min())
+        assert t[v.argmax()] == table[table[:, k].argmax(), 0] and t[v.argmin()] == table[table[:, k].argmin(), 0]
+
+
+def test_a_report_of_many_long_sections_probes_and_frames_stays_below_six_megabytes(tmp_path):
+    case = line(0.02, fields=100)
+    case["links"]["main"]["cells"] = 4000
+    case["output"] |= {"every": 1e-5, "probes": [f"main.head@{k / 200}" for k in range(200)]}
+    found = fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    (way,) = ways(found)
+    text = page(found, [way] * 40)
+    assert 5e6 < len(text.encode()) < 6e6 and "152 probes that swing less are not drawn" in text
+
+
+def test_words_of_a_case_are_data_and_never_markup(closure):
+    verdict = VERDICT | {"name": WICKED}
+    warning = {"kind": "range", "place": "x", "key": None, "value": None, "limit": None, "ok": True, "text": WICKED}
+    found = read(changed(closure, verdicts=[verdict], warnings=[warning]))
+    assert [attributes.get("type") for tag, attributes in found.tags if tag == "script"] == [
+        "application/json",
+        None,
+        None,
+    ]
+    assert not [tag for tag, _ in found.tags if tag in ("b", "img", "iframe", "object", "link")]
+    shown = re.sub(r"\s+", " ", WICKED.replace("\u2028", "\\u2028"))
+    assert found.text.count(shown) >= 5  # title, heading, description, source, verdict, warning
+    assert as_it_stands("<b>a</b> & $x$") == "&lt;b&gt;a&lt;/b&gt; &amp; &#36;x&#36;"
+
+
+def test_the_page_names_no_host(closure):
+    found = read(closure)
+    links = [value for _, attributes in found.tags for key, value in attributes.items() if key in ("href", "src")]
+    assert links and all(link.startswith("#") for link in links)
+    policy = next(one["content"] for tag, one in found.tags if tag == "meta" and "http-equiv" in one)
+    assert "default-src 'none'" in policy and "http" not in policy
+
+
+def test_lines_of_a_section_are_those_of_the_envelope(closure):
+    figure = read(closure).figures["section-0"]
+    lines = {one["name"]: values(one["y"]) for one in figure["data"] if isinstance(one["y"], dict)}
+    envelope, fluid = closure.envelope["main"], closure.summary["fluid"]
+    for name in ("greatest_head", "least_head", "initial_head"):
+        assert lines[name.replace("_", " ")] == pytest.approx(envelope[name], rel=1e-6)
+    below = (fluid["vapor_pressure"] - closure.summary["ambient_pressure"]) / (fluid["density"] * closure.case.gravity)
+    assert lines["vapour line"] == pytest.approx(envelope["elevation"] + below, rel=1e-6)
+    assert len(figure["moving"]["times"]) == 13 and np.shape(figure["moving"]["heads"]) == (13, 40)
+    assert figure["moving"]["heads"][0] == pytest.approx(envelope["initial_head"], rel=1e-5)
+
+
+def test_a_run_that_stopped_says_so_before_anything_else(tmp_path):
+    def enough(t, seconds, steps):
+        raise KeyboardInterrupt
+
+    links = {"hole": valve("high", "low", 1e-3)}
+    case = scene({"high": tank(3.0, 4.0), "low": tank(3.0, 1.0)}, links, 1e6, {"method": "heun", "step": 1e-3})
+    result = fvsolve.run(case, out=tmp_path / "run", progress=enough, pictures=False)
+    text = read(result).text
+    assert result.reason.startswith("interrupted")
+    first, after = text.index("This run stopped early."), text.index("No limits were stated.")
+    assert first < after < text.index("Long sections") and "of 1e+06 s" in text[first:after]
+    assert "there is no long section" in text
+
+
+def test_marks_and_warnings_that_spoil_numbers_stand_at_the_top(closure):
+    mark = {"what": "below vapour pressure", "place": "main", "time": 1.25, "text": "main: pressure falls"}
+    bad = {
+        "kind": "growth",
+        "place": "links.main",
+        "key": None,
+        "value": None,
+        "limit": None,
+        "ok": False,
+        "text": "it grows",
+    }
+    text = read(changed(closure, marks=[mark], warnings=[bad], ok=False)).text
+    places = [
+        text.index(one) for one in ("it grows", "from 1.25 s on are not to be trusted", "No limits were stated", "Long")
+    ]
+    assert places == sorted(places)
+
+
+def test_verdicts_stand_first_those_that_fail_before_others(closure):
+    holds = {"name": "vacuum", "ok": True, "value": 0.5, "limit": 0.2, "margin": 0.3, "bound": "least"}
+    verdicts = [VERDICT | holds, VERDICT]
+    text = read(changed(closure, verdicts=verdicts)).text
+    assert "1 of 2 limits does not hold. class" in text and "class gauge pressure at most 10 bar FAILS 13.5" in text
+    assert text.index("FAILS") < text.index("vacuum") < text.index("Worst of all pipes")
+    early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], ok=False)).text
+    assert "Whether a limit holds is open. vacuum: the run is not sound." in early and "FAILS" not in early
+    unsure = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
+    assert "open. class: their margins are smaller than the error" in unsure and "open 13.5 4" in unsure
+
+
+def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):
+    found = read(fvsolve.run(line(0.2, fields=0), out=tmp_path / "run", pictures=False))
+    assert "No fields were stored" in found.text and "moving" not in found.figures["section-0"]
+
+
+def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkeypatch):
+    with pytest.raises(fvsolve.RunError, match="nowhere does not exist; wanted a run directory"):
+        write_report(tmp_path / "nowhere")
+    with pytest.raises(fvsolve.RunError, match="holds no ended run"):
+        write_report(tmp_path)
+    (tmp_path / "restart.npz").touch()
+    with pytest.raises(fvsolve.RunError, match="holds an unfinished run: go on with it, .* --resume"):
+        write_report(tmp_path)
+    for name in ("summary.json", "history.csv", "envelope.csv", "fields/000003.vtu"):
+        path = closure.directory / name
+        whole = path.read_bytes()
+        path.write_bytes(whole[: len(whole) // 2].rsplit(b"\n", 1)[0] + b"\n1,2\n")
+        try:
+            with pytest.raises(fvsolve.RunError, match=re.escape(path.name)):
+                write_report(closure.directory, tmp_path / "report.html")
+        finally:
+            path.write_bytes(whole)
+    with pytest.raises(fvsolve.FvsolveError, match="cannot be written: .*--out"):
+        write_report(closure.directory, tmp_path / "no" / "report.html")
+    monkeypatch.setitem(__import__("sys").modules, "xlsxwriter", None)
+    with pytest.raises(fvsolve.FvsolveError, match=r'needs xlsxwriter: pip install "fvsolve\[report\]"'):
+        write_report(closure.directory, tmp_path / "report.html", xlsx=True)
+
+
+def test_the_commands_of_its_page_run(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (DOCS / "report.md").read_text(encoding="utf-8")
+    lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
+    assert all(fvs(*shlex.split(line)[1:])[0] == 0 for line in lines)
+    made = {"report.html", "report.xlsx", "section.png", "probes.png", "phase.png"}
+    assert made <= {path.name for path in (tmp_path / "runs/pump-trip-air-vessel").iterdir()}
+    again = fvs(
+        "run", "pump-trip-air-vessel", "--force", "--no-pictures", "--set", "numerics.end=1", "--set", "expect={}"
+    )
+    assert again[0] == 0 and not made & {path.name for path in (tmp_path / "runs/pump-trip-air-vessel").iterdir()}

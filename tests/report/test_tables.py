@@ -1,0 +1,68 @@
+"""Sections, tables and the workbook of a report."""
+
+import re
+import zipfile
+
+import numpy as np
+import pytest
+from truth.scenes import junction, lake, pipe, scene
+
+import fvsolve
+from fvsolve.report.legs import ways
+from fvsolve.report.report import write_report
+from fvsolve.report.section import section
+from fvsolve.report.tables import ReportTable, aligned, worded
+
+
+@pytest.fixture(scope="module")
+def fork(tmp_path_factory):
+    """Three pipes in a row, the middle one laid the other way round, a branch off it, and a loop beside it."""
+    nodes = {"high": lake("50 m", elevation=0.0), "a": junction(elevation=10.0), "b": junction(elevation=20.0),
+             "low": lake("30 m", elevation=5.0), "end": junction(1e-3, elevation=0.0)}  # fmt: skip
+    links = {"first": pipe("high", "a", 400.0, 0.3, 1000.0, 8), "second": pipe("b", "a", 300.0, 0.3, 1000.0, 6),
+             "third": pipe("b", "low", 500.0, 0.3, 1000.0, 10), "branch": pipe("a", "end", 100.0, 0.2, 1000.0, 2),
+             "beside": pipe("a", "b", 350.0, 0.3, 1000.0, 7)}  # fmt: skip
+    friction = {"friction": {"model": "steady", "factor": 0.02}}
+    links = {name: one | friction for name, one in links.items()}
+    case = scene(nodes, links, 0.5, {}, ["a.head"], title="=1+1")
+    return fvsolve.run(case, out=tmp_path_factory.mktemp("runs") / "fork", pictures=False)
+
+
+def test_sections_are_the_longest_ways_and_run_down_the_head(fork):
+    found = ways(fork)
+    assert [[leg.pipe for leg in way.legs] for way in found] == [["first", "second", "third"], ["branch", "beside"]]
+    longest = found[0]
+    assert [(leg.begin, leg.backwards) for leg in longest.legs] == [(0.0, False), (400.0, True), (700.0, False)]
+    assert longest.places == [("high", 0.0), ("a", 400.0), ("b", 700.0), ("low", 1200.0)]
+
+
+def test_a_section_is_one_line_along_its_chainage(fork):
+    one = section(fork, ways(fork)[0])
+    assert one.chainage == pytest.approx(25.0 + 50.0 * np.arange(24))  # all cells are 50 m long
+    points = [0.0, 400.0, 700.0, 1200.0], [0.0, 10.0, 20.0, 5.0]
+    assert one.along["elevation"] == pytest.approx(np.interp(one.chainage, *points))
+    assert (np.diff(one.along["initial_head"]) < 0).all() and one.parted == []
+    assert [device.parts for device in one.devices] == [("high (reservoir)",), (), (), ("low (reservoir)",)]
+
+
+def test_numbers_of_a_column_are_aligned_on_their_points():
+    plain = [text.replace("\u2007", "0").replace("\u2008", ".") for text in aligned([1.5, 22.25, 333.0, None])]
+    assert plain[:3] == ["1.50", "22.25", "333.00"]
+    assert len({len(text.partition(".")[2]) for text in aligned([0.001, 12.0, 5.5])}) == 1
+    assert worded(12345.678) == "12\u202f346" and worded(-0.0) == "0" and worded(1e-12) == "1e\u221212"
+    assert worded(float("nan")) == worded(None) == "\u2013" and worded(True) == "yes"
+    assert ReportTable("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
+
+
+def test_the_workbook_holds_every_row_and_no_formula(fork, tmp_path):
+    page, book = write_report(fork.directory, tmp_path / "handed.html", xlsx=True)
+    assert (page.name, book.name) == ("handed.html", "handed.xlsx")
+    with zipfile.ZipFile(book) as found:
+        sheets = {name: found.read(name).decode() for name in found.namelist() if name.startswith("xl/worksheets/")}
+        names = re.findall(r'<sheet name="([^"]+)"', found.read("xl/workbook.xml").decode())
+    assert not any("<f>" in text for text in sheets.values()) and {"Summary", "Pipes", "Ledgers"} <= set(names)
+    which = 1 + next(k for k, name in enumerate(names) if name.startswith("Section first"))
+    along = sheets[f"xl/worksheets/sheet{which}.xml"]
+    assert along.count("<row ") == 1 + 24
+    values = [float(text) for text in re.findall("<v>([^<]+)</v>", along)]
+    assert float(fork.envelope["first"]["greatest_pressure"].max()) == pytest.approx(max(values), rel=1e-14)

@@ -1,0 +1,184 @@
+"""A study is the runs that its events and protections make, and a size is where a limit is met exactly."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.case.text import write
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.studies import design
+from fvsolve.studies.sizing import ends, size, tied
+
+
+def throttled() -> dict:
+    """A lake, a main and a tap; shut by `closure`, kept by an accumulator of `vessel`."""
+    nodes = {"lake": lake(50.0, elevation=0.0), "gate": junction(elevation=10.0), "air": reservoir(1e5, elevation=10.0)}
+    rough = {"model": "quasi-steady", "roughness": 1e-4}
+    links = {"main": pipe("lake", "gate", 500.0, 0.2, 1000.0, 10, friction=rough),
+             "tap": valve("gate", "air", 0.02 * area(0.2))}  # fmt: skip
+    limits = {"top": {"on": "main", "quantity": "gauge_pressure", "greatest": "8 bar"},
+              "dry": {"on": "main", "least": "vacuum"}}  # fmt: skip
+    return scene(nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate.pressure"], limits=limits)
+
+
+STUDY = """
+title = "Two taps"
+case = "main.toml"
+
+[events.fast.links.tap]
+opening = { start = "0.5 s", duration = "0.1 s", value = [1.0, 0.0] }
+
+[events.slow]
+"links.tap.opening" = { start = "0.5 s", duration = "3 s", value = [1.0, 0.0] }
+
+[protections.none]
+
+[protections.vessel.nodes.vessel]
+type = "accumulator"
+volume = 1.0
+gas_volume = 0.3
+on = "main"
+at = 450.0
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    (tmp_path / "main.toml").write_text(write(throttled()))
+    (tmp_path / "taps.toml").write_text(STUDY)
+    return tmp_path / "taps.toml"
+
+
+def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_path) -> None:
+    found = design.study(study, tmp_path / "out")
+    assert [(row["event"], row["protection"]) for row in found.rows] == [
+        ("fast", "none"), ("fast", "vessel"), ("slow", "none"), ("slow", "vessel")]  # fmt: skip
+    alone = fvsolve.run(
+        tmp_path / "main.toml", {"links.tap.opening": {"start": 0.5, "duration": 0.1, "value": [1.0, 0.0]}}
+    )
+    assert found.rows[0]["verdicts"][0]["value"] == alone.verdicts[0].value
+    assert not found.rows[0]["verdicts"][0]["ok"] and found.rows[1]["verdicts"][0]["ok"]
+    assert found.holds == ["vessel"] and found.ok
+    said = json.loads((tmp_path / "out" / "study.json").read_text())
+    assert said["holds"] == ["vessel"] and said["runs"][1]["directory"] == "fast.vessel"
+    assert fvsolve.open_run(tmp_path / "out" / "fast.vessel").verdicts[0].ok
+    assert len((tmp_path / "out" / "study.csv").read_text().splitlines()) == 5
+    stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*/summary.json")}
+    again = design.study(study, tmp_path / "out")
+    assert again.rows == found.rows
+    assert {path: path.stat().st_mtime_ns for path in stamps} == stamps  # nothing was run again
+    assert design.open_study(tmp_path / "out")["title"] == "Two taps"
+
+
+@pytest.mark.slow
+def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
+    one = design.study(study, tmp_path / "one")
+    study.write_text(STUDY.replace("case =", "error = true\ncase ="))
+    other = design.study(study, tmp_path / "two", jobs=2)
+    for row, beside in zip(one.rows, other.rows, strict=True):
+        assert row["extremes"] == beside["extremes"]
+        assert [verdict["value"] for verdict in row["verdicts"]] == [verdict["value"] for verdict in beside["verdicts"]]
+        assert all(verdict["error"] > 0.0 for verdict in beside["verdicts"])
+
+
+def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(fvs, study, tmp_path) -> None:
+    status, text, _ = fvs("study", str(study), "--out", str(tmp_path / "out"))
+    assert status == 0 and "all limits hold in all events: vessel" in text and "fast with none" in text
+    study.write_text(STUDY[: STUDY.index("[protections.vessel")])
+    status, text, _ = fvs("study", str(study), "--out", str(tmp_path / "other"))
+    assert status == 1 and "under no protection" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("[protections.none]", "[protections.none.links.tap]\nopening = 0.5"),
+         "links.tap.opening is set here and links.tap.opening by protections.none"),
+        (("[protections.none]", "[protections.none]\n'links.tap' = {}"), "links.tap.opening is set here and links.tap"),
+        (("[events.slow]", "[events.slow]\n'links.tpa.area' = 2"), 'no link named "tpa"; did you mean "tap"?'),
+        (("at = 450.0", "at = 550.0"), "is not within: main runs from 0 m to 500 m"),
+        (('case = "main.toml"', 'case = "mian.toml"'), "there is no such file"),
+        (('case = "main.toml"', ""), "case is missing"),
+        (("[events.slow]", "[event.slow]"), 'unknown key; did you mean "events"?'),
+        (('title = "Two taps"', "title = 3"), "3 is not text"),
+        (("[protections.none]", "[protections]\nnone = 3\n[protections.x]"), "3 is no table"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named(study, change, told: str) -> None:
+    study.write_text(STUDY.replace(*change))
+    with pytest.raises(CaseError) as error:
+        design.study(study, study.parent / "out")
+    assert told in str(error.value)
+    assert not (study.parent / "out").exists()
+
+
+# sizes ------------------------------------------------------------------------------------------------------------
+
+
+def still(least: float | None = None, greatest: float | None = None) -> dict:
+    """A lake above a shut main: the gauge pressure at the gate is rho g (head - 10 m)."""
+    case = throttled()
+    case["links"]["tap"]["opening"] = 0.0
+    bounds = {key: one for key, one in (("least", least), ("greatest", greatest)) if one is not None}
+    return case | {"limits": {"gate": {"on": "gate", "quantity": "gauge_pressure", **bounds}}}
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "scale"), [(20.0, 80.0, 1.0), ("20 m", "80 m", 1.0), ("20 m", "262 ft", 0.3048)]
+)
+def test_a_size_is_where_the_limit_is_met(low, high, scale: float) -> None:
+    exact = 10.0 + 3e5 / (RHO * GRAVITY)
+    found = size(still(least=3e5), "nodes.lake.head", low, high, rtol=1e-4)
+    assert found.value * scale == pytest.approx(exact, rel=2e-4)
+    fails, holds = found.bracket
+    assert fails * scale < exact <= holds * scale
+    assert all(one.ok == (one.value * scale >= exact) for one in found.runs)
+    most = size(still(greatest=3e5), "nodes.lake.head", low, high, "greatest", rtol=1e-4)
+    assert most.value * scale == pytest.approx(exact, rel=2e-4) and most.value <= most.bracket[0]
+
+
+def test_ends_that_hold_or_fail_are_said() -> None:
+    assert size(still(least=1e5), "nodes.lake.head", 40.0, 80.0).value == 40.0
+    assert len(size(still(least=1e5), "nodes.lake.head", 40.0, 80.0).runs) == 1
+    lost = size(still(least=9e5), "nodes.lake.head", 20.0, 80.0)
+    assert lost.value is None and lost.nearest.value == 80.0
+    island = size(still(least=3e5, greatest=4.5e5), "nodes.lake.head", 20.0, 100.0, rtol=1e-3)
+    assert island.value == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=2e-3)
+
+
+def test_ties_follow_in_si() -> None:
+    found = size(still(least=3e5), "nodes.lake.head", "80 ft", "250 ft", ties=tied(["links.main.length = 10 * x"]),
+                 rtol=0.01)  # fmt: skip
+    assert found.ties == ("links.main.length = 10 * x",)
+    assert found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
+
+
+def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
+    (tmp_path / "still.toml").write_text(write(still(least=3e5)))
+    status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20 m,80 m")
+    assert status == 0 and "least value that holds all limits" in text and text.count("holds") > 2
+    status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30", "--json")
+    said = json.loads(text)
+    assert status == 1 and said["value"] is None and said["nearest"]["value"] == 30.0
+    assert {"value", "bracket", "runs"} <= set(said)
+
+
+def test_what_cannot_be_sized_is_said() -> None:
+    with pytest.raises(FvsolveError, match="states no"):
+        size(throttled() | {"limits": {}}, "nodes.lake.head", 20.0, 80.0)
+    with pytest.raises(FvsolveError, match="is not below"):
+        ends("80 m", "20 m")
+    with pytest.raises(FvsolveError, match="have not one unit"):
+        ends("80 m", "90 bar")
+    with pytest.raises(FvsolveError, match="is no number"):
+        ends("wide", 3)
+    with pytest.raises(FvsolveError, match="wanted"):
+        tied(["links.main.length"])
+    with pytest.raises(CaseError, match='did you mean "lake"'):
+        size(still(least=3e5), "nodes.lkae.head", 20.0, 80.0)
+    assert np.isclose(ends("1 km", "2000 m")[0], 1000.0) and AMBIENT > 0.0
