@@ -15,11 +15,13 @@ from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Inside
 from fvsolve.parts.value import (
     COUNTED,
+    SHAPE,
     VALUE,
     Choice,
     Misfit,
     Number,
     Quantity,
+    Rows,
     Setting,
     Text,
     Usual,
@@ -51,6 +53,8 @@ class Pipe(Conduit, kind="pipe"):
     drop times flow [W].
     """
 
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
+    asked: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
         *Conduit.alternatives, ("wave_speed", "wall"), ("diameter", "class"), ("schedule", "class"),
@@ -65,6 +69,10 @@ class Pipe(Conduit, kind="pipe"):
 
     length: Annotated[float, LENGTH] = None  # that of profile stands in for it
     profile: Annotated[Profile | None, ProfileValue()] = None
+    bends: Annotated[
+        tuple[float, ...] | None,
+        Rows("length", rising=True, about="chainages at which it is cut into legs", changes=SHAPE),
+    ] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     material: Annotated[str | None, OfCatalogue()] = None
