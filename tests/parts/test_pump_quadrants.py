@@ -179,3 +179,10 @@ def test_a_pump_starts_against_a_rigid_column_behind_its_check_valve(numerics):
     rising, up = (result.t > opens) & (result.t <= 3.0), result.t > 3.0
     assert result["pump.flow"][rising] == approx(first.sol(result.t[rising])[0], abs=1e-6)
     assert result["pump.flow"][up] == approx(then.sol(result.t[up])[0], abs=1e-6)
+
+
+def test_a_curve_too_full_for_the_torque_of_its_table_is_said():
+    full = {"flow": [0.0, 0.1, 0.2], "head": [52.0, 50.0, 45.0]}
+    result = fvsolve.run(column(30.0, 0.1, ["pump.flow"], **{**SHAFT, "curve": full}))
+    (said,) = [one for one in result.warnings if one.key == "efficiency"]
+    assert said.value > 1.0 and "give efficiency over flow" in said.text
