@@ -50,14 +50,14 @@ class Pump(TwoPort, kind="pump"):
         Scheduled("number", nonnegative, "relative to that of the curve", Usual(0.0, 2.5, "of the rated speed")),
     ] = Field(default_factory=lambda: constant(1.0))
     rated_speed: Annotated[
-        float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]", SPEEDS, VALUE)
+        float | None, Quantity("angular_velocity", positive, "at relative speed 1 [rad/s]", SPEEDS, PROFILE)
     ] = None
     inertia: Annotated[
         float | None,
         Quantity(
             "inertia",
             positive,
-            "of all that turns with the shaft, the water in it too [kg m2]; wants rated_speed",
+            "of all that turns with the shaft, the water in it too [kg m2]; wants rated_speed; else estimated",
             changes=VALUE,
         ),
     ] = None
