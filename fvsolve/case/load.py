@@ -228,9 +228,12 @@ class _Reader:
 
     def cut(self, properties: Any, numerics: Numerics | None) -> list[Notice]:
         """Cut pipes at what is placed on them by chainage; what is to be told of it."""
-        table = self.raw.table
+        table = placing.bent(self.raw.table)
         if not placing.placed(table):
             return []
+        self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
+                       for name, one in table["links"].items() if placing.is_pipe(one)
+                       for k in range(len(one["bends"]) if isinstance(one.get("bends"), list) else 0)}  # fmt: skip
         self.add(placing.faults(table))
         self.stop()
         pipes = {}
@@ -247,7 +250,8 @@ class _Reader:
         exact = {name for name, pipe in pipes.items() if (pipe.line or numerics.line) == "delay"}
         made = placing.cut(table, pipes, counts, exact, self.fault)
         self.stop()
-        self.raw, self.origin, self.pieces = replace(self.raw, table=made.table), made.origin, made.pieces
+        self.raw, self.pieces = replace(self.raw, table=made.table), made.pieces
+        self.origin |= made.origin
         return made.told
 
     def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:

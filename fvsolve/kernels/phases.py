@@ -133,6 +133,9 @@ MEMBERS = {
     ),
     "scalars": Pieces(leave="scalars: clear_losses", observe="scalars: observe_scalars"),
     "carried": Pieces(leave="scalars: leave_pipes", carry="scalars: carry_in_pipes"),
+    "forces, linear": Pieces(observe="forces: observe_forces_linear"),
+    "forces, barotropic": Pieces(observe="forces: observe_forces_barotropic"),
+    "forces, cavitating": Pieces(observe="forces: observe_forces_cavitating"),
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
 }  # fmt: skip
@@ -179,6 +182,7 @@ class Cast:
     alone: bool = False
     bands: bool = False
     together: bool = False
+    forces: bool = False
 
     def members(self) -> Iterator[Pieces]:
         """Of what it consists, in the order in which pieces of one phase run."""
@@ -233,6 +237,8 @@ class Cast:
             if self.pipes:
                 yield MEMBERS["carried"]
         yield from self.carried
+        if self.forces:
+            yield MEMBERS[f"forces, {family}"]
         if self.pipes:
             yield MEMBERS["pipes"]
         yield ALWAYS

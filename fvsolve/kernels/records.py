@@ -433,6 +433,7 @@ LAYOUT = np.dtype(
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
         ("ride", "i8"),  # what drives stretches on bodies since the start [J/kg]
         ("rates", "i8"),  # in `work`: room for rates where `out` alone is asked for and hangs on them; else -1
+        ("forces", "i8"),  # in `work`: room for the rates that forces on pipes are read off; else -1
         ("tank", "i8"),  # of basins that ride on bodies, what their mass is along their normal
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
@@ -475,6 +476,7 @@ GIVEN_FLOW = 18  # of a patch that a given velocity passes
 WALL_VALUE = 19  # of a wall that moves
 BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # `side` says which, see `mechanism.observe`
 SURFACE_VALUE = 24  # of water in modes
+PIPE_FORCE = 25  # on a whole pipe
 
 BASIN = np.dtype(
     [

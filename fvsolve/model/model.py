@@ -230,7 +230,8 @@ class Model(Shown):
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
         cast = Cast(self.case.law.family, cells, *there, self.unsteady, many.devices, tuple(self.laws),
-                    basins, carried, many.scalars, valves, many.delays, alone)  # fmt: skip
+                    basins, carried, many.scalars, valves, many.delays, alone,
+                    forces=bool(self.layout["forces"] >= 0))  # fmt: skip
         return functions(cast)
 
     @property

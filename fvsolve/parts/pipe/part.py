@@ -12,10 +12,12 @@ from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import (
     COUNTED,
+    SHAPE,
     Choice,
     Misfit,
     Number,
     Quantity,
+    Rows,
     Setting,
     Usual,
     Value,
@@ -78,6 +80,8 @@ class Pipe(Conduit, kind="pipe"):
     drop times flow [W].
     """
 
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
+    asked: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.alternatives, ("wave_speed", "wall"))
     along: ClassVar[dict[str, str]] = {
@@ -89,6 +93,10 @@ class Pipe(Conduit, kind="pipe"):
 
     length: Annotated[float, LENGTH] = None  # that of profile stands in for it
     profile: Annotated[Profile | None, ProfileValue()] = None
+    bends: Annotated[
+        tuple[float, ...] | None,
+        Rows("length", rising=True, about="chainages at which it is cut into legs", changes=SHAPE),
+    ] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
     cells: Annotated[
