@@ -40,9 +40,10 @@ def head(n: float, q: float) -> float:
 
 
 def torque(n: float, q: float) -> float:
-    """Of a pump that turns forward and delivers."""
+    """Of a pump that turns forward and delivers; of no efficiency above that at its rated point."""
     v = q / FLOWS[0]
-    return RATED * (n * n + v * v) * float(np.interp(math.atan2(v, n), np.linspace(0.0, math.pi / 2, len(WB)), WB))
+    by_table = (n * n + v * v) * float(np.interp(math.atan2(v, n), np.linspace(0.0, math.pi / 2, len(WB)), WB))
+    return RATED * max(by_table, v * head(n, q) / HEADS[0] / n)
 
 
 def steady() -> float:

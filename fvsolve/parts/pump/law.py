@@ -35,8 +35,8 @@ from fvsolve.parts.pump.law_curve import (
 # speed from which the shaft then runs free, J times rated speed [N m s], torque that is not balanced at the start and
 # the fluid's there [N m], rated speed [rad/s], points of P or a Suter table's rated torque, how many given torques,
 # whether its power at the shaft is known; then pairs of schedule and value at the start of given torques, then the
-# points of P (flows, then powers) or WB. Where a table is joined, points of P may be none, and behind them stand its
-# rated torque, what WB lacks at the last flow, and WB.
+# points of P (flows, then powers) or WB. Where a table is joined, behind P stand its rated torque, what WB lacks at the
+# last flow, and WB.
 MODE, CHECK, TRIP, HELD, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, GIVEN, KNOWN, OWN_NUMBERS = range(12)
 HELD_SPEED, TRIPPING, TURNED = 0, 1, 2  # modes
 STEEPEST = 8.0  # d(torque) / d(speed) of a Suter table, over rated and over n + v, at most
@@ -93,7 +93,7 @@ def fluid_torque(floats, at, curve, n, q, dense):
         rated = dense * floats[at + COUNT_OR_TORQUE]
         return rated * suter_value(floats, table, int(floats[curve + COUNT]), n, q / floats[curve + OWN + 1])[0]
     count = int(floats[at + COUNT_OR_TORQUE])
-    if floats[curve + JOIN] > 0.0 and (count == 0 or leaves(floats, curve, n, q)):
+    if leaves(floats, curve, n, q):
         join, own = curve + int(floats[curve + JOIN]), table + 2 * count
         return dense * floats[own] * joined_value(floats, join, own + 1, n, q / floats[join + RATED_FLOW])[0]
     if n <= 0.0:

@@ -15,7 +15,7 @@ from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point
 from fvsolve.parts.pump.lower_join import joined_table, specific_speed
-from fvsolve.parts.pump.lower_notes import drawn_backwards, estimated, quick, too_good
+from fvsolve.parts.pump.lower_notes import drawn_backwards, estimated, quick
 from fvsolve.parts.pump.lower_shaft import inertia, shaft_points
 from fvsolve.steady import Edge
 
@@ -163,7 +163,6 @@ class PumpRows(Device, kind="pump"):
             moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
         draft.warnings += [
             *drawn_backwards(start, name, part, valve), *quick(draft, name, part), *estimated(draft, name, part),
-            *too_good(draft, name, part),
         ]  # fmt: skip
         return moving + self.let_go(start, part, row, valve)
 

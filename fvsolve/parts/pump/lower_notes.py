@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.parts.pump.lower_curve import rated_point
-from fvsolve.parts.pump.lower_shaft import best_efficiency, inertia
+from fvsolve.parts.pump.lower_shaft import inertia
 
 NEAR = 1e-6  # difference of heads that is rounding [m]
 QUICKEST = 15.0  # velocity beside a pump at its rated flow beyond which a note asks [m/s]
@@ -37,16 +37,6 @@ def estimated(draft, name: str, part) -> list[Notice]:
     text = (f"{name}: its inertia is estimated at {found:.4g} kg m2, impeller, water and motor, from power and speed; "
             "a surge hangs on it, so ask the maker for it and give inertia")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "inertia", found)]
-
-
-def too_good(draft, name: str, part) -> list[Notice]:
-    """A note on a pump that would give more than it takes: its curve is too full for the torque of its table."""
-    best, flow = best_efficiency(part, draft.fluid.density * draft.case.gravity)
-    if best <= 1.0:
-        return []
-    text = (f"{name}: by its curve and the torque of its Suter table its efficiency at {flow:.4g} m3/s would be "
-            f"{best:.3g}; give efficiency over flow, or shaft_power")  # fmt: skip
-    return [Notice("range", f"links.{name}", text, "efficiency", best, 1.0)]
 
 
 def quick(draft, name: str, part) -> list[Notice]:

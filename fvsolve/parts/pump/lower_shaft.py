@@ -13,12 +13,13 @@ from fvsolve.parts.pump.lower_curve import base_law, curve_numbers, rated_point
 from fvsolve.parts.pump.lower_join import fitted, joined_table
 from fvsolve.parts.pump.part import EFFICIENCY
 
+EVEN = 65  # points of a power by a table over the angle, and as many over the flow
+
 
 def shaft_points(part, weight: float) -> list[float]:
     """[how many, flows, powers at the shaft [W]] at relative speed 1; of a Suter table [rated torque, WB].
 
-    Where a table is joined to the curve there follow its rated torque, what WB lacks and WB; by one number for the
-    efficiency there are no points.
+    Where a table is joined to the curve its rated torque, what WB lacks at the last flow and WB follow.
     """
     flow, head = rated_point(part, weight)
     rated = weight * flow * head / rated_efficiency(part)
@@ -28,29 +29,25 @@ def shaft_points(part, weight: float) -> list[float]:
     if (table := joined_table(part, flow, head)) is None:
         flows, powers = shaft_power(part, weight, flow, rated)
         return [len(flows), *flows, *powers]
-    if part.shaft_power is None and not isinstance(part.efficiency, CurvePoints):
-        return [0, torque, 0.0, *table.torque]
-    flows, powers = shaft_power(part, weight, flow, rated)
     last = base_law(part, weight)[3]
+    if part.shaft_power is None and not isinstance(part.efficiency, CurvePoints):
+        flows, powers = table_power(table, np.array(curve_numbers(part, weight)), flow, head, last)
+        powers = rated * powers
+    else:
+        flows, powers = shaft_power(part, weight, flow, rated)
     shut_off, end = np.interp([0.0, last], flows, powers) / rated
     lack, values = fitted(table.torque, shut_off, end, math.atan2(last, flow))
     return [len(flows), *flows, *powers, torque, lack, *values]
 
 
-def best_efficiency(part, weight: float) -> tuple[float, float]:
-    """(greatest efficiency over a curve whose torque is that of a table, flow there [m3/s]); 0, 0 of other pumps."""
-    flow, head = rated_point(part, weight)
-    table = joined_table(part, flow, head)
-    if table is None or part.shaft_power is not None or isinstance(part.efficiency, CurvePoints):
-        return 0.0, 0.0
-    numbers = np.array(curve_numbers(part, weight))
-    flows = np.linspace(0.0, numbers[curves.LAST], 101)[1:]
-    heads = np.array([curves.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows])
+def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    """(flows, powers over the rated one) of a curve by WB, but nowhere less than the rated efficiency asks for."""
+    flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), EVEN)[:-1])
+    flows = np.unique([*flows, *np.linspace(0.0, last, EVEN), *([flow] if last > flow else [])])
+    lifts = np.array([curves.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows]) / head
     at = np.linspace(-math.pi, math.pi, len(table.torque))
-    torque = (1.0 + (flows / flow) ** 2) * np.interp(np.arctan2(flows, flow), at, table.torque)
-    found = rated_efficiency(part) * flows * heads / (flow * head * np.maximum(torque, 1e-9))
-    best = int(np.argmax(found))
-    return float(found[best]), float(flows[best])
+    by_table = (1.0 + (flows / flow) ** 2) * np.interp(np.arctan2(flows, flow), at, table.torque)
+    return flows, np.maximum(by_table, lifts * flows / flow)
 
 
 def rated_efficiency(part) -> float:
