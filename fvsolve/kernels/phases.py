@@ -138,6 +138,10 @@ MEMBERS = {
     "forces, cavitating": Pieces(observe="forces: observe_forces_cavitating"),
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
+    "creep, barotropic": Pieces(rates="creep.barotropic: creep_walls_barotropic"),
+    "creep": Pieces(
+        rates="creep.wall: creep_walls", power="creep.energy: add_power", stored="creep.energy: add_stored",
+    ),
 }  # fmt: skip
 DELAYS = Pieces(
     offer="delay.lines: offer_lines", answer="delay.lines: answer_lines",
@@ -172,6 +176,7 @@ class Cast:
     bushings: bool = False
     rides: bool = False
     memory: bool = False
+    creep: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
     basins: tuple[Pieces, ...] = ()
@@ -229,6 +234,8 @@ class Cast:
             yield MEMBERS["devices"]
         if self.memory:
             yield MEMBERS["memory" if linear else "memory, barotropic"]
+        if self.creep:
+            yield MEMBERS["creep" if linear else "creep, barotropic"]
         yield from self.basins
         if self.scalars:  # which the flow carries that rates of waves now have
             yield MEMBERS["scalars"]

@@ -105,6 +105,12 @@ PIPE = np.dtype(  # what delay lines read comes first, in as few cache lines as 
         ("terms", "i8"),  # exponentials of its unsteady friction; 0 for none
         ("term", "i8"),  # offset in `floats` of pairs: drag per flow that is yet to follow [1/s], rate of following
         ("memory", "i8"),  # offset in y of the flows that follow, a row of cells for each term [kg/s]
+        ("elements", "i8"),  # Kelvin-Voigt elements of its wall; 0 for none
+        (
+            "element",
+            "i8",
+        ),  # offset in `floats` of pairs: what both waves lose per w yet to follow, rate [1/s]
+        ("strain", "i8"),  # offset in y of what follows w, the sum of both waves, a row of cells an element [kg/s]
         (
             "face",
             "i8",

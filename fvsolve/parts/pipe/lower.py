@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.creep import add_creep
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.model import PipeMesh
 from fvsolve.model.reading import along
@@ -44,6 +45,7 @@ class PipeRows(Lowering, kind="pipe"):
         else:
             names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
             row["y"] = draft.states(names, 0.5e5 * row["admittance"])
+            add_creep(draft, name, link, row)
         x = (np.arange(n) + 0.5) * (link.length / n)
         along_it = z[0] + row["slope"] * x if link.profile is None else link.profile.at(x)
         draft.meshes.append(
