@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import calls
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
@@ -75,6 +76,10 @@ class Device(Restriction):
     def begin(self, start, part: Any, row) -> list[str]:
         """Fill in what depends on the profile; returns what moves, in words."""
         return []
+
+    def passing(self, model, name: str, part: Any, time: float) -> Notice:
+        """What is to be known where its law's `outside` said PASSING, at first at that time."""
+        raise NotImplementedError
 
     def settle(self, slate, row, y: np.ndarray, scale: np.ndarray) -> None:
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""

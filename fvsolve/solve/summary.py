@@ -102,8 +102,8 @@ def find_marks(slate: Slate) -> list[Mark]:
             "its last way out shut while it flowed, or it met another; a rigid column has no surge, a pipe would"
         ),
         "outside its curve": (
-            "the pump works backwards or beyond its curve's last flow; in place of curve, suter = { rated_flow, "
-            'rated_head, table } says how, with table = "radial-35" or head and torque (WH and WB) of its own'
+            "the pump works backwards or beyond its curve's last flow; with rated_speed the Suter table of its "
+            "specific speed is joined to the curve, or suter = { rated_flow, rated_head, table } in its place says how"
         ),
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would hold it",
         "below vapor pressure": (
@@ -121,15 +121,15 @@ def find_marks(slate: Slate) -> list[Mark]:
 
 
 def run_downs(slate: Slate) -> list[Notice]:
-    """Pumps that ran forward beyond their curve while they ran down, ahead of a check valve that shuts."""
-    model, marks, found = slate.model, slate.marks, []
+    """What devices outside their laws have to say that is no mark: pumps that ran down, or whose curve goes on."""
+    model, marks = slate.model, slate.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
-    for (name, *_), time in zip(model.devices, marks[first + len(model.devices) :], strict=False):
-        if np.isfinite(time):
-            text = (f"{name}: it runs down, from {time:.6g} s on beyond its curve's last flow, where its head is "
-                    "that of a parabola; suter in place of curve would tell it")  # fmt: skip
-            found.append(Notice("range", f"links.{name}", text, "curve"))
-    return found
+    times = marks[first + len(model.devices) :]
+    return [
+        made.passing(model, name, part, float(time))
+        for (name, part, made), time in zip(model.devices, times, strict=False)
+        if np.isfinite(time)
+    ]
 
 
 def drifts(model: Model, y: np.ndarray) -> list[Notice]:

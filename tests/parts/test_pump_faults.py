@@ -31,7 +31,7 @@ FOUND = [
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0]}}, "1 values for 2 flows"),
     ({"curve": {"coefficients": [50.0]}}, "fall to 0 at some flow"),
     ({"curve": {"coefficients": [50.0, 100.0, -5000.0]}}, "the head rises at a flow of 0 m3/s"),
-    ({"curve": ONE, "trip": 1.0}, "trip: wants the inertia of all that turns with the shaft"),
+    ({"curve": ONE, "trip": 1.0}, "trip: wants rated_speed"),
     ({"curve": ONE, "inertia": 2.0}, 'inertia: wants rated_speed, for example "1480 rpm"'),
     ({"curve": ONE, "inertia": -2.0, "rated_speed": 150.0}, "inertia: -2.0 is out of range; wanted a value above 0"),
     ({"curve": ONE, "inertia": "2 kg", "rated_speed": 150.0}, "is a mass; wanted a moment of inertia"),
@@ -58,7 +58,7 @@ def test_a_fault_of_a_pump(keys, message):
 
 def test_all_faults_come_at_once():
     said = faults(curve={"flow": [0.1, 0.1], "head": [40.0, 50.0]}, trip=1.0, speed=-1.0)
-    for part in ("flows out of order", "the head must fall", "wants the inertia", "out of range"):
+    for part in ("flows out of order", "the head must fall", "wants rated_speed", "out of range"):
         assert part in said
 
 

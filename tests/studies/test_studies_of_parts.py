@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from truth import pump_trip
 from truth.folders import CASES
 
 import fvsolve
@@ -28,8 +29,6 @@ from fvsolve.studies.stability import stability as room
 from fvsolve.studies.stability.carried import TooLarge
 from fvsolve.studies.stability.stability import stability
 from fvsolve.studies.truth import candidates, truth
-
-RHO_WATER = 998.2
 
 
 def case(name, **numerics):
@@ -165,7 +164,7 @@ def test_a_chart_of_dear_rates_has_fewer_cells():
 def test_what_acts_on_a_pump_that_trips_is_its_run_down():
     model = fvsolve.build(case("pump-trip", links__main__cells=10))
     pump = model.case.links["pump"]
-    torque = RHO_WATER * 9.80665 * 46.658e-3 * (71.999 - 2.0) / (pump.efficiency * pump.rated_speed)
+    torque = pump_trip.torque(1.0, 46.658e-3)
     assert change_time(model) == pytest.approx(pump.inertia * pump.rated_speed / torque, rel=0.05)
 
 

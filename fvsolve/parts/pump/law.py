@@ -16,13 +16,17 @@ from fvsolve.kernels.schedules import schedule_value
 from fvsolve.parts.check_valve.law import RELUCTANCE
 from fvsolve.parts.pump.law_curve import (
     COUNT,
+    JOIN,
     LAST,
     LAW,
     OWN,
+    RATED_FLOW,
     SCALE,
     SUTER,
     curve_head,
     curve_step,
+    joined_value,
+    leaves,
     piecewise,
     suter_value,
 )
@@ -31,7 +35,8 @@ from fvsolve.parts.pump.law_curve import (
 # speed from which the shaft then runs free, J times rated speed [N m s], torque that is not balanced at the start and
 # the fluid's there [N m], rated speed [rad/s], points of P or a Suter table's rated torque, how many given torques,
 # whether its power at the shaft is known; then pairs of schedule and value at the start of given torques, then the
-# points of P (flows, then powers) or WB.
+# points of P (flows, then powers) or WB. Where a table is joined, behind P stand its rated torque, what WB lacks at the
+# last flow, and WB.
 MODE, CHECK, TRIP, HELD, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, GIVEN, KNOWN, OWN_NUMBERS = range(12)
 HELD_SPEED, TRIPPING, TURNED = 0, 1, 2  # modes
 STEEPEST = 8.0  # d(torque) / d(speed) of a Suter table, over rated and over n + v, at most
@@ -87,9 +92,12 @@ def fluid_torque(floats, at, curve, n, q, dense):
     if floats[curve + LAW] == SUTER:
         rated = dense * floats[at + COUNT_OR_TORQUE]
         return rated * suter_value(floats, table, int(floats[curve + COUNT]), n, q / floats[curve + OWN + 1])[0]
+    count = int(floats[at + COUNT_OR_TORQUE])
+    if leaves(floats, curve, n, q):
+        join, own = curve + int(floats[curve + JOIN]), table + 2 * count
+        return dense * floats[own] * joined_value(floats, join, own + 1, n, q / floats[join + RATED_FLOW])[0]
     if n <= 0.0:
         return 0.0
-    count = int(floats[at + COUNT_OR_TORQUE])
     place = max(floats[table], min(floats[table + count - 1], q / n))
     return dense * n * n * piecewise(floats, table, count, place)[0] / floats[at + RATED]
 
@@ -130,12 +138,11 @@ def shaft_rate(out, tables, device, torque):
     """Greatest rate at which the fluid brakes a free shaft [1/s]."""
     floats, at, curve = tables.floats, device["data"], tables.valves[device["valve"]]["data"]
     n, q, _ = pump_point(out, tables, device)
-    if floats[curve + LAW] == SUTER:
-        return (
-            STEEPEST
-            * abs(floats[at + COUNT_OR_TORQUE] / floats[at + INERTIA])
-            * (abs(n) + abs(q / floats[curve + SCALE]))
-        )
+    if floats[curve + LAW] == SUTER or floats[curve + JOIN] > 0.0:
+        rated = floats[at + COUNT_OR_TORQUE]
+        if floats[curve + JOIN] > 0.0:
+            rated = floats[at + OWN_NUMBERS + 2 * (int(floats[at + GIVEN]) + int(rated))]
+        return STEEPEST * abs(rated / floats[at + INERTIA]) * (abs(n) + abs(q / floats[curve + SCALE]))
     return 3.0 * abs(torque / (n * floats[at + INERTIA])) if n > 0.0 else 0.0
 
 
@@ -203,7 +210,8 @@ def value(t, y, out, tables, device, which):
 def outside(out, tables, device):
     """1 where it works outside its curve, backwards or beyond the last flow; a Suter table has no outside.
 
-    PASSING where it runs down behind a check valve: slower than at the start, forward, by a flow its curve then held.
+    PASSING where a table is joined to it, and where it runs down behind a check valve: slower than at the start,
+    forward, by a flow its curve then held.
     """
     floats, curve = tables.floats, tables.valves[device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:
@@ -216,6 +224,8 @@ def outside(out, tables, device):
     )
     if -slack <= q <= max(n, 0.0) * last + slack:
         return 0
+    if floats[curve + JOIN] > 0.0:
+        return PASSING
     down = floats[device["data"] + CHECK] > 0.0 and n < begun and 0.0 < q <= begun * last
     return PASSING if down else 1
 

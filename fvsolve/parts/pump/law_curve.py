@@ -5,6 +5,9 @@ a - b q^c, straight lines between points, a polynomial. Beyond them it goes on w
 line and beyond `last` along a parabola a' - b' q^2, which is what a pump at rest is too; flow backwards adds b' q^2,
 and where `first` is above 0, as it is for a curve that is flat at no flow, the line ends at as much flow backwards.
 With a table of Suter form, H = (n^2 + v^2) WH(pi + atan2(v, n)) [rated heads], v the flow over the rated one.
+A curve may have such a table joined to it in place of line and parabolas: outside of 0 <= q <= n `last`, n > 0, where
+WH gets what it lacks at either end of the curve, less and less of it until the pump stands, x = pi / 2 (this by the
+values of the table already) and 3 pi / 2.
 """
 
 from math import atan2, pi, sqrt
@@ -15,9 +18,13 @@ from fvsolve.kernels.valves import LEAST
 NEAR = 1e-9  # change of flow, relative, over which a chord is a tangent
 
 POWER, POINTS, POLYNOMIAL, SUTER = 0, 1, 2, 3  # laws of head curves
-# Numbers of a curve: law, how many, first, last, a', b', scale of flows, then a, b, c | flows, heads | coefficients |
-# rated head, rated flow and WH. Those of a law begin at OWN.
-LAW, COUNT, FIRST, LAST, TAIL_HEAD, TAIL, SCALE, OWN = 0, 1, 2, 3, 4, 5, 6, 7
+# Numbers of a curve: law, how many, first, last, a', b', scale of flows, at which of them those of what is joined
+# begin, 0 where nothing is, then a, b, c | flows, heads | coefficients | rated head, rated flow and WH. Those of a law
+# begin at OWN.
+LAW, COUNT, FIRST, LAST, TAIL_HEAD, TAIL, SCALE, JOIN, OWN = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# Numbers of what is joined: rated head, rated flow, values of the table, atan2(v, n) of the last flow, then what WH
+# lacks there, and WH. WB has these two likewise.
+RATED_HEAD, RATED_FLOW, VALUES, EDGE, LACKS = 0, 1, 2, 3, 4
 
 
 @njit
@@ -57,8 +64,30 @@ def suter_value(floats, at, count, speed, flow):
 
 
 @njit
+def leaves(floats, at, speed, flow):
+    """Whether a pump is outside its curve where a table is joined to it."""
+    return floats[at + JOIN] > 0.0 and not (speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST])
+
+
+@njit
+def joined_value(floats, join, lacks, speed, flow):
+    """`suter_value`, at a flow over the rated one, of what stands at `lacks`: a lack at the last flow, and a table."""
+    value, slope = suter_value(floats, lacks + 1, int(floats[join + VALUES]), speed, flow)
+    angle, edge, fade, steep = atan2(flow, speed), floats[join + EDGE], 0.0, 0.0
+    if edge <= angle < 0.5 * pi:
+        steep = -floats[lacks] / (0.5 * pi - edge)
+        fade = steep * (angle - 0.5 * pi)
+    return value + (speed * speed + flow * flow) * fade, slope + 2.0 * flow * fade + speed * steep
+
+
+@njit
 def curve_head(floats, at, speed, flow):
     """(head [m], its slope over flow [s/m2]) of the curve at `at` at a relative speed and a flow [m3/s]."""
+    if leaves(floats, at, speed, flow):
+        join = at + int(floats[at + JOIN])
+        head, rated = floats[join + RATED_HEAD], floats[join + RATED_FLOW]
+        value, slope = joined_value(floats, join, join + LACKS, speed, flow / rated)
+        return head * value, head / rated * slope
     if floats[at + LAW] == SUTER:
         head, rated = floats[at + OWN], floats[at + OWN + 1]
         value, slope = suter_value(floats, at + OWN + 2, int(floats[at + COUNT]), speed, flow / rated)

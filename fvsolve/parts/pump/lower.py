@@ -7,21 +7,21 @@ import math
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
 from fvsolve.kernels.schedules import value_until
 from fvsolve.model.device import Device
 from fvsolve.model.inputs import SPEED, Input
 from fvsolve.parts import Schedule
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
-from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point, shaft_points
+from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point
+from fvsolve.parts.pump.lower_join import joined_table, specific_speed
+from fvsolve.parts.pump.lower_notes import drawn_backwards, estimated, quick
+from fvsolve.parts.pump.lower_shaft import inertia, shaft_points
 from fvsolve.steady import Edge
 
 SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding
 SMALL_SPEED = 0.01  # what counts as a small change of relative speed
-NEAR = 1e-6  # difference of heads that is rounding [m]
-QUICKEST = 15.0  # velocity beside a pump at its rated flow beyond which a note asks [m/s]
-UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
+FEW, MANY = 20.0, 320.0  # specific speeds that the tables are near
 SNAP = 1e-12  # share of the torques on a shaft below which their sum is rounding
 
 
@@ -54,10 +54,11 @@ class PumpRows(Device, kind="pump"):
         mode = law.TURNED if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
         draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
         given = [x for torque in torques for x in (draft.schedules.add(torque.torque), 0.0)]
-        own = shaft_points(part, draft.fluid.density * draft.case.gravity)
+        weight = draft.fluid.density * draft.case.gravity
+        own = shaft_points(part, weight)
         numbers = {
             law.MODE: mode, law.CHECK: part.check_valve, law.TRIP: self.trip(draft, name, part),
-            law.INERTIA: (part.inertia or np.inf) * rated, law.RATED: rated, law.COUNT_OR_TORQUE: own[0],
+            law.INERTIA: (inertia(part, weight) or np.inf) * rated, law.RATED: rated, law.COUNT_OR_TORQUE: own[0],
             law.GIVEN: len(torques), law.KNOWN: self.resists(part),
         }  # fmt: skip
         return [float(numbers.get(k, 0.0)) for k in range(law.OWN_NUMBERS)] + given + own[1:]
@@ -74,14 +75,30 @@ class PumpRows(Device, kind="pump"):
         return made
 
     def resists(self, part) -> bool:
-        return not part.inertia is part.efficiency is part.shaft_power is part.suter is None
+        return not part.inertia is part.trip is part.efficiency is part.shaft_power is part.suter is None
 
     def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
-        return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
+        if row["y"] < 0:
+            return []
+        return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * inertia(part, weight_of(model)))}]
 
     def above(self, model, part, row) -> float:
         speed = float(model.tables.valves[row["valve"]]["drive"])
-        return 0.5 * part.inertia * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
+        return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
+
+    def passing(self, model, name, part, time) -> Notice:
+        """What is to be known of a pump that left its curve, and may have."""
+        rated = rated_point(part, weight_of(model))
+        if (table := joined_table(part, *rated)) is None:
+            text = (f"{name}: it runs down, from {time:.6g} s on beyond its curve's last flow, where its head is "
+                    "that of a parabola; with rated_speed a Suter table would tell it")  # fmt: skip
+            return Notice("range", f"links.{name}", text, "curve")
+        speed = specific_speed(part, *rated)
+        near = table.words if FEW <= speed <= MANY else f"{table.words}, the nearest"
+        text = (f"{name}: it leaves its curve at {time:.6g} s; outside of it head and torque are those of the Suter "
+                f"table {near}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
+                "of a pump of several stages or inlets suter says it better")  # fmt: skip
+        return Notice("range", f"links.{name}", text, "outside", speed)
 
     def speed_at(self, start, k: int) -> float:
         """Relative speed at the start."""
@@ -144,7 +161,9 @@ class PumpRows(Device, kind="pump"):
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
-        start.draft.warnings += [*drawn_backwards(start, name, part, valve), *quick(draft, name, part)]
+        draft.warnings += [
+            *drawn_backwards(start, name, part, valve), *quick(draft, name, part), *estimated(draft, name, part),
+        ]  # fmt: skip
         return moving + self.let_go(start, part, row, valve)
 
     def let_go(self, start, part, row, valve) -> list[str]:
@@ -170,34 +189,10 @@ class PumpRows(Device, kind="pump"):
         return [f"pump {name}: its shaft speeds up by {rise:.4g} rad/s2"] if left != 0.0 else []
 
 
-def drawn_backwards(start, name: str, part, valve) -> list[Notice]:
-    """A note on a pump that runs at the start and delivers downhill, or into the lowest water that there is."""
-    i, j = int(valve["from_node"]), int(valve["to_node"])
-    heads = start.nodes["pressure"] / start.weight + start.nodes["elevation"]
-    still = np.isin(start.nodes["kind"], (rec.FIXED, rec.TANK))
-    lowest = still[j] and not still[i] and heads[j] < heads[still].max() - NEAR and heads[j] == heads[still].min()
-    if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + NEAR or lowest):
-        return []
-    what = "the lowest water there is" if lowest else f"{heads[i] - heads[j]:.4g} m lower"
-    text = f"{name}: it pumps from {part.from_} to {part.to}, {what}; is it drawn backwards? `from` is its suction side"
-    return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
-
-
-def quick(draft, name: str, part) -> list[Notice]:
-    """A note on a pump whose rated flow is too quick for every pipe beside it; pumping stations have 1 to 4 m/s (Sanks,
-    Pumping Station Design)."""
-    pipes = [one for one in draft.case.links.values() if one.kind in ("pipe", "rigid-column")]
-    wide = max((one.diameter for one in pipes if {one.from_, one.to} & {part.from_, part.to}), default=None)
-    if wide is None or part.power is not None:
-        return []
-    flow = rated_point(part, draft.fluid.density * draft.case.gravity)[0]
-    speed = flow / (math.pi / 4.0 * wide**2)
-    if speed <= QUICKEST:
-        return []
-    meant = next((f'; was "{flow:.4g} {unit}" meant?' for unit, size in UNITS if speed * size <= QUICKEST), "")
-    text = f"{name}: its rated flow of {flow:.4g} m3/s is {speed:.4g} m/s in the widest pipe beside it{meant}"
-    key = "suter" if part.suter is not None else "curve"
-    return [Notice("range", f"links.{name}", text, key, speed, QUICKEST)]
+def weight_of(model) -> float:
+    """rho g of a model's fluid [N/m3]."""
+    settings = model.tables.settings[0]
+    return float(settings["rho"] * settings["gravity"])
 
 
 def torques_on(case, name: str) -> list:

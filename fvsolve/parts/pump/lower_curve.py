@@ -1,4 +1,4 @@
-"""Head curves and powers of pumps as the numbers that kernels read. Knows the curves; knows no scene."""
+"""Head curves of pumps as the numbers that kernels read. Knows the curves; knows no shaft and no scene."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.head_curve import CurvePoints, first_root
-from fvsolve.parts.pump.part import EFFICIENCY
+from fvsolve.parts.pump.lower_join import joined_numbers
 
 LEAST_FLOW = 1e-5  # share of the last flow below which a curve that is flat there is a straight line
 HIGHEST, LOWEST = 1000.0, 0.1  # heads between which a pump of constant power keeps it [m]
@@ -26,17 +26,20 @@ def curve_numbers(part, weight: float) -> list[float]:
             0.0,
             0.0,
             one.rated_flow,
+            0.0,
             one.rated_head,
             one.rated_flow,
             *one.head,
         ]
     law, count, first, last, own = base_law(part, weight)
-    numbers = [law, count, first, last, 0.0, 0.0, last, *own]
+    numbers = [law, count, first, last, 0.0, 0.0, last, 0.0, *own]
     head, slope = curves.base_head(np.array(numbers), 0, float(last))
     tail = -slope / (2.0 * last)
     numbers[curves.TAIL_HEAD], numbers[curves.TAIL] = head + tail * last**2, tail
     numbers[curves.SCALE] = rated_point(part, weight)[0]
-    return [float(one) for one in numbers]
+    joined = joined_numbers(part, *rated_point(part, weight), numbers)
+    numbers[curves.JOIN] = len(numbers) if joined else 0.0
+    return [float(one) for one in (*numbers, *joined)]
 
 
 def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
@@ -82,38 +85,8 @@ def rated_point(part, weight: float) -> tuple[float, float]:
         k = min(1, len(curve.flow) - 1)
         return curve.flow[k], curve.value[k]
     law, count, first, last, own = base_law(part, weight)
-    numbers = np.array([law, count, first, last, 0.0, 0.0, last, *own], dtype=float)
+    numbers = np.array([law, count, first, last, 0.0, 0.0, last, 0.0, *own], dtype=float)
     flows = np.linspace(0.0, last, 1001)[1:]
     heads = np.array([curves.base_head(numbers, 0, float(q))[0] for q in flows])
     best = int(np.argmax(flows * heads))
     return float(flows[best]), float(heads[best])
-
-
-def shaft_points(part, weight: float) -> list[float]:
-    """[how many, flows, powers at the shaft [W]] at relative speed 1; of a Suter table [rated torque, WB]."""
-    flow, head = rated_point(part, weight)
-    best = EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, CurvePoints) else part.efficiency
-    rated = weight * flow * head / best
-    if part.suter is not None:
-        return [rated / (part.rated_speed or 1.0), *part.suter.torque]
-    if part.power is not None and part.shaft_power is None:
-        return [2, 0.0, flow, part.power / best, part.power / best]
-    if part.shaft_power is not None:
-        flows, powers = part.shaft_power.flow, part.shaft_power.value
-    elif isinstance(part.efficiency, CurvePoints):
-        flows, powers = by_efficiency(part, weight)
-    else:
-        flows, powers = (0.0, flow, 4.0 * flow), (2.0 / 3.0 * rated, rated, 2.0 * rated)
-    if len(flows) == 1:
-        flows, powers = (flows[0], 2.0 * flows[0] + 1.0), (powers[0], powers[0])
-    return [len(flows), *flows, *powers]
-
-
-def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
-    """Powers at the points of an efficiency over flow, rho g q H / eta; at no flow that of the first one above it."""
-    numbers = np.array(curve_numbers(part, weight))
-    points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
-    flows = [q for q, _ in points]
-    powers = [weight * q * curves.curve_head(numbers, 0, 1.0, float(q))[0] / e for q, e in points]
-    shut_off = weight * curves.curve_head(numbers, 0, 1.0, 0.0)[0] * flows[0] / points[0][1]
-    return [0.0, *flows], [shut_off, *powers]

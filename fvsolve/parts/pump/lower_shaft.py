@@ -1,0 +1,98 @@
+"""Powers at the shafts of pumps, their efficiency and inertia, as kernels read them. Knows curves; knows no scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fvsolve.parts.pump import law_curve as curves
+from fvsolve.parts.pump.head_curve import CurvePoints
+from fvsolve.parts.pump.lower_curve import base_law, curve_numbers, rated_point
+from fvsolve.parts.pump.lower_join import fitted, joined_table
+from fvsolve.parts.pump.part import EFFICIENCY
+
+EVEN = 65  # points of a power by a table over the angle, and as many over the flow
+
+
+def shaft_points(part, weight: float) -> list[float]:
+    """[how many, flows, powers at the shaft [W]] at relative speed 1; of a Suter table [rated torque, WB].
+
+    Where a table is joined to the curve its rated torque, what WB lacks at the last flow and WB follow.
+    """
+    flow, head = rated_point(part, weight)
+    rated = weight * flow * head / rated_efficiency(part)
+    torque = rated / (part.rated_speed or 1.0)
+    if part.suter is not None:
+        return [torque, *part.suter.torque]
+    if (table := joined_table(part, flow, head)) is None:
+        flows, powers = shaft_power(part, weight, flow, rated)
+        return [len(flows), *flows, *powers]
+    last = base_law(part, weight)[3]
+    if part.shaft_power is None and not isinstance(part.efficiency, CurvePoints):
+        flows, powers = table_power(table, np.array(curve_numbers(part, weight)), flow, head, last)
+        powers = rated * powers
+    else:
+        flows, powers = shaft_power(part, weight, flow, rated)
+    shut_off, end = np.interp([0.0, last], flows, powers) / rated
+    lack, values = fitted(table.torque, shut_off, end, math.atan2(last, flow))
+    return [len(flows), *flows, *powers, torque, lack, *values]
+
+
+def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    """(flows, powers over the rated one) of a curve by WB, but nowhere less than the rated efficiency asks for."""
+    flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), EVEN)[:-1])
+    flows = np.unique([*flows, *np.linspace(0.0, last, EVEN), *([flow] if last > flow else [])])
+    lifts = np.array([curves.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows]) / head
+    at = np.linspace(-math.pi, math.pi, len(table.torque))
+    by_table = (1.0 + (flows / flow) ** 2) * np.interp(np.arctan2(flows, flow), at, table.torque)
+    return flows, np.maximum(by_table, lifts * flows / flow)
+
+
+def rated_efficiency(part) -> float:
+    """The number that a pump has at its rated point."""
+    return EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, CurvePoints) else part.efficiency
+
+
+def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequence[float], Sequence[float]]:
+    """Flows and powers at the shaft [W] at relative speed 1, two or more of each."""
+    if part.power is not None and part.shaft_power is None:
+        return (0.0, flow), (part.power / rated_efficiency(part),) * 2
+    if part.shaft_power is not None:
+        flows, powers = part.shaft_power.flow, part.shaft_power.value
+    elif isinstance(part.efficiency, CurvePoints):
+        flows, powers = by_efficiency(part, weight)
+    else:
+        flows, powers = (0.0, flow, 4.0 * flow), (2.0 / 3.0 * rated, rated, 2.0 * rated)
+    if len(flows) == 1:
+        flows, powers = (flows[0], 2.0 * flows[0] + 1.0), (powers[0], powers[0])
+    return flows, powers
+
+
+def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
+    """Powers at the points of an efficiency over flow, rho g q H / eta; at no flow that of the first one above it."""
+    numbers = np.array(curve_numbers(part, weight))
+    points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
+    flows = [q for q, _ in points]
+    powers = [weight * q * curves.curve_head(numbers, 0, 1.0, float(q))[0] / e for q, e in points]
+    shut_off = weight * curves.curve_head(numbers, 0, 1.0, 0.0)[0] * flows[0] / points[0][1]
+    return [0.0, *flows], [shut_off, *powers]
+
+
+def inertia(part, weight: float) -> float | None:
+    """Of all that turns with the shaft [kg m2]; where a pump that trips has none, impeller with its water, and motor.
+
+    0.03768 (P / N^3)^0.9556 + 0.0043 (P / N)^1.48, P the power at the shaft at the rated point [kW], N its speed in
+    1000 rpm. Regressions that go back to Thorley (Fluid Transients in Pipeline Systems, 1991), read as an open program
+    has both (`calculate_inertia`) and as Neutrium prints the former ("Estimation of pump moment of inertia":
+    1.5e7 (P / N^3)^0.9556 with N in rpm, 0.1 % less).
+    """
+    if part.inertia is not None or part.trip is None:
+        return part.inertia
+    flow, head = rated_point(part, weight)
+    power = weight * flow * head / rated_efficiency(part) / 1000.0
+    if part.shaft_power is not None:
+        power = float(np.interp(flow, *shaft_power(part, weight, flow, 0.0))) / 1000.0
+    speed = part.rated_speed * 30.0 / math.pi / 1000.0
+    return 0.03768 * (power / speed**3) ** 0.9556 + 0.0043 * (power / speed) ** 1.48
