@@ -18,6 +18,8 @@ MEANT = {
     "fcv": 'a "flow-control" valve',
     "emitter": 'a "leak"',
     "safety-valve": 'a "relief-valve"',
+    "burst-disc": 'a "rupture-disc"',
+    "bursting-disc": 'a "rupture-disc"',
     "piston": 'a "cylinder"',
     "actuator": 'a "cylinder"',
     "surge-tank": 'a "tank", with a connection for its throttle',

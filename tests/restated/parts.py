@@ -49,6 +49,7 @@ LINKS = {
     "orifice": of("orifice", {}, {"laminar_reynolds": between(5.0, 100.0)}, a=SIZE),
     "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc),
     "relief-valve": of("relief-valve", {"set_pressure": between(1.5e5, 6e5)}, a=SIZE, b=st.just({}) | MOVING).map(disc),
+    "rupture-disc": of("rupture-disc", {"burst_pressure": between(1.1e5, 1.6e5)}, a=SIZE),
     "pressure-reducing": of("pressure-reducing", {"set_pressure": between(1.5e5, 4e5)} | SLOW, a=SIZE),
     "pressure-sustaining": of("pressure-sustaining", {"set_pressure": between(1.5e5, 4e5)} | SLOW, a=SIZE),
     "flow-control": of("flow-control", {"set_flow": between(1e-3, 2e-2)} | SLOW, a=SIZE),
