@@ -18,6 +18,7 @@ MEANT = {
     "fcv": 'a "flow-control" valve',
     "emitter": 'a "leak"',
     "safety-valve": 'a "relief-valve"',
+    "surge-relief": 'a "surge-anticipating" valve, or a "relief-valve"',
     "burst-disc": 'a "rupture-disc"',
     "bursting-disc": 'a "rupture-disc"',
     "piston": 'a "cylinder"',

@@ -112,6 +112,13 @@ def test_resumed_before_and_after_it_burst_it_is_the_unbroken_run(tmp_path, end)
     assert np.array_equal(result["t.level"], whole["t.level"]) and result.summary["events"] == whole.summary["events"]
 
 
+def test_placed_by_chainage_it_stands_off_the_pipe():
+    nodes, links = {"a": reservoir(2e5), "b": junction()}, {"main": pipe("a", "b", 100.0, 0.2, 1000.0, 10)}
+    links["disc"] = {key: value for key, value in disc("", 2e5).items() if key != "from"} | {"on": "main", "at": 50.0}
+    model = fvsolve.build(fvsolve.load(scene(nodes, links, 0.1, {"scheme": "upwind"})))
+    assert model.valve_names == ["disc"] and "disc.outside" in model.node_names and len(model.tables.pipes) == 2
+
+
 @pytest.mark.parametrize(
     "wrong, said",
     [({"burst_pressure": -1.0}, "out of range"), ({"burst_pressure": 2e4}, "it would have burst, set it higher"),

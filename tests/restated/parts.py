@@ -50,6 +50,12 @@ LINKS = {
     "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc),
     "relief-valve": of("relief-valve", {"set_pressure": between(1.5e5, 6e5)}, a=SIZE, b=st.just({}) | MOVING).map(disc),
     "rupture-disc": of("rupture-disc", {"burst_pressure": between(1.1e5, 1.6e5)}, a=SIZE),
+    "surge-anticipating": of(
+        "surge-anticipating",
+        {"opening_time": between(0.05, 0.3), "closing_time": between(0.1, 0.5), "low_set": between(1.5e5, 2.8e5)},
+        {"high_set": between(3.2e5, 4e5), "trip": between(0.1, 0.6), "hold": between(0.0, 0.3)},
+        a=SIZE,
+    ),
     "pressure-reducing": of("pressure-reducing", {"set_pressure": between(1.5e5, 4e5)} | SLOW, a=SIZE),
     "pressure-sustaining": of("pressure-sustaining", {"set_pressure": between(1.5e5, 4e5)} | SLOW, a=SIZE),
     "flow-control": of("flow-control", {"set_flow": between(1e-3, 2e-2)} | SLOW, a=SIZE),

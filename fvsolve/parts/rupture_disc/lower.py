@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 from fvsolve.model.device import Device
-from fvsolve.parts.outlet.law import NO_END
+from fvsolve.parts.outlet.law import EVENTS
+from fvsolve.parts.outlet.lower import Relieving
 from fvsolve.parts.rupture_disc import law, law_outside
-from fvsolve.parts.rupture_disc.part import ToAmbient
-
-SPAN = 1e5  # drop at which an outlet's law has its flow [Pa]
 
 
-class RuptureDiscRows(Device, kind="rupture-disc"):
-    """Between two places, a root."""
+class RuptureDiscRows(Relieving, kind="rupture-disc"):
+    """Between two places."""
 
     law, sudden = law, True
-    quantities = ("opening",)
     events = ("bursts",)
 
     def of(self, part) -> Device:
-        return ToAmbientRows() if isinstance(part, ToAmbient) else self
+        return ToAmbient() if part.outward else self
 
-    def numbers(self, draft, name, part) -> list[float]:
+    def own_numbers(self, draft, name, part) -> list[float]:
         return [part.burst_pressure]
-
-    def revise(self, start, part, row) -> bool:
-        k = int(row["valve"])
-        new = k not in start.shut
-        start.shut |= {k}
-        return new
-
-    def follow(self, start, k) -> None:
-        """Nothing: it carries none."""
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
@@ -41,11 +29,8 @@ class RuptureDiscRows(Device, kind="rupture-disc"):
         return []
 
 
-class ToAmbientRows(RuptureDiscRows, kind=""):
-    """To ambient, an outlet."""
+class ToAmbient(RuptureDiscRows, kind=""):
+    """To ambient."""
 
-    law = law_outside
-    events = ("",) * law_outside.EVENTS + ("bursts",)
-
-    def numbers(self, draft, name, part) -> list[float]:
-        return [0.5, 0.0, SPAN, NO_END, part.burst_pressure]
+    law, mode = law_outside, EVENTS
+    events = ("",) * EVENTS + ("bursts",)
