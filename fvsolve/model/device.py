@@ -76,7 +76,7 @@ class Device(Restriction):
         """Fill in what depends on the profile; returns what moves, in words."""
         return []
 
-    def settle(self, slate, row, y: np.ndarray, scale: np.ndarray) -> None:
+    def settle(self, slate, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def resists(self, part: Any) -> bool:

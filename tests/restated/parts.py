@@ -9,6 +9,7 @@ from restated.drawing import FRICTIONS, between
 
 ONE, NONE = st.just(1.0), st.just(0.0)
 CRACKING = {"cracking_pressure": between(0.0, 5e3)}
+SLAMS = {"rate": [1.0, 10.0], "reverse_velocity": [0.05, 1.0]}
 SLOW = {"time_constant": between(0.1, 5.0)}
 SIZE = st.one_of(
     st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
@@ -47,7 +48,8 @@ LINKS = {
     "rigid-column": of("rigid-column", CONDUIT, {"minor_loss": between(0.0, 3.0)}),
     "valve": of("valve", {"opening": OPENING}, {"characteristic": st.just("equal-percentage")}, a=SIZE),
     "orifice": of("orifice", {}, {"laminar_reynolds": between(5.0, 100.0)}, a=SIZE),
-    "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc),
+    "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc)
+    | of("check-valve", {"area": between(1e-4, 5e-3), "deceleration": st.just(SLAMS)}, CRACKING),
     "relief-valve": of("relief-valve", {"set_pressure": between(1.5e5, 6e5)}, a=SIZE, b=st.just({}) | MOVING).map(disc),
     "rupture-disc": of("rupture-disc", {"burst_pressure": between(1.1e5, 1.6e5)}, a=SIZE),
     "surge-anticipating": of(

@@ -32,7 +32,7 @@ class SurgeAnticipatingRows(Relieving, kind="surge-anticipating"):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, part.hold + part.opening_time]
 
-    def settle(self, slate, row, y, scale) -> None:
+    def settle(self, slate, row, t, y, scale) -> None:
         at, o = row["event"] + row["mode"], row["y"]
         if slate.armed[at + law.SHUT] > 0.0:
             y[o] = 0.0
