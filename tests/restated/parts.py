@@ -90,5 +90,10 @@ NODES = {
             {"exponent": between(1.0, 1.4)} | CONNECTION,
         ),
     ),
-    "air-valve": of("air-valve", {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)}),
+    "air-valve": of(
+        "air-valve",
+        {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)},
+        {"automatic": between(1e-3, 3e-3)},
+        a=st.sampled_from([{}, {"switch": 3e3, "throttled_outlet": 4e-3}]),
+    ),
 }  # fmt: skip
